@@ -1,0 +1,91 @@
+"""A pinhole camera with its pose."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+
+def check_rigid(matrix: np.ndarray, name: str, tolerance: float = 1e-4) -> None:
+    """Raise ``ValueError`` unless ``matrix`` (..., 4, 4) is a finite rigid transform."""
+    if matrix.shape[-2:] != (4, 4):
+        raise ValueError(f"{name}: expected 4x4 matrices, got shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name}: holds NaN or infinite numbers")
+    rotation = matrix[..., :3, :3]
+    error = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0)
+    if error > tolerance or (np.linalg.det(rotation) < 0).any():
+        raise ValueError(
+            f"{name}: the 3x3 part is not a rotation (R R^T differs from the identity by {error:.2g}; "
+            "expected right-handed rotations without scale)"
+        )
+    if np.abs(matrix[..., 3, :] - np.array([0, 0, 0, 1])).max(initial=0.0) > tolerance:
+        raise ValueError(f"{name}: the last row must be 0 0 0 1")
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole: axes x right, y down, z forward; the centre of the top-left pixel is at (0.5, 0.5).
+
+    Attributes:
+        fx_px: Focal length along x in pixels.
+        fy_px: Focal length along y in pixels.
+        cx_px: Principal point in pixels, counted from the left edge of the image.
+        cy_px: Principal point in pixels, counted from the top edge of the image.
+        width_px: Image width.
+        height_px: Image height.
+        world_from_camera: Rigid pose (4, 4) in metres.
+    """
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    width_px: int
+    height_px: int
+    world_from_camera: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        if not (self.fx_px > 0 and self.fy_px > 0):
+            raise ValueError(f"focal lengths must be positive, got fx {self.fx_px}, fy {self.fy_px}")
+        if self.width_px < 1 or self.height_px < 1:
+            raise ValueError(f"image size must be positive, got {self.width_px}x{self.height_px}")
+        check_rigid(self.world_from_camera, "world_from_camera")
+
+    @property
+    def matrix(self) -> Float[np.ndarray, "3 3"]:
+        """Intrinsic matrix (3, 3) for pixel coordinates with centres at +0.5."""
+        return np.array([[self.fx_px, 0, self.cx_px], [0, self.fy_px, self.cy_px], [0, 0, 1]], dtype=np.float64)
+
+    @property
+    def camera_from_world(self) -> Float[np.ndarray, "4 4"]:
+        """Inverse of the pose (4, 4)."""
+        rotation = self.world_from_camera[:3, :3]
+        inverse = np.eye(4)
+        inverse[:3, :3] = rotation.T
+        inverse[:3, 3] = -rotation.T @ self.world_from_camera[:3, 3]
+        return inverse
+
+    def at(self, world_from_camera: Float[np.ndarray, "4 4"]) -> "Camera":
+        """The same pinhole at another pose."""
+        return replace(self, world_from_camera=np.asarray(world_from_camera, dtype=np.float64))
+
+    def resized(self, width_px: int, height_px: int) -> "Camera":
+        """The same view sampled on another pixel grid."""
+        sx, sy = width_px / self.width_px, height_px / self.height_px
+        return replace(
+            self,
+            fx_px=self.fx_px * sx,
+            fy_px=self.fy_px * sy,
+            cx_px=self.cx_px * sx,
+            cy_px=self.cy_px * sy,
+            width_px=width_px,
+            height_px=height_px,
+        )
+
+    def rays(self) -> Float[np.ndarray, "h w 3"]:
+        """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
+        x = (np.arange(self.width_px) + 0.5 - self.cx_px) / self.fx_px
+        y = (np.arange(self.height_px) + 0.5 - self.cy_px) / self.fy_px
+        grid_x, grid_y = np.meshgrid(x, y)
+        return np.stack([grid_x, grid_y, np.ones_like(grid_x)], axis=-1)

@@ -1,0 +1,79 @@
+"""What a prior hands over: frames, times, features and whatever is known of the cameras."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the input itself says about the geometry; each field may be absent.
+
+    Attributes:
+        world_from_camera: Poses (F, 4, 4) in metres.
+        intrinsics: Whether the rig's focal length and principal point are calibrated (not guessed).
+        depth_m: Depth along z (F, H, W) in metres; 0 where unknown.
+        sky: Sky masks (F, H, W).
+    """
+
+    world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
+    intrinsics: bool = False
+    depth_m: Float[np.ndarray, "f h w"] | None = None
+    sky: Bool[np.ndarray, "f h w"] | None = None
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Frames of one drive.
+
+    Attributes:
+        frames: RGB (F, H, W, 3).
+        times_s: Time of each frame (F,).
+        camera: Index into ``rig`` of each frame (F,).
+        rig: Pinholes of the frames' size; their poses are the mounting, the identity for a single camera.
+        valid: False where the frame holds no picture, such as the corners of an undistorted image (F, H, W).
+        held_out: Frames that no fit may see (F,).
+        source_index: Index of each frame in the source, in file or decode order (F,).
+        features: Named per-pixel features (F, h, w, C), h and w a whole fraction of H and W: the paper's Z_ref.
+        known: What the input says about the geometry.
+        requested: The trajectory a generative prior was asked for.
+        provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
+            of sentences for the report.
+    """
+
+    frames: UInt8[np.ndarray, "f h w 3"]
+    times_s: Float[np.ndarray, " f"]
+    camera: Int[np.ndarray, " f"]
+    rig: tuple[Camera, ...]
+    valid: Bool[np.ndarray, "f h w"]
+    held_out: Bool[np.ndarray, " f"]
+    source_index: Int[np.ndarray, " f"]
+    features: dict[str, Float[np.ndarray, "f _ _ _"]] = field(default_factory=dict)
+    known: Known = field(default_factory=Known)
+    requested: Trajectory | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        count = len(self.frames)
+        for name in ("times_s", "camera", "valid", "held_out", "source_index"):
+            if len(getattr(self, name)) != count:
+                raise ValueError(f"clip: {name} has {len(getattr(self, name))} entries for {count} frames")
+        if count and not 0 <= int(self.camera.min()) <= int(self.camera.max()) < len(self.rig):
+            raise ValueError("clip: camera indexes beyond the rig")
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.frames.shape[2], self.frames.shape[1]
+
+    def with_features(self, **features: Float[np.ndarray, "f _ _ _"]) -> "Clip":
+        """The clip with more named features."""
+        return replace(self, features={**self.features, **features})

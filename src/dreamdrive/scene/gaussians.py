@@ -1,0 +1,64 @@
+"""3D Gaussians."""
+
+from dataclasses import dataclass, fields, replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+SH_C0 = 0.28209479177387814
+
+
+@dataclass(frozen=True)
+class Gaussians:
+    """N Gaussians, parameterised as in 3DGS.
+
+    Attributes:
+        means: Centres (N, 3) in metres.
+        quaternions: Rotations (N, 4), wxyz, not necessarily of unit length.
+        log_scales: Natural logarithm of the standard deviations (N, 3) in metres.
+        logit_opacities: Logit of the opacities (N,).
+        sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16; colour = SH(direction) + 0.5, floored at 0.
+        source_frame: Index of the frame each was seeded from (N,); children keep their parent's.
+        features: Pixel-aligned features Z_ref (N, C), or None.
+        lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None when always visible.
+            Opacity is multiplied by exp(-(t - centre)^2 / (2 deviation^2)).
+        actor: Index of the actor each belongs to (N,), or None.
+    """
+
+    means: Float[Tensor, "n 3"]
+    quaternions: Float[Tensor, "n 4"]
+    log_scales: Float[Tensor, "n 3"]
+    logit_opacities: Float[Tensor, " n"]
+    sh: Float[Tensor, "n k 3"]
+    source_frame: Int[Tensor, " n"]
+    features: Float[Tensor, "n c"] | None = None
+    lifespan: Float[Tensor, "n 2"] | None = None
+    actor: Int[Tensor, " n"] | None = None
+
+    def __post_init__(self) -> None:
+        if self.sh.shape[1] not in (1, 4, 9, 16):
+            raise ValueError(f"sh: expected 1, 4, 9 or 16 coefficients a channel, got {self.sh.shape[1]}")
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    @property
+    def sh_degree(self) -> int:
+        """Degree of the stored spherical harmonics, 0 to 3."""
+        return {1: 0, 4: 1, 9: 2, 16: 3}[self.sh.shape[1]]
+
+    def tensors(self) -> dict[str, Tensor]:
+        """The present fields by name."""
+        named = ((f.name, getattr(self, f.name)) for f in fields(self))
+        return {name: value for name, value in named if value is not None}
+
+    def select(self, index: Tensor) -> "Gaussians":
+        """The Gaussians at a boolean mask (N,) or integer index (M,)."""
+        return replace(self, **{name: value[index] for name, value in self.tensors().items()})
+
+    @staticmethod
+    def concatenate(*parts: "Gaussians") -> "Gaussians":
+        """Several sets as one; an optional field survives only if every part has it."""
+        shared = set.intersection(*(set(p.tensors()) for p in parts))
+        return Gaussians(**{name: torch.cat([getattr(p, name) for p in parts]) for name in shared})

@@ -1,0 +1,101 @@
+"""What multi-view stereo hands over: cameras, depth and what is known about their trustworthiness."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from dreamdrive.scene.camera import Camera
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What fixed the metric scale.
+
+    Attributes:
+        source: ``"poses"``, ``"depth"``, ``"ground plane, camera height 1.50 m"`` or ``"none: ..."``, in words.
+        spread: Relative spread of the scale, as a fraction; infinite when there is no metric scale.
+    """
+
+    source: str
+    spread: float
+
+
+@dataclass(frozen=True)
+class Focal:
+    """The focal length and whether the clip itself shows it.
+
+    Attributes:
+        px: Focal length in pixels at the clip's size.
+        observed: True when calibrated or constrained by turning; False when it is a prior.
+    """
+
+    px: float
+    observed: bool
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The road as a plane: points x with ``normal_world . x + offset_m = 0``, the normal pointing up.
+
+    Attributes:
+        normal_world: Unit normal (3,); up is about -y in the world frame.
+        offset_m: Height of the world's origin above the plane in metres.
+    """
+
+    normal_world: Float[np.ndarray, "3"]
+    offset_m: float
+
+    def height_m(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+        """Height of points (..., 3) above the plane."""
+        return points_world @ self.normal_world + self.offset_m
+
+    def depth_m(self, camera: Camera) -> Float[np.ndarray, "h w"]:
+        """Depth along z (H, W) at which each pixel's ray meets the plane; infinite above the horizon."""
+        rays_world = camera.rays() @ camera.world_from_camera[:3, :3].T
+        height = float(self.height_m(camera.world_from_camera[:3, 3]))
+        slope = -(rays_world @ self.normal_world)
+        return np.where(slope > 1e-9, height / np.maximum(slope, 1e-9), np.inf)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Cameras and dense geometry of a clip, in metres, in the frame of the first camera.
+
+    Attributes:
+        cameras: One posed pinhole a frame.
+        depth_m: Depth along z (F, H, W); 0 where there is none.
+        confidence: Trust in the depth (F, H, W) in [0, 1]; 0 in sky, invalid and camera-fixed pixels.
+        sky: Sky masks (F, H, W).
+        moving: Evidence that a pixel belongs to something that moves (F, H, W) in [0, 1].
+        fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
+            camera (bonnet, mirror, bar, overlay) and stays empty in the scene (H, W).
+        region_names: Names of the regions in ``fixed_regions``.
+        ground: The road plane, where found.
+        scale: What fixed the metric scale.
+        focal: Focal length and whether it was observed.
+        detected: What was noticed about the clip, a sentence each.
+        fallback: Why the fallback ran, in words, or None when the full reconstruction did.
+        details: Figures for the report, as JSON values.
+    """
+
+    cameras: tuple[Camera, ...]
+    depth_m: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+    sky: Bool[np.ndarray, "f h w"]
+    moving: Float[np.ndarray, "f h w"]
+    fixed_regions: Int[np.ndarray, "h w"]
+    region_names: tuple[str, ...]
+    ground: Ground | None
+    scale: Scale
+    focal: Focal
+    detected: tuple[str, ...] = ()
+    fallback: str | None = None
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
+        """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""
+        camera = self.cameras[frame]
+        points = camera.rays() * self.depth_m[frame][..., None]
+        return points @ camera.world_from_camera[:3, :3].T + camera.world_from_camera[:3, 3]
