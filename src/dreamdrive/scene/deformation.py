@@ -1,0 +1,292 @@
+"""Where the dynamic Gaussians are at a given time: rigid actor tracks plus a learned residual (eq. 11-12)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from dreamdrive.scene.gaussians import Gaussians
+
+
+@dataclass(frozen=True)
+class DeformationConfig:
+    """Shape of a deformation field; everything that is not learned or measured, so that JSON can rebuild it.
+
+    Attributes:
+        depth: Layers of the network (the paper's baseline: 8; 4 suits two cores).
+        width: Units of each layer (the paper's baseline: 256; 64 suits two cores).
+        position_frequencies: Octaves 2^0, 2^1, ... of the positional encoding of the normalised position.
+        time_frequencies: Octaves of the encoding of the normalised time.
+        actors: Actors with a rigid track; 0 for none.
+        track_times: Key frames of each track; 0 for none.
+    """
+
+    depth: int = 4
+    width: int = 64
+    position_frequencies: int = 10
+    time_frequencies: int = 6
+    actors: int = 0
+    track_times: int = 0
+
+    def __post_init__(self) -> None:
+        if self.depth < 1 or self.width < 1 or min(self.position_frequencies, self.time_frequencies) < 0:
+            raise ValueError(f"deformation: expected depth, width >= 1 and frequencies >= 0, got {self}")
+        if self.actors < 0 or (self.actors == 0) != (self.track_times == 0):
+            raise ValueError(f"deformation: {self.actors} actors with {self.track_times} key frames")
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The space and time a deformation field is normalised by.
+
+    Attributes:
+        centre_m: Centre of the dynamic Gaussians (3,).
+        radius_m: Distance from the centre that is mapped to 1.
+        start_s: Time mapped to 0.
+        end_s: Time mapped to 1.
+        up: Unit axis of the actors' yaw (3,), in the world: the ground's normal.
+    """
+
+    centre_m: Float[np.ndarray, "3"]
+    radius_m: float
+    start_s: float
+    end_s: float
+    up: Float[np.ndarray, "3"]
+
+    def __post_init__(self) -> None:
+        if not (self.radius_m > 0 and self.end_s > self.start_s):
+            raise ValueError(
+                f"deformation: empty domain, radius {self.radius_m}, {self.start_s}..{self.end_s} s"
+            )
+        if abs(float(np.linalg.norm(self.up)) - 1) > 1e-4:
+            raise ValueError(f"deformation: up must be a unit vector, got {self.up}")
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Rigid motion of the actors: key frames to start from, refined by the fit.
+
+    Attributes:
+        times_s: Times of the key frames (T,), strictly increasing.
+        translation_m: Offset of each actor from its canonical place (A, T, 3).
+        yaw_rad: Rotation about the up axis from the canonical attitude (A, T), right-handed.
+        pivot_m: Point each actor turns about (A, 3), in the world, in its canonical place.
+    """
+
+    times_s: Float[np.ndarray, " t"]
+    translation_m: Float[np.ndarray, "a t 3"]
+    yaw_rad: Float[np.ndarray, "a t"]
+    pivot_m: Float[np.ndarray, "a 3"]
+
+    def __post_init__(self) -> None:
+        if len(self.times_s) == 0 or len(self.pivot_m) == 0 or (np.diff(self.times_s) <= 0).any():
+            raise ValueError("tracks: expected at least one actor and strictly increasing key times")
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What is added to each Gaussian at a time (eq. 12).
+
+    Attributes:
+        mean_m: To the mean (N, 3).
+        quaternion: To the normalised quaternion (N, 4).
+        log_scale: To the log-scale (N, 3).
+    """
+
+    mean_m: Float[Tensor, "n 3"]
+    quaternion: Float[Tensor, "n 4"]
+    log_scale: Float[Tensor, "n 3"]
+
+
+def encode(values: Float[Tensor, "*n d"], frequencies: int) -> Float[Tensor, "*n e"]:
+    """Positional encoding: the value, then sine and cosine of 2^0, 2^1, ... times it (no factor pi)."""
+    octaves = 2.0 ** torch.arange(frequencies, dtype=values.dtype, device=values.device)
+    angles = (values[..., None, :] * octaves[:, None]).flatten(-2)
+    return torch.cat([values, angles.sin(), angles.cos()], dim=-1)
+
+
+def multiply_quaternions(a: Float[Tensor, "*n 4"], b: Float[Tensor, "*n 4"]) -> Float[Tensor, "*n 4"]:
+    """Hamilton product of wxyz quaternions: the rotation b, then a."""
+    aw, ax, ay, az = a.unbind(-1)
+    bw, bx, by, bz = b.unbind(-1)
+    return torch.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        dim=-1,
+    )
+
+
+def faded(gaussians: Gaussians, t_s: float) -> Gaussians:
+    """The Gaussians with their life spans turned into opacity at ``t_s``; the result has no life spans.
+
+    opacity' = opacity * exp(-e), e = (t - centre)^2 / (2 deviation^2), on logits without forming 1 - opacity:
+    logit' = logit - e - log(1 + exp(logit) (1 - exp(-e))).
+    """
+    if gaussians.lifespan is None:
+        return gaussians
+    centre_s, deviation_s = gaussians.lifespan.unbind(-1)
+    exponent = 0.5 * ((t_s - centre_s) / deviation_s.clamp(min=1e-6)) ** 2
+    # exp(80) still fits float32; an opacity of logit 80 is 1 to the last bit.
+    logit = gaussians.logit_opacities.clamp(max=80.0)
+    logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
+    return replace(gaussians, logit_opacities=logit, lifespan=None)
+
+
+class DeformationField(nn.Module):
+    """F_deform(x, t): offsets of mean, rotation and scale (eq. 11-12).
+
+    A Gaussian of an actor follows the actor's rigid track; the network adds the residual. A Gaussian of no
+    actor (index -1) has the residual alone, which is the paper's formulation.
+
+    The heads start at zero, so the field starts as the identity (plus tracks). Deformable-3DGS leaves them at
+    the default initialisation and hides the first, random deformations behind 3000 steps of warm-up; a CPU
+    budget has no such steps to spare. Scale offsets are added to log-scales (as drivestudio does;
+    Deformable-3DGS adds them to the scales themselves, which can turn them negative). The network sees
+    detached means: the canonical means get gradients through the splat only.
+
+    Attributes:
+        config: The shape, to rebuild the field from its ``state_dict``.
+        track_translation: Learned key frames (A, T, 3).
+        track_yaw_rad: Learned key frames (A, T).
+    """
+
+    centre_m: Tensor
+    radius_m: Tensor
+    time_range_s: Tensor
+    up: Tensor
+    track_times_s: Tensor
+    track_pivot_m: Tensor
+
+    def __init__(
+        self, config: DeformationConfig, domain: Domain, tracks: Tracks | None = None, seed: int = 0
+    ) -> None:
+        super().__init__()
+        shape = (0, 0) if tracks is None else tracks.yaw_rad.shape
+        if shape != (config.actors, config.track_times):
+            raise ValueError(f"deformation: tracks of shape {shape} for {config}")
+        self.config = config
+        self.register_buffer("centre_m", _tensor(domain.centre_m))
+        self.register_buffer("radius_m", _tensor(domain.radius_m))
+        # Double: seconds may be since the epoch, and a difference of two of them is used.
+        self.register_buffer(
+            "time_range_s", torch.tensor([domain.start_s, domain.end_s], dtype=torch.float64)
+        )
+        self.register_buffer("up", _tensor(domain.up))
+        times_s = np.zeros(0) if tracks is None else tracks.times_s
+        self.register_buffer("track_times_s", torch.tensor(times_s, dtype=torch.float64))
+        self.register_buffer("track_pivot_m", _tensor(np.zeros((0, 3)) if tracks is None else tracks.pivot_m))
+        self.track_translation = nn.Parameter(
+            _tensor(np.zeros((0, 0, 3)) if tracks is None else tracks.translation_m)
+        )
+        self.track_yaw_rad = nn.Parameter(_tensor(np.zeros((0, 0)) if tracks is None else tracks.yaw_rad))
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self._build_network()
+
+    def _build_network(self) -> None:
+        c = self.config
+        inputs = 3 * (1 + 2 * c.position_frequencies) + 1 + 2 * c.time_frequencies
+        # The index of the layer that gets the encoded input again; short networks do without.
+        self._skip = c.depth // 2 if c.depth >= 6 else None
+        widths = [inputs] + [c.width + (inputs if i == self._skip else 0) for i in range(1, c.depth)]
+        self.layers = nn.ModuleList(nn.Linear(width, c.width) for width in widths)
+        self.head_mean = nn.Linear(c.width, 3)
+        self.head_quaternion = nn.Linear(c.width, 4)
+        self.head_log_scale = nn.Linear(c.width, 3)
+        for head in (self.head_mean, self.head_quaternion, self.head_log_scale):
+            nn.init.zeros_(head.weight)
+            nn.init.zeros_(head.bias)
+
+    def residual(self, means: Float[Tensor, "n 3"], t_s: float) -> Offsets:
+        """What the network alone adds; ``means`` (N, 3) canonical, in metres."""
+        start_s, end_s = self.time_range_s.tolist()
+        time = means.new_tensor([(t_s - start_s) / (end_s - start_s)])
+        position = (means.detach() - self.centre_m) / self.radius_m
+        encoded = torch.cat(
+            [
+                encode(position, self.config.position_frequencies),
+                encode(time, self.config.time_frequencies).expand(len(means), -1),
+            ],
+            dim=-1,
+        )
+        hidden = encoded
+        for i, layer in enumerate(self.layers):
+            hidden = torch.cat([encoded, hidden], dim=-1) if i == self._skip else hidden
+            hidden = torch.relu(layer(hidden))
+        return Offsets(self.head_mean(hidden), self.head_quaternion(hidden), self.head_log_scale(hidden))
+
+    def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
+        """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
+
+        Linear between key frames; before the first and after the last the velocity there continues.
+        """
+        times = self.track_times_s.tolist()
+        if len(times) < 2:
+            return self.track_translation.sum(dim=1), self.track_yaw_rad.sum(dim=1)
+        i = min(max(int(np.searchsorted(times, t_s, side="right")) - 1, 0), len(times) - 2)
+        weight = (t_s - times[i]) / (times[i + 1] - times[i])
+        translation = torch.lerp(self.track_translation[:, i], self.track_translation[:, i + 1], weight)
+        return translation, torch.lerp(self.track_yaw_rad[:, i], self.track_yaw_rad[:, i + 1], weight)
+
+    def forward(
+        self,
+        means: Float[Tensor, "n 3"],
+        quaternions: Float[Tensor, "n 4"],
+        actor: Int[Tensor, " n"] | None,
+        t_s: float,
+    ) -> Offsets:
+        """Offsets of N Gaussians at ``t_s``, to be added to means, normalised quaternions and log-scales.
+
+        Args:
+            means: Canonical centres in metres.
+            quaternions: Canonical rotations, wxyz, of any length.
+            actor: Index of the track each follows, -1 for none; None when nothing follows one.
+            t_s: Time in seconds.
+        """
+        offsets = self.residual(means, t_s)
+        if actor is None or self.config.actors == 0:
+            return offsets
+        member = (actor >= 0).to(means.dtype)[:, None]
+        index = actor.clamp(min=0)
+        translation, yaw_rad = self.pose(t_s)
+        arm = means - self.track_pivot_m[index]
+        moved = _rotate(arm, self.up, yaw_rad[index]) - arm + translation[index]
+        unit = nn.functional.normalize(quaternions, dim=-1)
+        turn = torch.cat([(0.5 * yaw_rad).cos()[:, None], (0.5 * yaw_rad).sin()[:, None] * self.up], dim=-1)[
+            index
+        ]
+        return Offsets(
+            offsets.mean_m + member * moved,
+            offsets.quaternion + member * (multiply_quaternions(turn, unit) - unit),
+            offsets.log_scale,
+        )
+
+    def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
+        """The Gaussians as they are at ``t_s``: moved, turned, scaled and faded; differentiable."""
+        if len(gaussians) == 0:
+            return faded(gaussians, t_s)
+        offsets = self(gaussians.means, gaussians.quaternions, gaussians.actor, t_s)
+        moved = replace(
+            gaussians,
+            means=gaussians.means + offsets.mean_m,
+            quaternions=nn.functional.normalize(gaussians.quaternions, dim=-1) + offsets.quaternion,
+            log_scales=gaussians.log_scales + offsets.log_scale,
+        )
+        return faded(moved, t_s)
+
+
+def _tensor(values: np.ndarray | float) -> Tensor:
+    return torch.tensor(values, dtype=torch.float32)
+
+
+def _rotate(vectors: Tensor, axis: Tensor, angle_rad: Tensor) -> Tensor:
+    """Rodrigues' formula: vectors (N, 3) about one unit axis (3,) by (N,) angles."""
+    cosine, sine = angle_rad.cos()[:, None], angle_rad.sin()[:, None]
+    along = (vectors @ axis)[:, None] * axis
+    return along + (vectors - along) * cosine + torch.linalg.cross(axis.expand_as(vectors), vectors) * sine

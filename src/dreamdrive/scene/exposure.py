@@ -1,0 +1,69 @@
+"""Colour of the recording camera: one affine transform a frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Affine colour transforms (F, 3, 4) of the frames they were trained on, and their times (F,)."""
+
+    transforms: Float[Tensor, "f 3 4"]
+    times_s: Float[np.ndarray, " f"]
+
+    def __post_init__(self) -> None:
+        if len(self.times_s) == 0 or (np.diff(self.times_s) <= 0).any():
+            raise ValueError("exposure: expected at least one frame and strictly increasing times")
+
+    def at(self, t_s: float) -> Float[Tensor, "3 4"]:
+        """The transform at a time: linear between the neighbouring trained frames, constant outside."""
+        after = int(np.searchsorted(self.times_s, t_s, side="right"))
+        if after == 0 or after == len(self.times_s):
+            return self.transforms[min(after, len(self.times_s) - 1)]
+        before = after - 1
+        weight = (t_s - self.times_s[before]) / (self.times_s[after] - self.times_s[before])
+        return torch.lerp(self.transforms[before], self.transforms[after], float(weight))
+
+    def apply(self, image: Float[Tensor, "h w 3"], t_s: float) -> Float[Tensor, "h w 3"]:
+        """An image of the scene as the camera would have recorded it at ``t_s``; not clipped."""
+        return transform_colour(image, self.at(t_s))
+
+
+def transform_colour(image: Float[Tensor, "h w 3"], affine: Float[Tensor, "3 4"]) -> Float[Tensor, "h w 3"]:
+    """``A rgb + b`` for every pixel, with ``affine`` = [A | b]."""
+    return image @ affine[:, :3].T + affine[:, 3]
+
+
+class ExposureNetwork(nn.Module):
+    """Learns the exposure: a 4-d embedding a frame, a layer of 64, an affine transform around the identity.
+
+    Only the last layer starts at zero. drivestudio zeroes every layer, and then nothing but the last bias can
+    ever learn: one global correction instead of one a frame.
+    """
+
+    def __init__(self, frames: int, seed: int = 0) -> None:
+        super().__init__()
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.embedding = nn.Parameter(torch.randn(frames, 4))
+            self.hidden = nn.Linear(4, 64)
+            self.output = nn.Linear(64, 12)
+        nn.init.zeros_(self.output.weight)
+        nn.init.zeros_(self.output.bias)
+
+    def forward(self, frame_index: int) -> Float[Tensor, "3 4"]:
+        """The affine colour transform of a frame."""
+        change = self.output(torch.relu(self.hidden(self.embedding[frame_index])))
+        return torch.eye(3, 4, dtype=change.dtype, device=change.device) + change.view(3, 4)
+
+    @torch.no_grad()
+    def freeze(self, times_s: Float[np.ndarray, " f"], trained: Bool[np.ndarray, " f"]) -> Exposure:
+        """The transforms of the frames that were trained on, of all frames at ``times_s`` (F,)."""
+        if len(times_s) != len(self.embedding):
+            raise ValueError(f"exposure: {len(times_s)} times for {len(self.embedding)} frames")
+        index = np.flatnonzero(trained)
+        return Exposure(torch.stack([self(int(i)) for i in index]).clone(), np.asarray(times_s)[index])

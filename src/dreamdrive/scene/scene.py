@@ -1,0 +1,74 @@
+"""The product: a street over time as Gaussians."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+
+from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.deformation import DeformationField, faded
+from dreamdrive.scene.exposure import Exposure
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Static and dynamic Gaussians with everything needed to render any view at any time.
+
+    World = the camera of the first frame (x right, y down, z forward), in metres.
+
+    Attributes:
+        static: What never moves.
+        dynamic: What moves, in its canonical place; may be empty.
+        deformation: Where the dynamic Gaussians are over time; None leaves them in place.
+        actors: The dynamic groups.
+        sky: Background at infinity; None is black.
+        exposure: The recording camera's colour over time; None is the identity.
+        cameras: The recorded views (F,).
+        times_s: Their times (F,).
+        held_out: Which of them no fit has seen (F,).
+        provenance: What the scene was made from, as JSON values.
+    """
+
+    static: Gaussians
+    dynamic: Gaussians
+    deformation: DeformationField | None
+    actors: tuple[Actor, ...]
+    sky: Sky | None
+    exposure: Exposure | None
+    cameras: tuple[Camera, ...]
+    times_s: Float[np.ndarray, " f"]
+    held_out: Bool[np.ndarray, " f"]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not len(self.cameras) == len(self.times_s) == len(self.held_out):
+            counts = len(self.cameras), len(self.times_s), len(self.held_out)
+            raise ValueError(f"scene: cameras, times and held-out marks differ in number: {counts}")
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The recorded drive."""
+        return Trajectory(np.stack([c.world_from_camera for c in self.cameras]), self.times_s)
+
+    @torch.no_grad()
+    def static_at(self, t_s: float) -> Gaussians:
+        """The static Gaussians; the time matters only to those with a life span."""
+        return faded(self.static, t_s)
+
+    @torch.no_grad()
+    def dynamic_at(self, t_s: float) -> Gaussians:
+        """The dynamic Gaussians where they are at ``t_s``."""
+        if self.deformation is None:
+            return faded(self.dynamic, t_s)
+        return self.deformation.apply_at(self.dynamic, t_s)
+
+    def at(self, t_s: float) -> Gaussians:
+        """All Gaussians at ``t_s``: the static ones, then the dynamic ones; no gradients."""
+        static = self.static_at(t_s)
+        return Gaussians.concatenate(static, self.dynamic_at(t_s)) if len(self.dynamic) else static

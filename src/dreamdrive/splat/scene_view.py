@@ -1,0 +1,89 @@
+"""A scene as a camera sees it at a time: Gaussians, sky behind them, the recording's exposure on top."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+from dreamdrive.splat.render import render
+
+Part = Literal["all", "static", "dynamic"]
+
+
+@dataclass(frozen=True)
+class SceneView:
+    """One finished view.
+
+    Attributes:
+        colour: RGB (H, W, 3) in [0, 1], with sky and exposure.
+        alpha: Share of the pixel covered by Gaussians (H, W).
+        depth_m: Expected depth along z of what covers the pixel (H, W); 0 where nothing does.
+        dynamic_share: Share of the pixel covered by dynamic Gaussians (H, W), at most ``alpha``.
+        channels: The further channels asked for (H, W, C), composited without background; C may be 0.
+    """
+
+    colour: Float[Tensor, "h w 3"]
+    alpha: Float[Tensor, "h w"]
+    depth_m: Float[Tensor, "h w"]
+    dynamic_share: Float[Tensor, "h w"]
+    channels: Float[Tensor, "h w c"]
+
+    @property
+    def dynamic(self) -> Bool[Tensor, "h w"]:
+        """Pixels of moving things: dynamic Gaussians carry at least half of the alpha, and alpha one half."""
+        return (self.dynamic_share >= 0.5 * self.alpha) & (self.alpha >= 0.5)
+
+
+@torch.no_grad()
+def render_scene(
+    scene: Scene,
+    camera: Camera,
+    t_s: float,
+    *,
+    exposure: bool = True,
+    channels: Float[Tensor, "n c"] | None = None,
+    part: Part = "all",
+) -> SceneView:
+    """Render a scene at ``t_s`` from any camera; no gradients.
+
+    Args:
+        scene: What to render.
+        camera: Pinhole with its pose in the scene's world.
+        t_s: Time in seconds.
+        exposure: Whether to apply the recording's exposure at this time.
+        channels: Further values of each Gaussian of the part, in the order of ``Scene.at``.
+        part: All Gaussians, or the static or the dynamic ones alone; the dynamic ones stand before black.
+    """
+    gaussians, is_dynamic = _select(scene, t_s, part)
+    marked = is_dynamic[:, None] if channels is None else torch.cat([is_dynamic[:, None], channels], dim=-1)
+    drawn = render(gaussians, camera, channels=marked)
+    colour = drawn.colour
+    if scene.sky is not None and part != "dynamic":
+        colour = colour + (1 - drawn.alpha)[..., None] * scene.sky.colour(camera)
+    if exposure and scene.exposure is not None:
+        colour = scene.exposure.apply(colour, t_s)
+    return SceneView(
+        colour=colour.clamp(0, 1),
+        alpha=drawn.alpha,
+        depth_m=torch.where(drawn.alpha > 1e-3, drawn.depth_m / drawn.alpha.clamp(min=1e-3), 0.0),
+        dynamic_share=drawn.channels[..., 0],
+        channels=drawn.channels[..., 1:],
+    )
+
+
+def _select(scene: Scene, t_s: float, part: Part) -> tuple[Gaussians, Tensor]:
+    """The Gaussians of a part and 1 for each dynamic one, 0 for each static one."""
+    if part == "static":
+        gaussians, dynamic = scene.static_at(t_s), 0
+    elif part == "dynamic":
+        gaussians, dynamic = scene.dynamic_at(t_s), len(scene.dynamic)
+    else:
+        gaussians, dynamic = scene.at(t_s), len(scene.dynamic)
+    mark = torch.zeros(len(gaussians), dtype=gaussians.means.dtype)
+    mark[len(gaussians) - dynamic :] = 1
+    return gaussians, mark
