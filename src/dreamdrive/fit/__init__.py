@@ -1,1 +1,26 @@
-""""""
+"""Seeds become Gaussians, and Gaussians are fitted to the frames."""
+
+from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier, NoDensifier
+from dreamdrive.fit.hybrid import Parts, Representation, fit
+from dreamdrive.fit.initialise import SeedOptions, initialise
+from dreamdrive.fit.losses import LossName, render_loss
+from dreamdrive.fit.static import StaticFit, fit_static
+from dreamdrive.fit.trainer import FitOptions, Progress
+
+__all__ = [
+    "Densifier",
+    "DensifySettings",
+    "FitOptions",
+    "GradientDensifier",
+    "LossName",
+    "NoDensifier",
+    "Parts",
+    "Progress",
+    "Representation",
+    "SeedOptions",
+    "StaticFit",
+    "fit",
+    "fit_static",
+    "initialise",
+    "render_loss",
+]

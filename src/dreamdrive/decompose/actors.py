@@ -1,0 +1,255 @@
+"""Dynamic clusters become actors: one track each, and one canonical set of Gaussians in place of copies.
+
+The initial points hold a moving car once per frame. Each cluster's copies are carried to one canonical time
+along the cluster's own track, so that at any time the copies lie on top of each other where the car is; a life
+span lets the copies nearest in time speak loudest, and hides the actor when it was not seen.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+
+from dreamdrive.decompose.flow import neighbour_flow
+from dreamdrive.decompose.group import Grouping, source_pixels
+from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.deformation import Tracks
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class ActorOptions:
+    """Constants of the tracks.
+
+    Attributes:
+        lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames.
+        contact_weight: Trust in one frame's depth against that in the change of size between two frames.
+        least_frames: Clusters seen in fewer frames get no track, only a short life.
+        least_points: Flow vectors needed to measure a change of size and place.
+    """
+
+    lifespan_frames: float = 1.25
+    contact_weight: float = 0.05
+    least_frames: int = 2
+    least_points: int = 12
+
+
+@dataclass(frozen=True)
+class Cast:
+    """All that moves.
+
+    Attributes:
+        gaussians: Dynamic Gaussians in canonical places, with actor and life span.
+        tracks: Motion of the actors, or None when there are none.
+        actors: The actors.
+    """
+
+    gaussians: Gaussians
+    tracks: Tracks | None
+    actors: tuple[Actor, ...]
+
+
+@dataclass(frozen=True)
+class _Path:
+    """One cluster over the frames it was seen in."""
+
+    frames: Int[np.ndarray, " k"]
+    anchor_px: Float[np.ndarray, "k 2"]
+    depth_m: Float[np.ndarray, " k"]
+    seen_depth_m: Float[np.ndarray, " k"]
+
+
+def cast(
+    clip: Clip,
+    geometry: Geometry,
+    gaussians: Gaussians,
+    grouping: Grouping,
+    options: ActorOptions | None = None,
+) -> Cast:
+    """Track every dynamic cluster and merge its copies.
+
+    Args:
+        clip: Frames and times; held-out frames are not read.
+        geometry: Cameras.
+        gaussians: As seeded: each dynamic one lies where its source frame saw it.
+        grouping: Labels and clusters.
+        options: Constants.
+    """
+    options = options or ActorOptions()
+    index = np.flatnonzero(grouping.dynamic.numpy())
+    chosen = gaussians.select(torch.from_numpy(index))
+    if not len(index):
+        return Cast(
+            replace(chosen, lifespan=torch.zeros(0, 2), actor=torch.zeros(0, dtype=torch.int64)), None, ()
+        )
+    pixels = source_pixels(geometry, gaussians, index)
+    cluster = grouping.cluster.numpy()[index]
+    frames = chosen.source_frame.numpy()
+    flows = _Flows(clip)
+    paths = [
+        _path(flows, pixels, frames, np.flatnonzero(cluster == c), options) for c in range(cluster.max() + 1)
+    ]
+    return _merge(clip, geometry, chosen, pixels, cluster, paths, options)
+
+
+class _Flows:
+    """Flow between training frames, computed once a pair."""
+
+    def __init__(self, clip: Clip) -> None:
+        self._clip = clip
+        self._cache: dict[tuple[int, int], np.ndarray] = {}
+
+    def between(self, frame: int, other: int) -> Float[np.ndarray, "h w 2"]:
+        if (frame, other) not in self._cache:
+            self._cache[frame, other] = neighbour_flow(self._clip, frame, other)
+        return self._cache[frame, other]
+
+
+def _path(
+    flows: _Flows,
+    pixels: Float[np.ndarray, "m 3"],
+    frames: Int[np.ndarray, " m"],
+    rows: Int[np.ndarray, " k"],
+    options: ActorOptions,
+) -> _Path:
+    """Where one cluster's anchor is in each frame, and how deep.
+
+    Between two frames a rigid thing's image changes by a similarity; its scale is the inverse ratio of depths,
+    which flow measures far better than any single frame measures depth. The depths of single frames fix the
+    common factor.
+    """
+    seen = np.unique(frames[rows])
+    centres = np.array([np.median(pixels[rows[frames[rows] == f], :2], axis=0) for f in seen])
+    contact = np.array([np.median(pixels[rows[frames[rows] == f], 2]) for f in seen])
+    anchors = centres.copy()
+    log_ratio, trust = np.zeros(max(len(seen) - 1, 0)), np.zeros(max(len(seen) - 1, 0))
+    for k in range(len(seen) - 1):
+        members = rows[frames[rows] == seen[k]]
+        flow = flows.between(int(seen[k]), int(seen[k + 1]))
+        similarity = _similarity(flow, pixels[members, :2], options)
+        if similarity is None:
+            continue
+        anchors[k + 1] = similarity[:, :2] @ anchors[k] + similarity[:, 2]
+        log_ratio[k] = -np.log(np.hypot(similarity[0, 0], similarity[1, 0]))
+        trust[k] = 1.0
+        drift = np.linalg.norm(anchors[k + 1] - centres[k + 1])
+        spread = pixels[rows[frames[rows] == seen[k + 1]], :2].std(axis=0).max()
+        if drift > 2 * spread + 4:
+            anchors[k + 1] = centres[k + 1]
+    depth = np.exp(_smooth_logs(np.log(contact), log_ratio, trust, options.contact_weight))
+    return _Path(seen, anchors, depth, contact)
+
+
+def _similarity(
+    flow: Float[np.ndarray, "h w 2"], points: Float[np.ndarray, "m 2"], options: ActorOptions
+) -> Float[np.ndarray, "2 3"] | None:
+    if len(points) < options.least_points:
+        return None
+    row = points[:, 1].astype(int).clip(0, flow.shape[0] - 1)
+    column = points[:, 0].astype(int).clip(0, flow.shape[1] - 1)
+    moved = points + flow[row, column]
+    cv2.setRNGSeed(0)
+    found, inliers = cv2.estimateAffinePartial2D(
+        points, moved, method=cv2.RANSAC, ransacReprojThreshold=1.0, maxIters=500, confidence=0.999
+    )
+    if found is None or inliers is None or int(inliers.sum()) < options.least_points:
+        return None
+    scale = float(np.hypot(found[0, 0], found[1, 0]))
+    return found if 0.5 < scale < 2.0 else None
+
+
+def _smooth_logs(
+    seen: Float[np.ndarray, " k"],
+    ratio: Float[np.ndarray, " j"],
+    trust: Float[np.ndarray, " j"],
+    weight: float,
+) -> Float[np.ndarray, " k"]:
+    """Least squares: close to ``seen`` weakly, to the measured differences strongly, at an even pace between."""
+    count = len(seen)
+    rows, right = [np.sqrt(weight) * np.eye(count)], [np.sqrt(weight) * seen]
+    for k in range(count - 1):
+        row = np.zeros((1, count))
+        row[0, k], row[0, k + 1] = -1, 1
+        rows.append(row * np.sqrt(max(float(trust[k]), 1e-3)))
+        right.append(np.array([ratio[k] * np.sqrt(max(float(trust[k]), 1e-3))]))
+    for k in range(1, count - 1):
+        row = np.zeros((1, count))
+        row[0, k - 1 : k + 2] = 1, -2, 1
+        rows.append(0.5 * row)
+        right.append(np.zeros(1))
+    return np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
+
+
+def _merge(
+    clip: Clip,
+    geometry: Geometry,
+    chosen: Gaussians,
+    pixels: Float[np.ndarray, "m 3"],
+    cluster: Int[np.ndarray, " m"],
+    paths: list[_Path],
+    options: ActorOptions,
+) -> Cast:
+    seen = np.flatnonzero(~clip.held_out)
+    times = clip.times_s[seen]
+    interval = float(np.median(np.diff(times)))
+    means = chosen.means.numpy().astype(np.float64)
+    log_scales = chosen.log_scales.numpy().copy()
+    actor = np.full(len(means), -1, dtype=np.int64)
+    deviation = np.full(len(means), 0.5 * interval)
+    translations, pivots, actors = [], [], []
+    frames = chosen.source_frame.numpy()
+    for c, path in enumerate(paths):
+        if len(path.frames) < options.least_frames:
+            continue
+        rows = np.flatnonzero(cluster == c)
+        places = _places(geometry, path)
+        middle = len(path.frames) // 2
+        offsets = _offsets_at(times, clip.times_s[path.frames], places - places[middle])
+        where = np.searchsorted(path.frames, frames[rows])
+        stretch = path.depth_m[where] / path.seen_depth_m[where]
+        centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames[rows]])
+        means[rows] = centres + (means[rows] - centres) * stretch[:, None] - (places - places[middle])[where]
+        log_scales[rows] += np.log(stretch)[:, None]
+        actor[rows] = len(actors)
+        deviation[rows] = options.lifespan_frames * interval
+        translations.append(offsets)
+        pivots.append(places[middle])
+        name = f"actor {len(actors)}"
+        actors.append(Actor(len(actors), name, "unknown", len(rows), clip.times_s[path.frames], places))
+    merged = replace(
+        chosen,
+        means=torch.tensor(means, dtype=torch.float32),
+        log_scales=torch.tensor(log_scales, dtype=torch.float32),
+        actor=torch.from_numpy(actor),
+        lifespan=torch.tensor(np.column_stack([clip.times_s[frames], deviation]), dtype=torch.float32),
+    )
+    tracks = None
+    if actors:
+        stacked = np.stack(translations)
+        tracks = Tracks(times, stacked, np.zeros(stacked.shape[:2]), np.stack(pivots))
+    return Cast(merged, tracks, tuple(actors))
+
+
+def _places(geometry: Geometry, path: _Path) -> Float[np.ndarray, "k 3"]:
+    """The anchor in the world at each frame it was seen in."""
+    places = []
+    for frame, (u, v), depth in zip(path.frames.tolist(), path.anchor_px, path.depth_m, strict=True):
+        camera = geometry.cameras[frame]
+        local = np.array([(u - camera.cx_px) / camera.fx_px, (v - camera.cy_px) / camera.fy_px, 1.0]) * depth
+        places.append(camera.world_from_camera[:3, :3] @ local + camera.world_from_camera[:3, 3])
+    return np.array(places)
+
+
+def _offsets_at(
+    times: Float[np.ndarray, " t"], known_s: Float[np.ndarray, " k"], offsets: Float[np.ndarray, "k 3"]
+) -> Float[np.ndarray, "t 3"]:
+    """Offsets at all key times: linear between those known, constant velocity beyond them."""
+    out = np.stack([np.interp(times, known_s, offsets[:, axis]) for axis in range(3)], axis=1)
+    for beyond, a, b in ((times < known_s[0], 0, 1), (times > known_s[-1], -1, -2)):
+        velocity = (offsets[a] - offsets[b]) / (known_s[a] - known_s[b])
+        out[beyond] = offsets[a] + (times[beyond] - known_s[a])[:, None] * velocity
+    return out

@@ -1,0 +1,19 @@
+"""Dense optical flow between the frames that may be seen."""
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from dreamdrive.scene.clip import Clip
+
+
+def grey(frame: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w"]:
+    """Luma of an RGB frame."""
+    return cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
+
+
+def neighbour_flow(clip: Clip, frame: int, other: int) -> Float[np.ndarray, "h w 2"]:
+    """Where each pixel of ``frame`` lies in ``other``, minus where it is, in pixels (DIS, medium preset)."""
+    method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    start = np.zeros((*clip.frames.shape[1:3], 2), np.float32)
+    return np.asarray(method.calc(grey(clip.frames[frame]), grey(clip.frames[other]), start))

@@ -1,0 +1,156 @@
+"""F_score: a dynamic score for every Gaussian, trained through the splat (eq. 7-9)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from dreamdrive.decompose.errors import smoothed
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.deformation import encode
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.splat import render
+
+TargetName = Literal["error", "error_and_evidence"]
+
+
+@dataclass(frozen=True)
+class ScoreOptions:
+    """Constants of the scoring.
+
+    Attributes:
+        target: What the splatted scores are compared with: ``"error"`` is the paper's error map (eq. 8);
+            ``"error_and_evidence"`` also asks the recorded clip's moving evidence.
+        error_scale: Error that counts as 1: absolute, so that a street where nothing moves scores nothing.
+        error_sigma_px: Blur of the error maps.
+        threshold: tau of eq. 9, absolute.
+        steps: Training steps, one frame each.
+        rate: Adam's step.
+        width: Units of the two hidden layers.
+        position_frequencies: Octaves of the encoding of the position.
+        shrink: The splat of the scores is compared at this fraction of the size.
+    """
+
+    target: TargetName = "error_and_evidence"
+    error_scale: float = 0.12
+    error_sigma_px: float = 2.0
+    threshold: float = 0.5
+    steps: int = 150
+    rate: float = 5e-3
+    width: int = 64
+    position_frequencies: int = 4
+    shrink: int = 2
+
+
+class ScoreNetwork(nn.Module):
+    """S = F_score(G_init, Z_ref): an MLP on position and pixel-aligned features (eq. 7)."""
+
+    def __init__(self, features: int, options: ScoreOptions, seed: int) -> None:
+        super().__init__()
+        inputs = 3 * (1 + 2 * options.position_frequencies) + features
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.layers = nn.Sequential(
+                nn.Linear(inputs, options.width),
+                nn.ReLU(),
+                nn.Linear(options.width, options.width),
+                nn.ReLU(),
+                nn.Linear(options.width, 1),
+            )
+
+    def forward(self, inputs: Float[Tensor, "n d"]) -> Float[Tensor, " n"]:
+        """Scores in (0, 1)."""
+        return torch.sigmoid(self.layers(inputs).squeeze(1))
+
+
+def score(
+    clip: Clip,
+    geometry: Geometry,
+    gaussians: Gaussians,
+    errors: Float[np.ndarray, "f h w"],
+    options: ScoreOptions,
+    seed: int,
+    progress: Callable[[int, int], None],
+) -> Float[Tensor, " n"]:
+    """Train F_score by binary cross-entropy between its splatted scores and the targets (eq. 8).
+
+    Args:
+        clip: Which frames may be seen.
+        geometry: Cameras and moving evidence.
+        gaussians: The static fit, with features.
+        errors: Error maps of the static fit (eq. 6).
+        options: Constants.
+        seed: Initial weights and order of the frames.
+        progress: Called with steps done and steps in all.
+
+    Returns:
+        Scores in (0, 1); those above ``options.threshold`` are dynamic (eq. 9).
+    """
+    if gaussians.features is None:
+        raise ValueError("score: the Gaussians carry no features")
+    inputs = _inputs(gaussians, options.position_frequencies)
+    targets = _targets(clip, geometry, errors, options)
+    network = ScoreNetwork(gaussians.features.shape[1], options, seed)
+    optimiser = torch.optim.Adam(network.parameters(), lr=options.rate)
+    generator = torch.Generator().manual_seed(seed)
+    order: list[int] = []
+    for step in range(options.steps):
+        if not order:
+            choice = torch.randperm(len(targets), generator=generator)
+            order = [sorted(targets)[int(i)] for i in choice]
+        frame = order.pop()
+        camera = geometry.cameras[frame]
+        small = camera.resized(camera.width_px // options.shrink, camera.height_px // options.shrink)
+        splatted = _splat(gaussians, network(inputs), small)
+        target, weight = targets[frame]
+        loss = nn.functional.binary_cross_entropy(splatted, target, weight=weight)
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        optimiser.step()
+        progress(step + 1, options.steps)
+    with torch.no_grad():
+        return network(inputs)
+
+
+def _splat(gaussians: Gaussians, scores: Float[Tensor, " n"], camera: Camera) -> Float[Tensor, "h w"]:
+    """Scores composited like colour, the sky counting as 0."""
+    rendered = render(gaussians, camera, channels=scores[:, None], sh_degree=0)
+    return rendered.channels[..., 0].clamp(1e-4, 1 - 1e-4)
+
+
+def _inputs(gaussians: Gaussians, frequencies: int) -> Float[Tensor, "n d"]:
+    """Encoded positions, in units of their spread, and features of zero mean and unit variance."""
+    assert gaussians.features is not None
+    # Distance matters by ratio on a street, so positions are compressed before they are encoded.
+    middle = gaussians.means.median(dim=0).values
+    squeezed = torch.asinh((gaussians.means - middle) / 10.0)
+    features = gaussians.features
+    features = (features - features.mean(0)) / features.std(0).clamp(min=1e-3)
+    return torch.cat([encode(squeezed, frequencies), features.clamp(-4, 4)], dim=1)
+
+
+def _targets(
+    clip: Clip, geometry: Geometry, errors: Float[np.ndarray, "f h w"], options: ScoreOptions
+) -> dict[int, tuple[Float[Tensor, "h w"], Float[Tensor, "h w"]]]:
+    """What each frame's splatted scores should be, and the weight of each pixel."""
+    blurred = smoothed(errors, options.error_sigma_px)
+    targets: dict[int, tuple[Tensor, Tensor]] = {}
+    for i in np.flatnonzero(~clip.held_out).tolist():
+        target = np.clip(blurred[i] / options.error_scale, 0, 1)
+        if options.target == "error_and_evidence":
+            target = 0.3 * target * (geometry.moving[i] < 0.5) + np.maximum(geometry.moving[i], 0) * 1.0
+        weight = (clip.valid[i] & (geometry.fixed_regions == 0)).astype(np.float32)
+        targets[i] = (_shrunk(target, options.shrink), _shrunk(weight, options.shrink))
+    return targets
+
+
+def _shrunk(values: Float[np.ndarray, "h w"], factor: int) -> Float[Tensor, "a b"]:
+    h, w = values.shape[0] // factor, values.shape[1] // factor
+    blocks = values[: h * factor, : w * factor].reshape(h, factor, w, factor).mean(axis=(1, 3))
+    return torch.tensor(blocks, dtype=torch.float32).clamp(0, 1)

@@ -1,0 +1,227 @@
+"""G_init: pixel-aligned points become Gaussians that carry features and their source frame (eq. 4)."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from scipy.spatial.transform import Rotation
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.gaussians import SH_C0, Gaussians
+from dreamdrive.scene.geometry import Geometry
+
+# Relative depth step above which neighbouring pixels are taken to lie on different surfaces.
+DEPTH_EDGE = 0.08
+# A disc seen at a grazing angle is stretched along its surface at most this much, and is this thin.
+MAX_STRETCH = 3.0
+THICKNESS = 0.3
+
+
+@dataclass(frozen=True)
+class SeedOptions:
+    """How pixels become Gaussians.
+
+    Attributes:
+        stride_px: Distance between static seeds of one frame.
+        moving_stride_px: Distance between seeds on pixels with moving evidence, added by every frame.
+        moving_evidence: Evidence from which a pixel counts as moving for seeding.
+        far_m: Depth at which everything farther is put.
+        footprint: Standard deviation over the seeds' spacing.
+        agreement: Relative depth difference within which an older seed already explains a pixel.
+        sky_fringe_px: Width of the band beside the sky that seeds nothing: half-sky pixels at tree edges are
+            the most visible error of a cloud.
+        sh_degree: Degree of the spherical harmonics that are kept.
+    """
+
+    stride_px: int = 2
+    moving_stride_px: int = 2
+    moving_evidence: float = 0.5
+    far_m: float = 250.0
+    footprint: float = 0.55
+    agreement: float = 0.08
+    sky_fringe_px: int = 1
+    sh_degree: int = 1
+
+
+def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = None) -> Gaussians:
+    """Seed Gaussians from the depth of all frames that may be seen.
+
+    Frames are taken from the last to the first, since a forward drive sees each surface finest just before it
+    leaves the view; a frame adds only what later frames have not explained yet. Pixels with moving evidence
+    are added by every frame: a moving thing stands somewhere else in each of them.
+
+    Args:
+        clip: Frames and features; held-out frames are not read.
+        geometry: Depth, confidence, sky and moving evidence.
+        options: Density and sizes of the seeds.
+
+    Returns:
+        Gaussians with features Z_ref (appearance, then moving evidence, then confidence).
+
+    Raises:
+        ValueError: If no pixel has depth.
+    """
+    options = options or SeedOptions()
+    kept: list[_Seeds] = []
+    for frame in np.flatnonzero(~clip.held_out)[::-1].tolist():
+        usable = _usable(clip, geometry, frame, options)
+        moving = usable & (geometry.moving[frame] >= options.moving_evidence)
+        explained = _explained(kept, geometry.cameras[frame], geometry.depth_m[frame], options)
+        static = usable & ~moving & ~explained
+        chosen = (_lattice(static.shape, options.stride_px, frame) & static) | (
+            _lattice(static.shape, options.moving_stride_px, frame) & moving
+        )
+        if chosen.any():
+            kept.append(_seeds(clip, geometry, frame, chosen, moving[chosen], options))
+    if not kept:
+        raise ValueError("no pixel of any frame has depth: there is nothing to make Gaussians from")
+    return _gaussians(kept, options)
+
+
+@dataclass(frozen=True)
+class _Seeds:
+    """Points of one frame."""
+
+    points: Float[np.ndarray, "m 3"]
+    tangents: Float[np.ndarray, "m 2 3"]
+    spacing_m: Float[np.ndarray, " m"]
+    colour: Float[np.ndarray, "m 3"]
+    confidence: Float[np.ndarray, " m"]
+    moving: Bool[np.ndarray, " m"]
+    features: Float[np.ndarray, "m c"]
+    frame: int
+
+
+def _usable(clip: Clip, geometry: Geometry, frame: int, options: SeedOptions) -> Bool[np.ndarray, "h w"]:
+    sky = geometry.sky[frame].astype(np.uint8)
+    if options.sky_fringe_px:
+        size = 2 * options.sky_fringe_px + 1
+        sky = cv2.dilate(sky, np.ones((size, size), np.uint8))
+    free = clip.valid[frame] & (geometry.fixed_regions == 0) & (sky == 0)
+    return free & (geometry.depth_m[frame] > 0)
+
+
+def _lattice(shape: tuple[int, int], stride: int, frame: int) -> Bool[np.ndarray, "h w"]:
+    """Every ``stride``-th pixel; the phase changes with the frame so that copies do not line up."""
+    lattice = np.zeros(shape, dtype=bool)
+    phase = frame % stride
+    lattice[phase::stride, (stride - 1 - phase) :: stride] = True
+    return lattice
+
+
+def _explained(
+    kept: list[_Seeds], camera: Camera, depth_m: Float[np.ndarray, "h w"], options: SeedOptions
+) -> Bool[np.ndarray, "h w"]:
+    """Pixels beside which a static seed of comparable size already lies, not behind what is seen there."""
+    shape = (camera.height_px, camera.width_px)
+    nearest = np.full(shape, np.inf, dtype=np.float32)
+    matrix = camera.camera_from_world
+    for seeds in kept:
+        static = ~seeds.moving
+        points = seeds.points[static] @ matrix[:3, :3].T + matrix[:3, 3]
+        z = np.maximum(points[:, 2], 1e-6)
+        u = np.floor(points[:, 0] / z * camera.fx_px + camera.cx_px)
+        v = np.floor(points[:, 1] / z * camera.fy_px + camera.cy_px)
+        fine = seeds.spacing_m[static] / z * camera.fx_px < 2.0 * options.stride_px
+        inside = (points[:, 2] > 0.2) & (u >= 0) & (u < shape[1]) & (v >= 0) & (v < shape[0]) & fine
+        np.minimum.at(nearest, (v[inside].astype(int), u[inside].astype(int)), z[inside].astype(np.float32))
+    reach = 2 * options.stride_px - 1
+    around = cv2.erode(nearest, np.ones((reach, reach), np.uint8), borderValue=float("inf"))
+    return around < depth_m * (1 + options.agreement)
+
+
+def _seeds(
+    clip: Clip,
+    geometry: Geometry,
+    frame: int,
+    chosen: Bool[np.ndarray, "h w"],
+    moving: Bool[np.ndarray, " m"],
+    options: SeedOptions,
+) -> _Seeds:
+    camera = geometry.cameras[frame]
+    depth = np.minimum(geometry.depth_m[frame], options.far_m).astype(np.float64)
+    stride = np.where(moving, options.moving_stride_px, options.stride_px)
+    rotation = camera.world_from_camera[:3, :3]
+    points = camera.rays() * depth[..., None]
+    steps = [_tangent(points, depth, focal, axis) for axis, focal in ((1, camera.fx_px), (0, camera.fy_px))]
+    tangents = np.stack(steps, axis=2)[chosen] * stride[:, None, None]
+    return _Seeds(
+        points=points[chosen] @ rotation.T + camera.world_from_camera[:3, 3],
+        tangents=tangents @ rotation.T,
+        spacing_m=depth[chosen] / camera.fx_px * stride,
+        colour=clip.frames[frame][chosen].astype(np.float64) / 255,
+        confidence=geometry.confidence[frame][chosen],
+        moving=moving,
+        features=pixel_features(clip, geometry, frame)[chosen],
+        frame=frame,
+    )
+
+
+def pixel_features(clip: Clip, geometry: Geometry, frame: int) -> Float[np.ndarray, "h w c"]:
+    """Z_ref of one frame at the frame's size: all of the clip's features, moving evidence, confidence."""
+    size = clip.size
+    maps = [geometry.moving[frame][..., None], geometry.confidence[frame][..., None]]
+    for name in sorted(clip.features):
+        feature = np.asarray(clip.features[name][frame], dtype=np.float32)
+        resized = cv2.resize(feature, size, interpolation=cv2.INTER_LINEAR)
+        maps.append(resized.reshape(size[1], size[0], -1))
+    return np.concatenate(maps, axis=2).astype(np.float32)
+
+
+def _tangent(
+    points: Float[np.ndarray, "h w 3"], depth: Float[np.ndarray, "h w"], focal_px: float, axis: int
+) -> Float[np.ndarray, "h w 3"]:
+    """Step (H, W, 3) on the surface for one pixel along ``axis``; fronto-parallel across depth edges."""
+    ahead = np.roll(points, -1, axis) - points
+    ratio = np.abs(np.roll(depth, -1, axis) / np.maximum(depth, 1e-6) - 1)
+    if axis == 1:
+        ratio[:, -1] = np.inf
+    else:
+        ratio[-1] = np.inf
+    flat = np.zeros_like(points)
+    flat[..., 1 - axis] = depth / focal_px
+    return np.where((ratio < DEPTH_EDGE)[..., None], ahead, flat)
+
+
+def _gaussians(kept: list[_Seeds], options: SeedOptions) -> Gaussians:
+    tangents = np.concatenate([s.tangents for s in kept])
+    spacing = np.concatenate([s.spacing_m for s in kept])
+    rotations, extents = _surfels(tangents, spacing)
+    scales = extents * options.footprint
+    colour = np.concatenate([s.colour for s in kept])
+    confidence = np.concatenate([s.confidence for s in kept])
+    coefficients = (options.sh_degree + 1) ** 2
+    sh = np.zeros((len(colour), coefficients, 3))
+    sh[:, 0] = (colour - 0.5) / SH_C0
+    opacity = 0.25 + 0.5 * np.clip(confidence, 0, 1)
+    tensor = lambda value: torch.tensor(value, dtype=torch.float32)  # noqa: E731
+    return Gaussians(
+        means=tensor(np.concatenate([s.points for s in kept])),
+        quaternions=tensor(rotations),
+        log_scales=tensor(np.log(scales)),
+        logit_opacities=tensor(np.log(opacity / (1 - opacity))),
+        sh=tensor(sh),
+        source_frame=torch.tensor(np.concatenate([np.full(len(s.points), s.frame) for s in kept])),
+        features=tensor(np.concatenate([s.features for s in kept])),
+    )
+
+
+def _surfels(
+    tangents: Float[np.ndarray, "n 2 3"], spacing: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, "n 4"], Float[np.ndarray, "n 3"]]:
+    """Rotations (N, 4) wxyz and extents (N, 3) of discs that lie on the surface, touching each other."""
+    first, second = tangents[:, 0], tangents[:, 1]
+    normal = _unit(np.cross(first, second))
+    x_axis = _unit(first - (first * normal).sum(1, keepdims=True) * normal)
+    y_axis = np.cross(normal, x_axis)
+    quaternions = Rotation.from_matrix(np.stack([x_axis, y_axis, normal], axis=2)).as_quat()[:, [3, 0, 1, 2]]
+    along = np.stack([np.abs((first * x_axis).sum(1)), np.abs((second * y_axis).sum(1))], axis=1)
+    along = np.clip(along, spacing[:, None], MAX_STRETCH * spacing[:, None])
+    return quaternions, np.concatenate([along, THICKNESS * spacing[:, None]], axis=1)
+
+
+def _unit(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)

@@ -1,0 +1,168 @@
+"""Gaussians while they are being fitted: leaf tensors, their Adam state, and surgery on both."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from dreamdrive.scene.gaussians import Gaussians
+
+_LEARNED = ("offsets", "quaternions", "log_scales", "logit_opacities", "sh_dc", "sh_rest")
+_CARRIED = ("anchors", "unit_m", "source_frame", "features", "lifespan", "actor")
+
+
+@dataclass(frozen=True)
+class LearningRates:
+    """Adam's step sizes, those of 3DGS (its arguments file) except for the positions.
+
+    Attributes:
+        offsets: Positions, in units of each Gaussian's own pixel footprint. 3DGS steps 1.6e-4 of the scene's
+            extent for all; on a street that spans 3 m to 250 m one metric step is either nothing or a jump.
+        offsets_end: What ``offsets`` decays to, log-linearly.
+        quaternions: Rotations.
+        log_scales: Scales.
+        logit_opacities: Opacities.
+        sh_dc: Base colour.
+        sh_rest: View-dependent colour.
+    """
+
+    offsets: float = 0.02
+    offsets_end: float = 0.002
+    quaternions: float = 2e-3
+    log_scales: float = 8e-3
+    logit_opacities: float = 0.03
+    sh_dc: float = 4e-3
+    sh_rest: float = 2.5e-4
+
+
+class Parameters:
+    """N Gaussians as leaf tensors with an optimiser; ``fit`` works on this and returns frozen ``Gaussians``.
+
+    Positions are ``anchors + unit_m * offsets``: the offset is dimensionless, so that Adam's steps are a
+    fraction of a pixel at any depth.
+    """
+
+    def __init__(self, gaussians: Gaussians, unit_m: Float[Tensor, " n"], rates: LearningRates) -> None:
+        count = len(gaussians)
+        self.rates = rates
+        self.anchors = gaussians.means.clone()
+        self.unit_m = unit_m.clone()
+        self.source_frame = gaussians.source_frame.clone()
+        self.features = gaussians.features
+        self.lifespan = gaussians.lifespan
+        self.actor = gaussians.actor
+        self.offsets = torch.zeros(count, 3)
+        self.quaternions = gaussians.quaternions.clone()
+        self.log_scales = gaussians.log_scales.clone()
+        self.logit_opacities = gaussians.logit_opacities.clone()
+        self.sh_dc = gaussians.sh[:, :1].clone()
+        self.sh_rest = gaussians.sh[:, 1:].clone()
+        groups = [
+            {"params": [self._leaf(name)], "lr": getattr(rates, name), "name": name} for name in _LEARNED
+        ]
+        self.optimiser = torch.optim.Adam(groups, eps=1e-15, fused=True)
+
+    def _leaf(self, name: str) -> Tensor:
+        leaf = getattr(self, name).contiguous().requires_grad_(True)
+        setattr(self, name, leaf)
+        return leaf
+
+    def __len__(self) -> int:
+        return len(self.anchors)
+
+    @property
+    def means(self) -> Float[Tensor, "n 3"]:
+        """Centres in metres, differentiable."""
+        return torch.addcmul(self.anchors, self.unit_m[:, None], self.offsets)
+
+    @property
+    def sh(self) -> Float[Tensor, "n k 3"]:
+        """All spherical-harmonic coefficients, differentiable."""
+        return torch.cat([self.sh_dc, self.sh_rest], dim=1) if self.sh_rest.shape[1] else self.sh_dc
+
+    def gaussians(self) -> Gaussians:
+        """The Gaussians as they are now, still attached to the leaves."""
+        return Gaussians(
+            means=self.means,
+            quaternions=self.quaternions,
+            log_scales=self.log_scales,
+            logit_opacities=self.logit_opacities,
+            sh=self.sh,
+            source_frame=self.source_frame,
+            features=self.features,
+            lifespan=self.lifespan,
+            actor=self.actor,
+        )
+
+    def frozen(self) -> Gaussians:
+        """A detached copy."""
+        now = self.gaussians().tensors()
+        return Gaussians(**{name: value.detach().clone() for name, value in now.items()})
+
+    def set_progress(self, done: float) -> None:
+        """Decay the step of the positions; ``done`` runs from 0 to 1."""
+        rates = self.rates
+        for group in self.optimiser.param_groups:
+            if group["name"] == "offsets":
+                group["lr"] = rates.offsets * (rates.offsets_end / rates.offsets) ** done
+
+    def step(self) -> None:
+        """One Adam step, then forget the gradients."""
+        self.optimiser.step()
+        self.optimiser.zero_grad(set_to_none=True)
+
+    @torch.no_grad()
+    def keep(self, mask: Bool[Tensor, " n"]) -> None:
+        """Drop the Gaussians outside ``mask`` with their optimiser state."""
+        index = torch.nonzero(mask).squeeze(1)
+        self._rebuild(lambda value: value[index])
+
+    @torch.no_grad()
+    def append_children(self, parents: Int[Tensor, " m"], changes: dict[str, Tensor]) -> None:
+        """Append copies of ``parents`` with ``changes`` to some fields and fresh optimiser state.
+
+        Everything else, source frame, features, life span and actor included, is the parent's.
+        """
+
+        def extend(name: str, value: Tensor) -> Tensor:
+            return torch.cat([value, changes.get(name, value[parents])])
+
+        for name in _CARRIED:
+            value = getattr(self, name)
+            if value is not None:
+                setattr(self, name, extend(name, value))
+        self._swap_leaves(extend, lambda state: torch.cat([state, torch.zeros_like(state[parents])]))
+
+    @torch.no_grad()
+    def reset_opacity(self, ceiling: float) -> None:
+        """Lower every opacity to at most ``ceiling`` and forget its moments."""
+        limit = torch.logit(torch.tensor(ceiling))
+        self.logit_opacities.clamp_(max=float(limit))
+        state = self.optimiser.state.get(self.logit_opacities, {})
+        for moment in ("exp_avg", "exp_avg_sq"):
+            if moment in state:
+                state[moment].zero_()
+
+    def _rebuild(self, pick: Callable[[Tensor], Tensor]) -> None:
+        for name in _CARRIED:
+            value = getattr(self, name)
+            if value is not None:
+                setattr(self, name, pick(value))
+        self._swap_leaves(lambda _, value: pick(value), pick)
+
+    def _swap_leaves(
+        self, change: Callable[[str, Tensor], Tensor], change_state: Callable[[Tensor], Tensor]
+    ) -> None:
+        """Replace each leaf and carry its Adam moments over."""
+        for group in self.optimiser.param_groups:
+            name = group["name"]
+            old = getattr(self, name)
+            state = self.optimiser.state.pop(old, None)
+            setattr(self, name, change(name, old.detach()))
+            new = self._leaf(name)
+            group["params"] = [new]
+            if state:
+                moments = {key: change_state(state[key]) for key in ("exp_avg", "exp_avg_sq")}
+                self.optimiser.state[new] = {"step": state["step"], **moments}

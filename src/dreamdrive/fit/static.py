@@ -1,0 +1,57 @@
+"""The static fit: everything optimised as if nothing moved (the scene behind eq. 5)."""
+
+from dataclasses import dataclass
+
+import torch
+
+from dreamdrive.fit.densify import NoDensifier
+from dreamdrive.fit.parameters import LearningRates, Parameters
+from dreamdrive.fit.sky import estimate_sky
+from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
+from dreamdrive.fit.views import training_views
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.exposure import Exposure, ExposureNetwork
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.sky import Sky
+
+
+@dataclass(frozen=True)
+class StaticFit:
+    """G_init after the static fit; row i is still seed i.
+
+    Attributes:
+        gaussians: Optimised Gaussians.
+        sky: Optimised background.
+        exposure: Colour of the training frames.
+    """
+
+    gaussians: Gaussians
+    sky: Sky
+    exposure: Exposure
+
+
+def fit_static(
+    clip: Clip, geometry: Geometry, gaussians: Gaussians, options: FitOptions, seed: int, progress: Progress
+) -> StaticFit:
+    """Optimise all seeds as static (eq. 5), without densification, so that rows keep their meaning.
+
+    Args:
+        clip: References; held-out frames are not read.
+        geometry: Cameras, depth, masks.
+        gaussians: The seeds.
+        options: Length, rates and weights.
+        seed: Order of the frames.
+        progress: Called with steps done and steps in all.
+    """
+    views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
+    static = Parameters(gaussians, footprints(gaussians), LearningRates())
+    model = Model(static, None, None, estimate_sky(clip, geometry), ExposureNetwork(len(clip), seed))
+    optimise(model, views, [NoDensifier()], options, seed, progress)
+    sky = Sky(model.sky.texture.detach(), model.sky.azimuth_rad, model.sky.elevation_rad)
+    return StaticFit(static.frozen(), sky, model.exposure.freeze(clip.times_s, ~clip.held_out))
+
+
+def footprints(gaussians: Gaussians) -> torch.Tensor:
+    """Size of each seed in metres (N,), the unit of its moves: the geometric mean of its two largest deviations."""
+    return gaussians.log_scales.detach().topk(2, dim=1).values.mean(dim=1).exp()

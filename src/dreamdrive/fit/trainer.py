@@ -1,0 +1,232 @@
+"""The optimisation loop both fits share: render a frame, compare, step, densify."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from dreamdrive.fit.densify import Densifier
+from dreamdrive.fit.losses import LossName, disparity_loss, render_loss
+from dreamdrive.fit.parameters import Parameters
+from dreamdrive.fit.views import View
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.deformation import DeformationField
+from dreamdrive.scene.exposure import ExposureNetwork, transform_colour
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.render import Render
+from dreamdrive.scene.sky import Sky
+from dreamdrive.splat import rasterize
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How long and against what a fit runs.
+
+    Attributes:
+        steps: Optimisation steps, one frame each.
+        loss: Weights of L1 and SSIM, see ``losses.WEIGHTS``.
+        half_size_share: Share of the steps, from the first, that look at half-size frames.
+        sh_after: Share of the steps after which view-dependent colour is learned.
+        depth_weight: Weight of the inverse-depth term (1/m), decayed to a tenth over the fit.
+        sky_weight: Weight of coverage in sky pixels.
+        shape_weight: Weight of the excess of the largest over the smallest scale beyond ``shape_ratio``.
+        shape_ratio: Elongation that is free.
+        warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
+        deformation_rate: Adam's step for the deformation network, decayed to a tenth.
+        track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth.
+        sky_rate: Adam's step for the sky panorama.
+        exposure_rate: Adam's step for the exposure network.
+    """
+
+    steps: int
+    loss: LossName = "field"
+    half_size_share: float = 0.3
+    sh_after: float = 0.4
+    depth_weight: float = 0.5
+    sky_weight: float = 0.05
+    shape_weight: float = 0.02
+    shape_ratio: float = 10.0
+    warm_up: float = 0.1
+    deformation_rate: float = 2e-3
+    track_rate: float = 5e-3
+    sky_rate: float = 2e-3
+    exposure_rate: float = 1e-3
+
+
+@dataclass
+class Model:
+    """Everything a fit changes.
+
+    Attributes:
+        static: Gaussians free of time.
+        dynamic: Gaussians that go through ``deformation``, or None.
+        deformation: Present exactly when ``dynamic`` is.
+        sky: The far background; its texture is learned.
+        exposure: Colour of each frame of the clip.
+    """
+
+    static: Parameters | None
+    dynamic: Parameters | None
+    deformation: DeformationField | None
+    sky: Sky
+    exposure: ExposureNetwork
+
+    def at(self, t_s: float) -> Gaussians:
+        """All Gaussians at a time, differentiable: the static ones, then the dynamic ones."""
+        parts: list[Gaussians] = []
+        if self.static is not None:
+            parts.append(self.static.gaussians())
+        if self.dynamic is not None and self.deformation is not None:
+            parts.append(self.deformation.apply_at(self.dynamic.gaussians(), t_s))
+        return Gaussians.concatenate(*parts) if len(parts) > 1 else parts[0]
+
+    def parts(self) -> list[Parameters]:
+        """The present parameter sets in the order of ``at``."""
+        return [p for p in (self.static, self.dynamic) if p is not None]
+
+
+def splat(
+    gaussians: Gaussians, camera: Camera, sh_degree: int, offsets_px: Float[Tensor, "n 2"] | None = None
+) -> Render:
+    """Rasterise activated Gaussians, differentiable in them and in ``offsets_px``."""
+    return rasterize(
+        gaussians.means,
+        gaussians.quaternions,
+        gaussians.log_scales.exp(),
+        torch.sigmoid(gaussians.logit_opacities),
+        gaussians.sh,
+        torch.tensor(camera.camera_from_world, dtype=torch.float32),
+        fx_px=camera.fx_px,
+        fy_px=camera.fy_px,
+        cx_px=camera.cx_px,
+        cy_px=camera.cy_px,
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        screen_offsets_px=offsets_px,
+        sh_degree=sh_degree,
+    )
+
+
+def optimise(
+    model: Model,
+    views: dict[int, list[View]],
+    densifiers: list[Densifier],
+    options: FitOptions,
+    seed: int,
+    progress: Progress,
+) -> None:
+    """Fit ``model`` in place to the views.
+
+    Args:
+        model: What changes.
+        views: The same training frames by how much they are shrunk: 1 and 2.
+        densifiers: One for each of ``model.parts()``.
+        options: Length, rates and weights.
+        seed: Order of the frames and places of split Gaussians.
+        progress: Called with steps done and steps in all.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    grids = {shrink: [model.sky.grid(v.camera) for v in shrunk] for shrink, shrunk in views.items()}
+    optimiser = _shared_optimiser(model, options)
+    order: list[int] = []
+    for step in range(options.steps):
+        done = step / options.steps
+        if not order:
+            order = torch.randperm(len(views[1]), generator=generator).tolist()
+        shrink = 2 if done < options.half_size_share else 1
+        which = order.pop()
+        view = views[shrink][which]
+        gaussians = model.at(view.time_s)
+        offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
+        degree = gaussians.sh_degree if done >= options.sh_after else 0
+        rendered = splat(gaussians, view.camera, degree, offsets_px)
+        loss = _loss(model, gaussians, rendered, view, grids[shrink][which], options, done)
+        loss.backward()
+        _decay(model, optimiser, options, done)
+        _step(model, optimiser)
+        _densify(model, densifiers, offsets_px, rendered, shrink, step, options.steps, generator)
+        progress(step + 1, options.steps)
+
+
+def _loss(
+    model: Model,
+    gaussians: Gaussians,
+    rendered: Render,
+    view: View,
+    grid: Float[Tensor, "h w 2"],
+    options: FitOptions,
+    done: float,
+) -> Float[Tensor, ""]:
+    image = rendered.colour + (1 - rendered.alpha)[..., None] * model.sky.sample(grid)
+    image = transform_colour(image, model.exposure(view.index))
+    loss = render_loss(image, view.image, view.mask, options.loss)
+    if options.depth_weight:
+        weight = options.depth_weight * 0.1**done
+        loss = loss + weight * disparity_loss(
+            rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight
+        )
+    if options.sky_weight:
+        loss = loss + options.sky_weight * (rendered.alpha * view.sky).mean()
+    if options.shape_weight:
+        spread = gaussians.log_scales.amax(1) - gaussians.log_scales.amin(1)
+        loss = loss + options.shape_weight * torch.relu(spread - float(np.log(options.shape_ratio))).mean()
+    return loss
+
+
+def _shared_optimiser(model: Model, options: FitOptions) -> torch.optim.Adam:
+    """Adam for what is not a set of Gaussians: deformation, tracks, sky, exposure."""
+    model.sky = replace(model.sky, texture=model.sky.texture.clone().requires_grad_(True))
+    groups = [
+        {"params": [model.sky.texture], "lr": options.sky_rate, "name": "sky"},
+        {"params": list(model.exposure.parameters()), "lr": options.exposure_rate, "name": "exposure"},
+    ]
+    if model.deformation is not None:
+        named = dict(model.deformation.named_parameters())
+        tracks = [named.pop(name) for name in ("track_translation", "track_yaw_rad")]
+        groups.append({"params": list(named.values()), "lr": 0.0, "name": "network"})
+        groups.append({"params": tracks, "lr": 0.0, "name": "tracks"})
+    return torch.optim.Adam(groups, eps=1e-15, fused=True)
+
+
+def _decay(model: Model, optimiser: torch.optim.Adam, options: FitOptions, done: float) -> None:
+    for part in model.parts():
+        part.set_progress(done)
+    moving = 0.1**done if done >= options.warm_up else 0.0
+    for group in optimiser.param_groups:
+        if group["name"] == "network":
+            group["lr"] = options.deformation_rate * moving
+        elif group["name"] == "tracks":
+            group["lr"] = options.track_rate * 0.1**done
+
+
+def _step(model: Model, optimiser: torch.optim.Adam) -> None:
+    for part in model.parts():
+        part.step()
+    optimiser.step()
+    optimiser.zero_grad(set_to_none=True)
+
+
+def _densify(
+    model: Model,
+    densifiers: list[Densifier],
+    offsets_px: Tensor,
+    rendered: Render,
+    shrink: int,
+    step: int,
+    steps: int,
+    generator: torch.Generator,
+) -> None:
+    gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
+    start = 0
+    for part, densifier in zip(model.parts(), densifiers, strict=True):
+        rows = slice(start, start + len(part))
+        # A pixel of a half-size frame is two pixels wide.
+        densifier.observe(gradient[rows] / shrink, rendered.visible[rows])
+        start += len(part)
+    for part, densifier in zip(model.parts(), densifiers, strict=True):
+        densifier.update(part, step, steps, generator)
