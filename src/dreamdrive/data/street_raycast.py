@@ -49,10 +49,8 @@ def cast(camera: Camera, solids: list[Solid], dtype: type = np.float64) -> Hits:
     shape = camera.height_px, camera.width_px
     depth = np.full(shape, np.inf, dtype=dtype)
     index = np.full(shape, -1, dtype=np.int32)
-    for number, solid in enumerate(solids):
-        window = _screen_window(camera, solid)
-        if window is None:
-            continue
+    for number, window in _windows(camera, solids):
+        solid = solids[number]
         origin, rays = _local_rays(camera, solid, window, dtype)
         enter = np.full(rays[0].shape, -np.inf, dtype=dtype)
         leave = np.full(rays[0].shape, np.inf, dtype=dtype)
@@ -71,11 +69,11 @@ def cast(camera: Camera, solids: list[Solid], dtype: type = np.float64) -> Hits:
 
 def shade(camera: Camera, solids: list[Solid], hits: Hits, sky: np.ndarray) -> Float[np.ndarray, "h w 3"]:
     """Colours (H, W, 3) in 0..255 of what :func:`cast` found, ``sky`` (180, 720, 3) behind it."""
-    colour = _sky(camera, sky)
-    for number, solid in enumerate(solids):
-        window = _screen_window(camera, solid)
-        if window is None:
-            continue
+    colour = np.empty((*hits.solid.shape, 3), dtype=np.float32)
+    above = hits.solid < 0
+    colour[above] = _sky(camera, sky, above)
+    for number, window in _windows(camera, solids):
+        solid = solids[number]
         inside = np.nonzero(hits.solid[window] == number)
         if len(inside[0]) == 0:
             continue
@@ -88,25 +86,32 @@ def shade(camera: Camera, solids: list[Solid], hits: Hits, sky: np.ndarray) -> F
     return colour
 
 
-def _screen_window(camera: Camera, solid: Solid) -> tuple[slice, slice] | None:
-    """Rows and columns that a solid can reach; None when it is out of view."""
-    corners = np.array([[x, y, z, 1] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
-    corners[:, :3] *= solid.half_m
-    points = corners @ (camera.camera_from_world @ solid.street_from_box).T
-    if (points[:, 2] <= _NEAR_M).all():
-        return None
-    # Edges that cross the near plane are cut there: the convex hull of these points is the visible part.
+def _windows(camera: Camera, solids: list[Solid]) -> list[tuple[int, tuple[slice, slice]]]:
+    """Index of each solid in view with the rows and columns that it can reach."""
+    unit = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+    poses = camera.camera_from_world @ np.stack([solid.street_from_box for solid in solids])
+    half = np.stack([solid.half_m for solid in solids])
+    corners = (unit * half[:, None]) @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]
+    found: list[tuple[int, tuple[slice, slice]]] = []
+    for number in np.flatnonzero((corners[..., 2] > _NEAR_M).any(axis=1)):
+        window = _window(camera, corners[number])
+        if window is not None:
+            found.append((int(number), window))
+    return found
+
+
+def _window(camera: Camera, points: np.ndarray) -> tuple[slice, slice] | None:
+    """Rows and columns that the hull of the points (8, 3) can reach; None when it is out of view."""
     ahead, behind = points[points[:, 2] > _NEAR_M], points[points[:, 2] <= _NEAR_M]
     if len(behind):
+        # Edges that cross the near plane are cut there: the hull of these points is the visible part.
         share = (_NEAR_M - behind[:, None, 2]) / (ahead[None, :, 2] - behind[:, None, 2])
         cut = behind[:, None] + share[..., None] * (ahead[None] - behind[:, None])
-        ahead = np.concatenate([ahead, cut.reshape(-1, 4)])
+        ahead = np.concatenate([ahead, cut.reshape(-1, 3)])
     x = ahead[:, 0] / ahead[:, 2] * camera.fx_px + camera.cx_px
     y = ahead[:, 1] / ahead[:, 2] * camera.fy_px + camera.cy_px
-    left, right = (int(np.clip(v, 0, camera.width_px)) for v in (np.floor(x.min()) - 1, np.ceil(x.max()) + 1))
-    top, bottom = (
-        int(np.clip(v, 0, camera.height_px)) for v in (np.floor(y.min()) - 1, np.ceil(y.max()) + 1)
-    )
+    left, right = max(0, int(x.min()) - 1), min(camera.width_px, int(x.max()) + 2)
+    top, bottom = max(0, int(y.min()) - 1), min(camera.height_px, int(y.max()) + 2)
     return (slice(top, bottom), slice(left, right)) if left < right and top < bottom else None
 
 
@@ -188,29 +193,27 @@ def _bilinear(image: np.ndarray, place: np.ndarray) -> np.ndarray:
     return picked.reshape(-1, 3)[: flat.shape[1]].reshape(*place.shape[1:], 3)
 
 
-def _sky(camera: Camera, panorama: np.ndarray) -> np.ndarray:
-    """The panorama behind each pixel (H, W, 3), by direction alone."""
-    rays = (camera.rays() @ camera.world_from_camera[:3, :3].T).astype(np.float32)
-    azimuth = np.arctan2(rays[..., 0], rays[..., 2])
-    elevation = np.arctan2(-rays[..., 1], np.hypot(rays[..., 0], rays[..., 2]))
-    height, width = panorama.shape[:2]
-    x = (azimuth / (2 * np.pi) + 0.5) * width - 0.5
-    y = (1 - elevation / (np.pi / 2)) * height - 0.5
-    return cv2.remap(panorama.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+def _sky(camera: Camera, panorama: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The panorama behind the pixels of a mask (N, 3), by direction alone."""
+    rays = _pixel_rays(camera, mask).T @ camera.world_from_camera[:3, :3].T
+    azimuth = np.arctan2(rays[:, 0], rays[:, 2])
+    elevation = np.arctan2(-rays[:, 1], np.hypot(rays[:, 0], rays[:, 2]))
+    place = np.stack([azimuth / (2 * np.pi) + 0.5, 1 - elevation / (np.pi / 2)]).astype(np.float32)
+    return _bilinear(panorama, place[:, None])[0]
+
+
+def _pixel_rays(camera: Camera, mask: np.ndarray) -> np.ndarray:
+    """Rays (3, N) of the pixels of a mask in the camera frame, scaled to z = 1."""
+    rows, columns = np.nonzero(mask)
+    x = (columns + 0.5 - camera.cx_px) / camera.fx_px
+    return np.stack([x, (rows + 0.5 - camera.cy_px) / camera.fy_px, np.ones(len(rows))])
 
 
 def _shadows(camera: Camera, solids: list[Solid], depth: np.ndarray, ground: np.ndarray) -> np.ndarray:
     """Brightness (N,) of the ground pixels: darker below and close to solids that throw a shadow."""
-    rows, columns = np.nonzero(ground)
-    rays = np.stack(
-        [
-            (columns + 0.5 - camera.cx_px) / camera.fx_px,
-            (rows + 0.5 - camera.cy_px) / camera.fy_px,
-            np.ones(len(rows)),
-        ]
-    )
+    rays = _pixel_rays(camera, ground)
     points = camera.world_from_camera[:3, :3] @ (rays * depth[ground]) + camera.world_from_camera[:3, 3:]
-    brightness = np.ones(len(rows), dtype=np.float32)
+    brightness = np.ones(rays.shape[1], dtype=np.float32)
     for solid in solids:
         if not solid.shadow:
             continue

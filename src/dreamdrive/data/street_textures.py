@@ -317,4 +317,4 @@ def sky_panorama(rng: np.random.Generator) -> Float[np.ndarray, "h w 3"]:
         1 - up**0.5
     )
     cloud = np.clip(noise(rng, shape, {8: 0.12, 25: 0.25, 80: 0.4}) + 0.1, 0, 1)[..., None]
-    return blue + 0.7 * cloud * (np.array([246, 246, 248], np.float32) - blue)
+    return (blue + 0.7 * cloud * (np.array([246, 246, 248], np.float32) - blue)).astype(np.float32)
