@@ -1,1 +1,7 @@
-""""""
+"""Readers: recordings, calibration, poses and trajectories on disk, converted at the door."""
+
+from dreamdrive.data.clip_reader import read_clip
+from dreamdrive.data.lens import Lens
+from dreamdrive.data.poses import read_trajectory, write_trajectory
+
+__all__ = ["Lens", "read_clip", "read_trajectory", "write_trajectory"]

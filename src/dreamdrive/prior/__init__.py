@@ -1,1 +1,29 @@
-""""""
+"""Priors: from a control to a clip with features."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.replay import replay
+
+PRIORS: Mapping[str, Prior] = MappingProxyType(
+    {
+        "replay": replay,
+    }
+)
+"""Every prior by the name that ``--prior`` takes."""
+
+
+def choose_prior(name: str) -> Prior:
+    """The prior of that name.
+
+    Raises:
+        InputError: There is none.
+    """
+    if name not in PRIORS:
+        raise InputError(f"--prior {name}: unknown; available are {', '.join(PRIORS)}")
+    return PRIORS[name]
+
+
+__all__ = ["PRIORS", "Prior", "choose_prior", "replay"]

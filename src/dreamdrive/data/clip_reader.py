@@ -1,0 +1,220 @@
+"""A recording on disk becomes a clip: pinhole frames of one size, with times and whatever is known."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from dreamdrive.data.frame import RawFrame
+from dreamdrive.data.images import ImageFolder
+from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
+from dreamdrive.data.lens import Lens, Undistorter
+from dreamdrive.data.poses import read_poses
+from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.size import Sizing, choose_size
+from dreamdrive.data.source import Source, one_frame, open_source
+from dreamdrive.data.video import Video
+from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+
+FOLDER_RATE_HZ = 10.0
+"""Rate at which the images of a folder count unless told."""
+MAX_FRAMES = 1000
+"""Frames a clip may have: all are in memory, 0.4 MB each at 480x270, and every stage adds its own."""
+
+
+def read_clip(
+    path: Path,
+    *,
+    frames: str | None = None,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    intrinsics: Path | None = None,
+    poses: Path | None = None,
+    hfov_deg: float | None = None,
+    hold_out: int | None = None,
+) -> Clip:
+    """Read a video or a folder of images as a clip.
+
+    The frames are undistorted to a pinhole with the source's focal length and axis, scaled and cropped, in
+    one resampling; ``provenance["lens"]`` holds what gives a render the source's distortion back
+    (``Lens.from_json``), or ``None``. Time 0 and the world are those of the first selected frame.
+
+    Args:
+        path: Video or folder of images.
+        frames: ``START:STOP:STEP`` over source indices (file or decode order); all without it.
+        fps: Rate of the input before the step. Without it a video's own times count, and a folder has 10 Hz.
+        size: Exact width and height; without it 480 wide, or the source's width if that is less.
+        intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
+        poses: Pose file (see ``poses.read_poses``).
+        hfov_deg: Horizontal field of view of the source, instead of ``intrinsics``.
+        hold_out: Withhold the selected frames i with i mod N = N // 2.
+
+    Raises:
+        InputError: Anything about the input or the options that cannot be used, in one sentence.
+    """
+    if fps is not None and not (isfinite(fps) and fps > 0):
+        raise InputError(f"--fps {fps:g}: expected a positive number of frames a second")
+    if intrinsics is not None and hfov_deg is not None:
+        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
+    source = open_source(path)
+    picked = _gather(source, Selection.parse(frames), size, intrinsics, hfov_deg)
+    index = np.array(picked.index)
+    times_s, said = _times(source, index, picked.times_s, fps)
+    notes = [*said, *picked.notes]
+    known_poses = None
+    if poses is not None:
+        known_poses, said = read_poses(poses, path.resolve().name, index, times_s, source.count)
+        notes += said
+    valid = np.stack(picked.valid)
+    if not valid.any():
+        raise InputError(
+            f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
+        )
+    sampler = picked.sampler
+    return Clip(
+        frames=np.stack(picked.frames),
+        times_s=times_s - times_s[0],
+        camera=np.zeros(len(index), dtype=np.int64),
+        rig=(sampler.camera,),
+        valid=valid,
+        held_out=held_out_mask(len(index), hold_out),
+        source_index=index,
+        known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
+        provenance=_provenance(source, picked, notes),
+    )
+
+
+@dataclass(frozen=True)
+class _Sampler:
+    """How a source image becomes a clip frame."""
+
+    calibration: Calibration
+    sizing: Sizing
+    camera: Camera
+    lens: Lens | None
+    undistorter: Undistorter | None
+
+    @staticmethod
+    def create(
+        source: tuple[int, int], size: tuple[int, int] | None, intrinsics: Path | None, hfov_deg: float | None
+    ) -> "_Sampler":
+        calibration = (
+            guess_camera(source, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, source)
+        )
+        sizing = choose_size(source, size)
+        camera = sizing.camera(calibration.camera)
+        if calibration.distortion is None:
+            return _Sampler(calibration, sizing, camera, None, None)
+        lens = Lens(calibration.distortion, camera)
+        return _Sampler(
+            calibration, sizing, camera, lens, Undistorter.create(lens, calibration.camera, sizing)
+        )
+
+    def __call__(self, raw: RawFrame) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:
+        apply = self.sizing.apply if self.undistorter is None else self.undistorter.apply
+        width, height = self.sizing.target
+        valid = np.ones((height, width), bool) if self.undistorter is None else self.undistorter.valid.copy()
+        if raw.opaque is not None:  # a clip pixel is valid when all of its footprint is
+            valid &= apply(raw.opaque.astype(np.uint8) * 255) == 255
+        frame = apply(raw.rgb)
+        frame[~valid] = 0
+        return frame, valid
+
+
+@dataclass
+class _Picked:
+    """What has been read so far."""
+
+    sampler: _Sampler
+    first: RawFrame
+    index: list[int] = field(default_factory=list)
+    times_s: list[float | None] = field(default_factory=list)
+    frames: list[UInt8[np.ndarray, "h w 3"]] = field(default_factory=list)
+    valid: list[Bool[np.ndarray, "h w"]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, raw: RawFrame) -> None:
+        frame, valid = self.sampler(raw)
+        self.index.append(raw.index)
+        self.times_s.append(raw.time_s)
+        self.frames.append(frame)
+        self.valid.append(valid)
+        self.notes += [note for note in raw.notes if note not in self.notes]
+
+
+def _gather(
+    source: Source,
+    selection: Selection,
+    size: tuple[int, int] | None,
+    intrinsics: Path | None,
+    hfov_deg: float | None,
+) -> _Picked:
+    """Read the selected frames, each brought to the clip's size as it comes."""
+    count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
+    wanted = selection.resolve(count, str(source.path))
+    picked: _Picked | None = None
+    for raw in _limited(source, wanted):
+        if picked is None:
+            sampler = _Sampler.create(raw.size, size, intrinsics, hfov_deg)
+            picked = _Picked(sampler, raw)
+        elif raw.size != picked.first.size:
+            (w, h), (w2, h2) = picked.first.size, raw.size
+            raise InputError(
+                f"{source.path}: {picked.first.name} is {w}x{h} but {raw.name} is {w2}x{h2}; "
+                "expected frames of one size"
+            )
+        picked.add(raw)
+    if picked is None or len(picked.index) < 2:
+        raise one_frame(source.path)
+    picked.notes += picked.sampler.calibration.notes
+    if picked.sampler.sizing.shrink < 1:
+        picked.notes.append(
+            f"frames enlarged {1 / picked.sampler.sizing.shrink:.2f} times: they hold no more detail"
+        )
+    return picked
+
+
+def _limited(source: Source, wanted: range) -> Iterator[RawFrame]:
+    for number, raw in enumerate(source.read(wanted)):
+        if number == MAX_FRAMES:
+            raise InputError(
+                f"{source.path}: more than {MAX_FRAMES} frames are selected, too many to hold in memory; "
+                "choose some with --frames START:STOP:STEP"
+            )
+        yield raw
+
+
+def _times(
+    source: Source, index: Int[np.ndarray, " f"], clock_s: list[float | None], fps: float | None
+) -> tuple[Float[np.ndarray, " f"], tuple[str, ...]]:
+    """Seconds since frame 0 of the source, and what to say about them."""
+    if fps is not None:
+        return index / fps, ()
+    if not isinstance(source, Video):
+        return index / FOLDER_RATE_HZ, (f"no --fps given: the images count as {FOLDER_RATE_HZ:g} Hz",)
+    if all(t is not None for t in clock_s):
+        times_s = np.array(clock_s, dtype=np.float64)
+        if (np.diff(times_s) > 0).all():
+            return times_s, ()
+    if source.rate_hz is None:
+        raise InputError(f"{source.path} has no usable times; give its rate with --fps")
+    return index / source.rate_hz, (f"the video's times are unusable: taken as {source.rate_hz:g} Hz",)
+
+
+def _provenance(source: Source, picked: _Picked, notes: list[str]) -> dict[str, Any]:
+    sampler = picked.sampler
+    return {
+        "input": str(source.path),
+        "kind": "video" if isinstance(source, Video) else "images",
+        "source_size": list(sampler.sizing.source),
+        "scaled_size": list(sampler.sizing.scaled),
+        "crop_offset": list(sampler.sizing.offset),
+        "lens": None if sampler.lens is None else sampler.lens.to_json(),
+        "notes": notes,
+    }

@@ -1,0 +1,158 @@
+"""Calibration files, and the guess where there is none."""
+
+import json
+from dataclasses import dataclass
+from math import isfinite, radians, tan
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from dreamdrive.data.distortion import Distortion
+from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import Camera
+
+DEFAULT_FOCAL = 0.85
+"""Focal length over the longer side of the image where nothing is known: 61 degrees, a usual dashcam."""
+_ASPECT_TOLERANCE = 0.005
+_OPENCV_ORDER = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty"]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The camera that took the source.
+
+    Attributes:
+        camera: Pinhole at the source's size; pixel centres at +0.5.
+        distortion: ``None`` where there is none or where it is unknown.
+        known: Whether it comes from a calibration file.
+        notes: What the report should say, a sentence each.
+    """
+
+    camera: Camera
+    distortion: Distortion | None
+    known: bool
+    notes: tuple[str, ...]
+
+
+def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibration:
+    """A pinhole for a source without calibration: principal point in the centre, square pixels.
+
+    Args:
+        size: Width and height of the source in pixels.
+        hfov_deg: Horizontal field of view; without it the focal length is 0.85 times the longer side.
+
+    Raises:
+        InputError: The field of view is not between 1 and 179 degrees.
+    """
+    width, height = size
+    if hfov_deg is None:
+        focal = DEFAULT_FOCAL * max(size)
+        said = f"no calibration: focal length taken as {DEFAULT_FOCAL} times the longer side"
+    elif not 1 <= hfov_deg <= 179:
+        raise InputError(f"--hfov {hfov_deg:g}: expected degrees between 1 and 179, such as 60")
+    else:
+        focal = 0.5 * width / tan(radians(hfov_deg) / 2)
+        said = f"no calibration: focal length from the given horizontal field of view of {hfov_deg:g} degrees"
+    camera = Camera(focal, focal, width / 2, height / 2, width, height)
+    return Calibration(camera, None, False, (said, "lens distortion unknown, taken as zero"))
+
+
+def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
+    """Read a calibration file: JSON with ``width``, ``height``, ``intrinsics`` and optional ``distortion``.
+
+    The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy.
+
+    Args:
+        path: The file; a clip's ``meta.json`` is one.
+        size: Width and height of the source; another size of the same aspect scales the calibration.
+
+    Raises:
+        InputError: The file is missing, malformed, or for images of another shape.
+    """
+    values = read_json(path, "--intrinsics")
+    pinhole = values.get("intrinsics")
+    if not isinstance(pinhole, dict):
+        raise InputError(
+            f"--intrinsics {path} holds no calibration; expected JSON with width, height and "
+            'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
+        )
+    pinhole = cast("dict[str, Any]", pinhole)
+    width, height = (_number(path, values, name) for name in ("width", "height"))
+    fx, fy, cx, cy = (_number(path, pinhole, name) for name in ("fx", "fy", "cx", "cy"))
+    if min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
+        raise InputError(
+            f"--intrinsics {path}: expected positive sizes and focal lengths and a principal point inside "
+            f"the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}"
+        )
+    notes: list[str] = []
+    if (width, height) != size:
+        if abs(width / height * size[1] / size[0] - 1) > _ASPECT_TOLERANCE:
+            raise InputError(
+                f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
+                f"{size[0]}x{size[1]}, another shape; give the calibration of this input"
+            )
+        notes.append(f"calibration scaled from {width:g}x{height:g} to {size[0]}x{size[1]}")
+    sx, sy = size[0] / width, size[1] / height
+    camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
+    distortion = _distortion(path, values.get("distortion"), notes)
+    return Calibration(camera, distortion, True, tuple(notes))
+
+
+def read_json(path: Path, option: str) -> dict[str, Any]:
+    """The JSON object in a file.
+
+    Raises:
+        InputError: The file is missing or holds something else.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{option} {path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{option} {path} is not JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{option} {path}: expected a JSON object, got a {type(values).__name__}")
+    return cast("dict[str, Any]", values)
+
+
+def _number(path: Path, values: dict[str, Any], name: str) -> float:
+    value = values.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+        raise InputError(f"--intrinsics {path}: expected a number for {name}, got {json.dumps(value)}")
+    return float(value)
+
+
+def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | None:
+    if value is None or isinstance(value, str):
+        said = f' (the calibration says "{value}")' if value else ""
+        notes.append(f"no distortion coefficients given: lens distortion taken as zero{said}")
+        return None
+    values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
+    name, numbers = values.get("model"), values.get("coefficients")
+    if not isinstance(name, str) or not isinstance(numbers, list):
+        raise InputError(f'--intrinsics {path}: expected distortion {{"model", "coefficients"}} or a text')
+    coefficients = tuple(
+        _number(path, {"distortion coefficients": n}, "distortion coefficients")
+        for n in cast("list[object]", numbers)
+    )
+    model, order = _model(path, name)
+    allowed = (4,) if model == "fisheye" else (4, 5, 8, 12, 14)
+    if len(coefficients) not in allowed or (order and len(order) != len(coefficients)):
+        raise InputError(
+            f"--intrinsics {path}: distortion {name!r} with {len(coefficients)} coefficients; expected "
+            f"{' or '.join(map(str, allowed))} in OpenCV's order"
+        )
+    return Distortion(model, coefficients) if any(coefficients) or model == "fisheye" else None
+
+
+def _model(path: Path, name: str) -> tuple[Literal["opencv", "fisheye"], list[str]]:
+    """The model and the order of coefficients that a name such as ``opencv k1 k2 p1 p2 k3`` spells out."""
+    words = name.lower().replace("_", " ").replace(",", " ").split()
+    fisheye = "fisheye" in words
+    order = [w for w in words if w not in ("opencv", "fisheye")]
+    expected = ["k1", "k2", "k3", "k4"] if fisheye else _OPENCV_ORDER[: len(order)]
+    if len(order) == len(words) or (order and order != expected):
+        raise InputError(
+            f"--intrinsics {path}: unknown distortion model {name!r}; expected opencv (k1 k2 p1 p2 k3 ...) "
+            "or fisheye"
+        )
+    return ("fisheye" if fisheye else "opencv"), order

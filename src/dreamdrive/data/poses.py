@@ -1,0 +1,108 @@
+"""Poses of a clip from a file, and trajectories on disk."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.data.pose_files import PoseRows, read_pose_file, write_pose_file
+from dreamdrive.errors import InputError
+from dreamdrive.scene.trajectory import Trajectory
+
+_CLOCK_NOTE = "times in the pose file are counted from its first row, which is taken as frame 0 of the input"
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Read a path of the camera in the world frame: JSON or TUM.
+
+    Raises:
+        InputError: The file is missing or malformed, or has no times.
+    """
+    rows = read_pose_file(path, "trajectory")
+    if rows.times_s is None:
+        raise InputError(f"trajectory {path} has poses but no times; expected Trajectory JSON or TUM")
+    return Trajectory(rows.world_from_camera, rows.times_s)
+
+
+def write_trajectory(trajectory: Trajectory, path: Path) -> None:
+    """Write JSON, or TUM unless the name ends in ``.json``.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    try:
+        write_pose_file(path, PoseRows(trajectory.world_from_camera, trajectory.times_s))
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def read_poses(
+    path: Path,
+    camera: str,
+    index: Int[np.ndarray, " f"],
+    times_s: Float[np.ndarray, " f"],
+    count: Callable[[], int],
+) -> tuple[Float[np.ndarray, "f 4 4"], tuple[str, ...]]:
+    """The poses of the selected frames, in the frame of the first of them, and notes for the report.
+
+    A file has one pose per frame of the source, or one per selected frame; with any other number, poses with
+    times are matched to the nearest frame within half a frame.
+
+    Args:
+        path: Trajectory JSON, TUM, KITTI or PandaSet's ``cameras.json``.
+        camera: Name of the camera in ``cameras.json``: that of the input folder.
+        index: Index of each selected frame in the source.
+        times_s: Time of each selected frame since frame 0 of the source.
+        count: Number of frames in the source; called only where it decides.
+
+    Raises:
+        InputError: The file is malformed or its poses fit the frames in no way.
+    """
+    rows = read_pose_file(path, "--poses", camera)
+    notes: tuple[str, ...] = ()
+    if len(rows) == len(index):
+        chosen = np.arange(len(index))
+    elif len(rows) == count():
+        chosen = np.asarray(index)
+    elif rows.times_s is None:
+        raise InputError(
+            f"--poses {path} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of them "
+            "selected; expected one pose per frame of the input or per selected frame"
+        )
+    else:
+        chosen, notes = _by_time(path, rows.times_s, index, times_s)
+    return to_first(rows.world_from_camera[chosen]), notes
+
+
+def to_first(poses: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "f 4 4"]:
+    """Rigid poses relative to the first of them, which becomes exactly the identity."""
+    first = poses[0]
+    inverse = np.eye(4)
+    inverse[:3, :3] = first[:3, :3].T
+    inverse[:3, 3] = -first[:3, :3].T @ first[:3, 3]
+    moved = inverse @ poses
+    moved[0] = np.eye(4)
+    return moved
+
+
+def _by_time(
+    path: Path,
+    rows_s: Float[np.ndarray, " n"],
+    index: Int[np.ndarray, " f"],
+    times_s: Float[np.ndarray, " f"],
+) -> tuple[Int[np.ndarray, " f"], tuple[str, ...]]:
+    """The nearest row of each frame, on the source's clock or, if that cannot be, on the file's own."""
+    period_s = float(np.median(np.diff(times_s) / np.diff(index)))
+    worst = np.inf
+    for clock_s, notes in ((rows_s, ()), (rows_s - rows_s[0], (_CLOCK_NOTE,))):
+        chosen = np.abs(times_s[:, None] - clock_s[None, :]).argmin(axis=1)
+        gap = np.abs(times_s - clock_s[chosen])
+        if gap.max() <= period_s / 2 and (np.diff(chosen) > 0).all():
+            return chosen, notes
+        worst = min(worst, float(gap.max()))
+    raise InputError(
+        f"--poses {path}: its {len(rows_s)} poses (times {rows_s[0]:g} to {rows_s[-1]:g} s) do not meet the "
+        f"{len(index)} selected frames ({times_s[0]:g} to {times_s[-1]:g} s): a frame lies {worst:.3g} s "
+        f"from the nearest pose, at most half a frame ({period_s / 2:.3g} s) is allowed; is --fps right?"
+    )

@@ -1,0 +1,53 @@
+"""What an input path is: a video, a folder of images, or something that is no recording."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+from dreamdrive.data.frame import RawFrame
+from dreamdrive.data.images import SUFFIXES, ImageFolder
+from dreamdrive.data.video import Video
+from dreamdrive.errors import InputError
+
+
+class Source(Protocol):
+    """A numbered sequence of pictures."""
+
+    @property
+    def path(self) -> Path:
+        """Where it lies."""
+        ...
+
+    def count(self) -> int:
+        """Number of frames; may have to decode them all."""
+        ...
+
+    def read(self, wanted: range) -> Iterator[RawFrame]:
+        """The wanted frames, one at a time, in order."""
+        ...
+
+
+def open_source(path: Path) -> ImageFolder | Video:
+    """Open a recording.
+
+    Raises:
+        InputError: The path is missing, is a single photo or is not a recording.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist; expected a video or a folder of images")
+    if path.is_dir():
+        return ImageFolder.open(path)
+    if path.suffix.lower() in SUFFIXES:
+        raise one_frame(path)
+    if path.suffix.lower() == ".json":
+        raise InputError(f"{path} is a JSON file, not a recording; a layout is taken by --prior street-world")
+    return Video.open(path)
+
+
+def one_frame(path: Path) -> InputError:
+    """The error for an input of one picture."""
+    return InputError(
+        f"{path} gives a single frame, and a recorded clip needs at least two. One photo will be taken by "
+        "the priors street (the one that ships in the box), vista and svd, which are not available yet; "
+        "until then give a video or a folder of images"
+    )

@@ -1,0 +1,28 @@
+"""The prior of a recorded clip: the recording itself, with its appearance as features."""
+
+from dreamdrive.data import read_clip
+from dreamdrive.errors import InputError
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+
+
+def replay(control: Control) -> Clip:
+    """Read a video or a folder of images; Z_ref is ``features["appearance"]``.
+
+    Raises:
+        InputError: There is no input, or it cannot be used.
+    """
+    if control.path is None:
+        raise InputError("the prior replay needs an input: a video or a folder of images")
+    clip = read_clip(
+        control.path,
+        frames=control.frames,
+        fps=control.fps,
+        size=control.size,
+        intrinsics=control.intrinsics,
+        poses=control.poses,
+        hfov_deg=control.hfov_deg,
+        hold_out=control.hold_out,
+    )
+    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
