@@ -1,0 +1,196 @@
+"""The scene folder: round trip, equal bytes, refusal of what is damaged, nothing lost on failure."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
+from dreamdrive.scene.exposure import Exposure
+from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.sky import Sky
+
+
+def gaussians(count: int, seed: int, **more: torch.Tensor) -> Gaussians:
+    g = torch.Generator().manual_seed(seed)
+    return Gaussians(
+        means=torch.randn(count, 3, generator=g),
+        quaternions=torch.randn(count, 4, generator=g),
+        log_scales=torch.randn(count, 3, generator=g),
+        logit_opacities=torch.randn(count, generator=g),
+        sh=torch.randn(count, 4, 3, generator=g),
+        source_frame=torch.arange(count) % 3,
+        **more,
+    )
+
+
+def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
+    config = DeformationConfig(depth=6, width=8, actors=2, track_times=3)
+    tracks = Tracks(
+        np.array([0.0, 0.5, 1.0]),
+        np.random.default_rng(0).normal(size=(2, 3, 3)),
+        np.ones((2, 3)),
+        np.ones((2, 3)),
+    )
+    domain = Domain(np.array([1.0, 2, 3]), 4.0, 0.0, 1.0, np.array([0, -1.0, 0]))
+    field = DeformationField(config, domain, tracks)
+    torch.nn.init.constant_(field.head_mean.bias, 0.25)
+    more = {"lifespan": torch.ones(dynamic, 2), "actor": torch.arange(dynamic) % 3 - 1}
+    return Scene(
+        static=gaussians(7, 1, features=torch.ones(7, 2)),
+        dynamic=gaussians(dynamic, 2, **more),
+        deformation=field if full else None,
+        actors=(Actor(0, "actor 0", "vehicle", 2, np.array([0.0, 0.1]), np.ones((2, 3)) / 3),)
+        if full
+        else (),
+        sky=Sky(torch.rand(4, 6, 3), (-1.0, 1.0), (-0.1, 0.8)) if full else None,
+        exposure=Exposure(torch.eye(3, 4).repeat(2, 1, 1), np.array([0.0, 0.1])) if full else None,
+        cameras=tuple(Camera(50.0, 51.0, 16.5, 12.0, 33, 24) for _ in range(3)),
+        times_s=np.array([0.0, 0.1, 0.2]) + 1 / 3,
+        held_out=np.array([False, True, False]),
+        provenance={"seed": 1, "per_frame": {10: "a", 2: "b"}},
+    )
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in sorted(path.iterdir())}
+
+
+@pytest.mark.parametrize(("dynamic", "full"), [(4, True), (0, True), (0, False)])
+def test_round_trip(tmp_path: Path, dynamic: int, full: bool) -> None:
+    scene = make_scene(dynamic, full)
+    save_scene(scene, tmp_path / "scene")
+    loaded = load_scene(tmp_path / "scene")
+    before, after = scene.at(0.4).tensors(), loaded.at(0.4).tensors()
+    assert before.keys() == after.keys()
+    assert all(torch.equal(before[name], after[name]) for name in before)
+    assert loaded.static.features is not None
+    assert (loaded.times_s == scene.times_s).all()
+    assert (loaded.held_out == scene.held_out).all()
+    assert loaded.cameras[1].cx_px == 16.5
+    assert [a.name for a in loaded.actors] == [a.name for a in scene.actors]
+    assert (loaded.sky is None) == (scene.sky is None)
+    assert (loaded.exposure is None) == (scene.exposure is None)
+
+
+def test_equal_scenes_give_equal_bytes(tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    first = make_scene()
+    torch.manual_seed(0)
+    second = make_scene()
+    save_scene(first, tmp_path / "a")
+    save_scene(second, tmp_path / "b")
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    save_scene(load_scene(tmp_path / "a"), tmp_path / "c")
+    assert contents(tmp_path / "a") == contents(tmp_path / "c")
+
+
+def test_every_flipped_byte_is_noticed(tmp_path: Path) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    rng = np.random.default_rng(0)
+    for name, data in contents(tmp_path / "s").items():
+        for at in rng.integers(0, len(data) - 1, 12):
+            flipped = bytearray(data)
+            flipped[at] ^= 0x11
+            (tmp_path / "s" / name).write_bytes(bytes(flipped))
+            if name == "scene.json" and json.loads(data) == _parsed(flipped):
+                continue  # white space
+            with pytest.raises(InputError):
+                load_scene(tmp_path / "s")
+        (tmp_path / "s" / name).write_bytes(data)
+    load_scene(tmp_path / "s")
+
+
+def _parsed(data: bytearray) -> object:
+    try:
+        return json.loads(data)
+    except ValueError:
+        return None
+
+
+def test_missing_parts_and_other_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"scene\.json"):
+        load_scene(tmp_path)
+    save_scene(make_scene(), tmp_path / "s")
+    (tmp_path / "s" / "main-sky.safetensors").unlink()
+    with pytest.raises(InputError, match="incomplete"):
+        load_scene(tmp_path / "s")
+
+
+def test_a_newer_format_is_named(tmp_path: Path) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    index = tmp_path / "s" / "scene.json"
+    index.write_text(index.read_text().replace('"version": 1', '"version": 7'))
+    with pytest.raises(InputError, match="version 7"):
+        load_scene(tmp_path / "s")
+
+
+def test_replaces_only_when_told_and_only_scenes(tmp_path: Path) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    with pytest.raises(InputError, match="exists already"):
+        save_scene(make_scene(), tmp_path / "s")
+    save_scene(make_scene(full=False), tmp_path / "s", replace=True)
+    assert load_scene(tmp_path / "s").sky is None
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "1.png").write_text("mine")
+    with pytest.raises(InputError, match="other files"):
+        save_scene(make_scene(), tmp_path / "photos", replace=True)
+    assert (tmp_path / "photos" / "1.png").read_text() == "mine"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["photos", "s"]
+
+
+def test_an_unwritable_place_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="cannot write"):
+        save_scene(make_scene(), tmp_path / "file" / "scene")
+
+
+def test_a_failing_write_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    before = contents(tmp_path / "s")
+    written = []
+
+    def full_disk(self: Path, data: bytes) -> int:
+        written.append(self.name)
+        if len(written) > 1:
+            raise OSError(28, "No space left on device")
+        return len(data)
+
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    with pytest.raises(InputError, match="No space left"):
+        save_scene(make_scene(full=False), tmp_path / "s", replace=True)
+    assert contents(tmp_path / "s") == before
+    assert [p.name for p in tmp_path.iterdir()] == ["s"]
+
+
+def test_a_failing_rename_puts_the_old_scene_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    before = contents(tmp_path / "s")
+    replace = os.replace
+
+    def failing(source: Path, target: Path) -> None:
+        if Path(source).name == ".s.partial":
+            raise OSError(5, "Input/output error")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", failing)
+    with pytest.raises(InputError, match="Input/output"):
+        save_scene(make_scene(full=False), tmp_path / "s", replace=True)
+    assert contents(tmp_path / "s") == before
+
+
+def test_a_kill_between_the_renames_is_repaired(tmp_path: Path) -> None:
+    save_scene(make_scene(), tmp_path / "s")
+    before = contents(tmp_path / "s")
+    os.replace(tmp_path / "s", tmp_path / ".s.retired")
+    with pytest.raises(InputError, match="exists already"):
+        save_scene(make_scene(full=False), tmp_path / "s")
+    assert contents(tmp_path / "s") == before
