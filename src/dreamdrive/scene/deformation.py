@@ -224,15 +224,27 @@ class DeformationField(nn.Module):
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
-        Linear between key frames; before the first and after the last the velocity there continues.
+        A cubic through the key frames whose slopes are those of their neighbours (Catmull-Rom): between two key
+        frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off. Before
+        the first and after the last key frame the velocity there continues.
         """
         times = self.track_times_s.tolist()
         if len(times) < 2:
             return self.track_translation.sum(dim=1), self.track_yaw_rad.sum(dim=1)
+        keys = torch.cat([self.track_translation, self.track_yaw_rad[..., None]], dim=-1)
         i = min(max(int(np.searchsorted(times, t_s, side="right")) - 1, 0), len(times) - 2)
-        weight = (t_s - times[i]) / (times[i + 1] - times[i])
-        translation = torch.lerp(self.track_translation[:, i], self.track_translation[:, i + 1], weight)
-        return translation, torch.lerp(self.track_yaw_rad[:, i], self.track_yaw_rad[:, i + 1], weight)
+        step = times[i + 1] - times[i]
+        u = (t_s - times[i]) / step
+        start, end = keys[:, i], keys[:, i + 1]
+        slope, next_slope = (_slope(keys, times, k) * step for k in (i, i + 1))
+        if u < 0:
+            at = start + u * slope
+        elif u > 1:
+            at = end + (u - 1) * next_slope
+        else:
+            bend = 2 * (start - end) + slope + next_slope
+            at = start + u * (slope + u * (end - start - slope - bend + u * bend))
+        return at[:, :3], at[:, 3]
 
     def forward(
         self,
@@ -283,6 +295,15 @@ class DeformationField(nn.Module):
 
 def _tensor(values: np.ndarray | float) -> Tensor:
     return torch.tensor(values, dtype=torch.float32)
+
+
+def _slope(keys: Float[Tensor, "a t 4"], times: list[float], k: int) -> Float[Tensor, "a 4"]:
+    """Velocity at key frame ``k``, of the parabola through it and its neighbours; one-sided at the ends."""
+    before, after = min(k, len(times) - 2), max(k, 1)
+    ahead = (keys[:, before + 1] - keys[:, before]) / (times[before + 1] - times[before])
+    behind = (keys[:, after] - keys[:, after - 1]) / (times[after] - times[after - 1])
+    share = (times[after] - times[after - 1]) / (times[before + 1] - times[after - 1])
+    return torch.lerp(behind, ahead, share)
 
 
 def _rotate(vectors: Tensor, axis: Tensor, angle_rad: Tensor) -> Tensor:
