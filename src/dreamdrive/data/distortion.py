@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 _NEWTON_STEPS = 20
+_BLOCK = 1 << 15
+"""Points given to OpenCV at once; its scratch memory is 500 bytes a point."""
 _STEP = 1e-6
 _TOLERANCE = 1e-7
 """Largest error of an inverted point, in units of the focal length: under a thousandth of a pixel."""
@@ -43,8 +45,9 @@ class Distortion:
             bent = _fisheye_radius(angle, coefficients)
             return points * (bent / np.maximum(radius, 1e-12))[:, None]
         rays = np.concatenate([points, np.ones((len(points), 1))], axis=1)[:, None]
-        found = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), coefficients)[0]
-        return np.asarray(found, dtype=np.float64).reshape(-1, 2)
+        blocks = (rays[start : start + _BLOCK] for start in range(0, len(rays), _BLOCK))
+        found = [cv2.projectPoints(b, np.zeros(3), np.zeros(3), np.eye(3), coefficients)[0] for b in blocks]
+        return np.concatenate(found).astype(np.float64).reshape(-1, 2)
 
     def undistort(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """The inverse of ``distort``; NaN where no ideal point in front of the camera leads there.
@@ -54,14 +57,15 @@ class Distortion:
         """
         if self.model == "fisheye":
             return _undistort_fisheye(points, np.array(self.coefficients), self.fold_rad)
-        ideal = points.astype(np.float64, copy=True)
+        ideal = np.array(points, dtype=np.float64)
+        left = np.arange(len(points))
         with np.errstate(all="ignore"):  # points that diverge are thrown out below
             for _ in range(_NEWTON_STEPS):
-                error = self.distort(ideal) - points
-                if np.abs(error).max(initial=0.0) < 1e-12:
-                    break
-                ideal -= _solve(self._jacobian(ideal), error)
-                ideal[~np.isfinite(ideal).all(axis=1)] = np.nan
+                error = self.distort(ideal[left]) - points[left]
+                far = np.abs(error).max(axis=1, initial=0.0) > 1e-12
+                left, error = left[far], error[far]
+                ideal[left] -= _solve(self._jacobian(ideal[left]), error)
+                left = left[np.isfinite(ideal[left]).all(axis=1)]
             good = np.abs(self.distort(ideal) - points).max(axis=1, initial=0.0) < _TOLERANCE
         good &= self.unfolded(ideal)
         return np.where(good[:, None], ideal, np.nan)

@@ -1,33 +1,17 @@
 """What an input path is: a video, a folder of images, or something that is no recording."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
 
-from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import SUFFIXES, ImageFolder
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 
 
-class Source(Protocol):
-    """A numbered sequence of pictures."""
-
-    @property
-    def path(self) -> Path:
-        """Where it lies."""
-        ...
-
-    def count(self) -> int:
-        """Number of frames; may have to decode them all."""
-        ...
-
-    def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames, one at a time, in order."""
-        ...
+Source = ImageFolder | Video
+"""A numbered sequence of pictures."""
 
 
-def open_source(path: Path) -> ImageFolder | Video:
+def open_source(path: Path) -> Source:
     """Open a recording.
 
     Raises:
