@@ -201,4 +201,4 @@ def _deformation(config: dict[str, Any] | None, state: dict[str, Tensor] | None)
     )
     field = DeformationField(shape, domain, tracks if actors else None)
     field.load_state_dict(state)
-    return field
+    return field.requires_grad_(False)

@@ -1,0 +1,93 @@
+"""MP4 out."""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.error import FFmpegError
+from av.video.reformatter import Colorspace
+from jaxtyping import Float, UInt8
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.atomic import new_file
+
+Frame = UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"]
+
+# Constant rate factor of x264: 18 is commonly taken as visually lossless.
+_QUALITY = "18"
+# One thread: x264's output depends on how many there are.
+_OPTIONS = {"crf": _QUALITY, "preset": "medium", "threads": "1"}
+
+
+def write_video(path: Path, frames: Iterable[Frame], fps: float) -> int:
+    """Write frames as H.264 in MP4 (yuv420p, BT.709); equal frames give equal bytes.
+
+    The file appears when it is whole; a failure leaves what was there. An odd width or height is padded by
+    one column or row, since yuv420p has none.
+
+    Args:
+        path: The file.
+        frames: RGB (H, W, 3), uint8 or float in [0, 1], all of one size; consumed one at a time.
+        fps: Frames a second.
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    if not fps > 0:
+        raise ValueError(f"{path.name}: fps must be positive, got {fps}")
+    with new_file(path) as partial:
+        # PyAV would hide the reason of a failed open.
+        partial.touch()
+        try:
+            count = _encode(partial, frames, fps)
+        except FFmpegError as error:
+            raise InputError(
+                f"cannot write {path}: {error}; free some space or choose another place"
+            ) from error
+        if count == 0:
+            raise ValueError(f"{path.name}: a video needs at least one frame")
+    return count
+
+
+def _encode(path: Path, frames: Iterable[Frame], fps: float) -> int:
+    count, size = 0, None
+    flags = {"movflags": "+faststart", "fflags": "+bitexact"}
+    with av.open(str(path), "w", format="mp4", options=flags) as container:
+        stream = container.add_stream(
+            "libx264", rate=Fraction(fps).limit_denominator(100_000), options=_OPTIONS
+        )
+        stream.pix_fmt = "yuv420p"
+        context = stream.codec_context
+        context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709
+        for frame in frames:
+            image = _even(_bytes(frame))
+            if size is None:
+                size = image.shape
+                stream.height, stream.width = size[:2]
+            if image.shape != size:
+                raise ValueError(f"{path.name}: frame {count} is {image.shape}, the first one {size}")
+            picture = av.VideoFrame.from_ndarray(image, format="rgb24")
+            picture = picture.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709)
+            picture.pts = count
+            container.mux(stream.encode(picture))
+            count += 1
+        if count:
+            container.mux(stream.encode(None))
+    return count
+
+
+def _bytes(frame: Frame) -> np.ndarray:
+    if frame.dtype == np.uint8:
+        return frame
+    return np.rint(np.clip(frame, 0, 1) * 255).astype(np.uint8)
+
+
+def _even(image: np.ndarray) -> np.ndarray:
+    """Pad to even sizes by repeating the last column and row."""
+    height, width = image.shape[:2]
+    return np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

@@ -1,0 +1,22 @@
+"""What a scene can be exported to."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.export.ply import export_ply
+from dreamdrive.scene.scene import Scene
+
+KINDS: dict[str, Callable[[Scene, Path], None]] = {"ply": export_ply}
+"""What ``export --to`` takes."""
+
+
+def export(scene: Scene, kind: str, path: Path) -> None:
+    """Write a scene as one of :data:`KINDS`.
+
+    Raises:
+        InputError: There is no such kind, or the place cannot be written.
+    """
+    if kind not in KINDS:
+        raise InputError(f"unknown export kind {kind!r}; expected {', '.join(KINDS)}")
+    KINDS[kind](scene, path)

@@ -1,0 +1,133 @@
+"""Gaussians as PLY, in the layout that 3DGS viewers read."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.atomic import new_file, new_folder
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+
+_COEFFICIENTS = (1, 4, 9, 16)
+
+
+def write_ply(gaussians: Gaussians, path: Path) -> None:
+    """Write one PLY: float32, little endian, the fields and order of 3DGS.
+
+    x y z, nx ny nz (0), f_dc_0..2, f_rest_* (channel-major, as many as the degree has), opacity (logit),
+    scale_0..2 (log), rot_0..3 (wxyz, unit). Axes stay: x right, y down, z forward. Life spans, actors,
+    features and source frames have no field and are left out; use ``Scene.at`` first for a scene at a time.
+
+    Raises:
+        InputError: The file cannot be written; what was there stays.
+    """
+    data = _encode(gaussians)
+    with new_file(path) as partial:
+        partial.write_bytes(data)
+
+
+def read_ply(path: Path) -> Gaussians:
+    """Read a 3DGS PLY; fields in any order, further fields ignored.
+
+    Raises:
+        InputError: The file is missing, damaged or holds no Gaussians.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    names, count, start = _header(path, data)
+    size = 4 * len(names) * count
+    if len(data) < start + size:
+        raise InputError(f"{path} is cut off: {len(data) - start} bytes of {size} after the header")
+    table = np.frombuffer(data, dtype="<f4", count=len(names) * count, offset=start).reshape(
+        count, len(names)
+    )
+    rest = sorted((n for n in names if n.startswith("f_rest_")), key=lambda n: int(n.removeprefix("f_rest_")))
+    coefficients = 1 + len(rest) // 3
+    if coefficients not in _COEFFICIENTS or len(rest) % 3:
+        raise InputError(f"{path} has {len(rest)} f_rest fields; expected 0, 9, 24 or 45")
+
+    def take(*wanted: str) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(table[:, [names.index(n) for n in wanted]]))
+
+    base = take("f_dc_0", "f_dc_1", "f_dc_2")[:, None]
+    higher = take(*rest).view(count, 3, coefficients - 1).transpose(1, 2)
+    return Gaussians(
+        means=take("x", "y", "z"),
+        quaternions=take("rot_0", "rot_1", "rot_2", "rot_3"),
+        log_scales=take("scale_0", "scale_1", "scale_2"),
+        logit_opacities=take("opacity")[:, 0],
+        sh=torch.cat([base, higher], dim=1),
+        source_frame=torch.zeros(count, dtype=torch.int64),
+    )
+
+
+def export_ply(scene: Scene, path: Path) -> None:
+    """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
+
+    The single file holds everything as it is at the first recorded time. The folder holds ``static.ply``
+    (what never moves) and ``frames/NNNN.ply``, everything as it is at each recorded time: a numbered sequence
+    that viewers play. PLY has no place for sky and exposure. One Gaussian takes 68 bytes, with spherical
+    harmonics of degree 1 104.
+
+    Raises:
+        InputError: Something else is at ``path``, or it cannot be written; what was there stays.
+    """
+    if path.suffix.lower() == ".ply":
+        write_ply(scene.at(float(scene.times_s[0])), path)
+        return
+    with new_folder(path, replace=True, mark="static.ply") as folder:
+        (folder / "static.ply").write_bytes(_encode(scene.static_at(float(scene.times_s[0]))))
+        (folder / "frames").mkdir()
+        for i, t_s in enumerate(scene.times_s):
+            (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
+
+
+def _fields(coefficients: int) -> list[str]:
+    names = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
+    names += [f"f_rest_{i}" for i in range(3 * (coefficients - 1))]
+    return [*names, "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
+
+
+def _encode(gaussians: Gaussians) -> bytes:
+    count, coefficients = gaussians.sh.shape[:2]
+    properties = "".join(f"property float {name}\n" for name in _fields(coefficients))
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n"
+    columns = [
+        gaussians.means,
+        torch.zeros_like(gaussians.means),
+        gaussians.sh[:, 0],
+        gaussians.sh[:, 1:].transpose(1, 2).reshape(count, 3 * (coefficients - 1)),
+        gaussians.logit_opacities[:, None],
+        gaussians.log_scales,
+        torch.nn.functional.normalize(gaussians.quaternions, dim=-1),
+    ]
+    table = torch.cat([c.detach().cpu().float() for c in columns], dim=1).numpy()
+    return header.encode("ascii") + table.astype("<f4").tobytes()
+
+
+def _header(path: Path, data: bytes) -> tuple[list[str], int, int]:
+    """Names of the vertex fields, number of vertices, and where the numbers start."""
+    end = data.find(b"end_header\n")
+    if not data.startswith(b"ply\n") or end < 0:
+        raise InputError(f"{path} is no PLY file; expected one that 3DGS programs write")
+    lines = [line.split() for line in data[:end].decode("ascii", errors="replace").splitlines()]
+    if ["format", "binary_little_endian", "1.0"] not in lines:
+        raise InputError(f"{path} is not binary little endian; expected a PLY that 3DGS programs write")
+    elements = [line for line in lines if line[:1] == ["element"]]
+    fields = [line for line in lines if line[:1] == ["property"]]
+    is_plain = len(elements) == 1 and len(elements[0]) == 3 and elements[0][1] == "vertex"
+    if (
+        not is_plain
+        or not elements[0][2].isdigit()
+        or any(f[1:2] != ["float"] or len(f) != 3 for f in fields)
+    ):
+        raise InputError(f"{path}: expected one element vertex with float properties only")
+    names = [field[2] for field in fields]
+    missing = sorted(set(_fields(1)) - {"nx", "ny", "nz"} - set(names))
+    if missing or len(set(names)) != len(names):
+        raise InputError(f"{path} holds no Gaussians: {', '.join(missing) or 'a repeated field'}")
+    return names, int(elements[0][2]), end + len(b"end_header\n")

@@ -1,0 +1,81 @@
+"""The prior that ships in the box: a drive through the procedural street."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool
+
+from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.street import Street, make_street
+from dreamdrive.errors import InputError
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.control import Control
+
+FRAMES = 24
+"""Length of the drive unless ``control.frames`` says where to stop."""
+RATE_HZ = 10.0
+"""Rate unless told."""
+SIZE = (320, 192)
+"""Width and height unless told."""
+
+
+def street_world(control: Control, *, truth: bool = False) -> Clip:
+    """A clip of the procedural street that ``control.seed`` decides; Z_ref is ``features["appearance"]``.
+
+    Args:
+        control: Frames, rate, size, withheld frames and seed; no files.
+        truth: Whether the exact poses, depth and sky are handed over. Without them the clip is what a
+            calibrated dashcam would give, and the reconstruction has to find them.
+
+    Raises:
+        InputError: A file is given, the size is odd, or the frames cannot be selected.
+    """
+    for name in ("path", "intrinsics", "poses", "hfov_deg"):
+        if getattr(control, name) is not None:
+            raise InputError(
+                f"the prior street-world draws its own street and takes no {name}; leave it out, "
+                "or use --prior replay for a recording"
+            )
+    size = control.size or SIZE
+    if size[0] % 2 or size[1] % 2:
+        raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
+    selection = Selection.parse(control.frames)
+    if selection.stop is None:
+        selection = replace(selection, stop=max(FRAMES, selection.start + FRAMES))
+    wanted = list(selection.resolve(FRAMES if selection.needs_count else None, "the street"))
+    street = make_street(control.seed, wanted[-1] + 1, control.fps or RATE_HZ, size)
+    clip = _clip(street, np.array(wanted), truth)
+    provenance = {
+        "prior": "street-world",
+        "seed": control.seed,
+        "notes": [
+            f"The input is the built-in procedural street, seed {control.seed}, handed over with "
+            f"{'exact poses and depth' if truth else 'exact intrinsics only'}."
+        ],
+    }
+    held_out = held_out_mask(len(wanted), control.hold_out)
+    clip = replace(clip, held_out=held_out, provenance=provenance)
+    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+def _clip(street: Street, index: np.ndarray, truth: bool) -> Clip:
+    """Some frames of a street; time 0 and the world are those of the first of them."""
+    first = street.cameras[index[0]]
+    known = Known(intrinsics=True)
+    if truth:
+        poses = first.camera_from_world @ street.trajectory.world_from_camera[index]
+        poses[0] = np.eye(4)
+        known = Known(poses, intrinsics=True, depth_m=street.depth_m[index], sky=street.sky[index])
+    frames = street.frames[index]
+    nothing: Bool[np.ndarray, " f"] = np.zeros(len(index), dtype=bool)
+    return Clip(
+        frames=frames,
+        times_s=street.times_s[index] - street.times_s[index[0]],
+        camera=np.zeros(len(index), dtype=np.int64),
+        rig=(first.at(np.eye(4)),),
+        valid=np.ones(frames.shape[:3], dtype=bool),
+        held_out=nothing,
+        source_index=index,
+        known=known,
+    )
