@@ -1,0 +1,139 @@
+// Gradient of the compositing of one tile, back to front: transmittance and the light from behind are rebuilt per pixel.
+#include "kernel_list.h"
+#include "tile.h"
+
+namespace dd::DD_ISA {
+namespace {
+
+struct State {
+  // before: transmittance in front of what was handled so far; behind: sum of weight * (value . upstream) handled so far.
+  alignas(64) float before[kTilePixels], behind[kTilePixels];
+  alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels], depth[kTilePixels];  // upstream
+  alignas(64) int32_t last[kTilePixels];
+  int32_t last_of_row[kStrips * kTile];
+  float* channels;  // upstream, 256 a channel
+  float* sums;      // kLanes a channel
+};
+
+void load_pixel(const TileTask& task, const ImageGradients& in, State& state, int k, int64_t pixel) {
+  if (in.colour) {
+    state.red[k] = in.colour[3 * pixel];
+    state.green[k] = in.colour[3 * pixel + 1];
+    state.blue[k] = in.colour[3 * pixel + 2];
+  }
+  if (in.depth) state.depth[k] = in.depth[pixel];
+  // alpha = 1 - T_end and dT_end/dalpha_i = -T_end / (1 - alpha_i): the same form as the light from behind.
+  if (in.alpha) state.behind[k] = -in.alpha[pixel] * state.before[k];
+  if (in.channels)
+    for (int c = 0; c < task.n_channels; c++)
+      state.channels[c * kTilePixels + k] = in.channels[pixel * task.n_channels + c];
+}
+
+// Returns one more than the last entry that reached any pixel.
+int start(const TileTask& task, const ImageGradients& in, State& state) {
+  __builtin_memset(&state, 0, sizeof(state));
+  state.channels = task.scratch;
+  state.sums = task.scratch + task.n_channels * kTilePixels;
+  __builtin_memset(task.scratch, 0, sizeof(float) * task.n_channels * kTilePixels);
+  __builtin_memcpy(state.before, task.transmittance, sizeof(state.before));
+  __builtin_memcpy(state.last, task.last, sizeof(state.last));
+  const int width = task.view->width, x0 = task.tile_x * kTile, y0 = task.tile_y * kTile;
+  int deepest = -1;
+  for (int row = 0; row < kTile; row++)
+    for (int column = 0; column < kTile; column++) {
+      const int k = at(column / kLanes, row) + column % kLanes;
+      int32_t& row_last = state.last_of_row[k / kLanes];
+      if (column % kLanes == 0) row_last = -1;
+      if (x0 + column >= width || y0 + row >= task.view->height) continue;
+      load_pixel(task, in, state, k, int64_t(y0 + row) * width + x0 + column);
+      if (state.last[k] > row_last) row_last = state.last[k];
+      if (state.last[k] > deepest) deepest = state.last[k];
+    }
+  return deepest + 1;
+}
+
+// Sums over the rows of one strip, still one per column.
+struct ColumnSums {
+  V v = V{}, v_y = V{}, v_yy = V{}, red = V{}, green = V{}, blue = V{}, depth = V{};
+};
+
+static inline void add(V& sum, V value, V factor) { sum += value * factor; }
+
+template <bool kChannels>
+static inline void row_gradient(const TileTask& task, State& state, const Splat& s, int i, int k, V p, float dy,
+                                const float* values, ColumnSums& sums) {
+  const I seen = (p >= kMinPower) & (load(state.last + k) >= broadcast(int32_t(i)));
+  const V raw = masked(seen, exp2_bounded(p)), alpha = vmin(raw, broadcast(kMaxAlpha));
+  const V inverse = 1.0f / (1.0f - alpha);
+  const V before = load(state.before + k) * inverse, weight = alpha * before;
+  const V red = load(state.red + k), green = load(state.green + k), blue = load(state.blue + k);
+  const V depth = load(state.depth + k), behind = load(state.behind + k);
+  V value = s.colour[0] * red + s.colour[1] * green + s.colour[2] * blue + s.depth * depth;
+  add(sums.red, weight, red);
+  add(sums.green, weight, green);
+  add(sums.blue, weight, blue);
+  add(sums.depth, weight, depth);
+  if (kChannels)
+    for (int c = 0; c < task.n_channels; c++) {
+      const V upstream = load(state.channels + c * kTilePixels + k);
+      value += values[c] * upstream;
+      store(state.sums + c * kLanes, load(state.sums + c * kLanes) + weight * upstream);
+    }
+  store(state.before + k, before);
+  store(state.behind + k, behind + weight * value);
+  const V by_alpha = before * value - behind * inverse;
+  const V v = masked(raw <= kMaxAlpha, alpha * by_alpha);
+  sums.v += v;
+  sums.v_y += v * dy;
+  sums.v_yy += v * (dy * dy);
+}
+
+template <bool kChannels>
+void entry_gradient(const TileTask& task, State& state, int i, float left, float top, EntryGradient& out,
+                    float* out_channels) {
+  const Splat& s = task.splats[task.entries[i]];
+  const float* values = kChannels ? task.channels + int64_t(s.index) * task.n_channels : nullptr;
+  const Span reach = span(s, left, top);
+  V v = V{}, v_x = V{}, v_xx = V{}, v_y = V{}, v_xy = V{}, v_yy = V{};
+  ColumnSums sums;
+  if (kChannels) __builtin_memset(state.sums, 0, sizeof(float) * kLanes * task.n_channels);
+  for (int strip = reach.first_strip; strip <= reach.last_strip; strip++) {
+    const V dx = iota() + (left + 0.5f + float(strip * kLanes) - s.u);
+    const RowPower power(s, dx);
+    sums.v = sums.v_y = sums.v_yy = V{};
+    for (int row = reach.first_row; row <= reach.last_row; row++) {
+      if (state.last_of_row[strip * kTile + row] < i) continue;
+      const float dy = top + 0.5f + float(row) - s.v;
+      row_gradient<kChannels>(task, state, s, i, at(strip, row), power.at(dy), dy, values, sums);
+    }
+    v += sums.v;
+    v_x += sums.v * dx;
+    v_xx += sums.v * dx * dx;
+    v_y += sums.v_y;
+    v_xy += sums.v_y * dx;
+    v_yy += sums.v_yy;
+  }
+  float* to = &out.v;
+  const V4 a = sum_lanes(v, v_x, v_xx, v_y), b = sum_lanes(v_xy, v_yy, sums.red, sums.green);
+  const V4 c = sum_lanes(sums.blue, sums.depth, V{}, V{});
+  __builtin_memcpy(to, &a, 16);
+  __builtin_memcpy(to + 4, &b, 16);
+  __builtin_memcpy(to + 8, &c, 16);
+  if (kChannels)
+    for (int ch = 0; ch < task.n_channels; ch++) out_channels[ch] = sum_lanes(load(state.sums + ch * kLanes));
+}
+
+}  // namespace
+
+void composite_backward(const TileTask& task, const ImageGradients& in, EntryGradient* out, float* out_channels) {
+  State state;
+  const int n = start(task, in, state), channels = task.n_channels;
+  const float left = float(task.tile_x * kTile), top = float(task.tile_y * kTile);
+  for (int i = n - 1; i >= 0; i--)
+    channels ? entry_gradient<true>(task, state, i, left, top, out[i], out_channels + int64_t(i) * channels)
+             : entry_gradient<false>(task, state, i, left, top, out[i], nullptr);
+  __builtin_memset(out + n, 0, sizeof(EntryGradient) * (task.n_entries - n));
+  __builtin_memset(out_channels + int64_t(n) * channels, 0, sizeof(float) * channels * (task.n_entries - n));
+}
+
+}  // namespace dd::DD_ISA

@@ -1,0 +1,11 @@
+// The table of the kernels of one instruction set.
+#include "kernel_list.h"
+
+#define DD_STRING_(x) #x
+#define DD_STRING(x) DD_STRING_(x)
+
+namespace dd::DD_ISA {
+
+const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, composite, composite_backward, ssim, ssim_backward};
+
+}  // namespace dd::DD_ISA

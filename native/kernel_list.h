@@ -1,0 +1,16 @@
+// Declarations of the kernels of one instruction set; the macro DD_ISA names it.
+#pragma once
+#include "types.h"
+
+namespace dd::DD_ISA {
+
+int project(const Inputs&, const View&, int64_t first, int64_t last, Splat* projected, uint64_t* keys);
+void project_backward(const Inputs&, const View&, const BackwardTask&, int64_t first, int64_t last, float* pose);
+void composite(const TileTask&, const Images&);
+void composite_backward(const TileTask&, const ImageGradients&, EntryGradient*, float* entry_channels);
+void ssim(const SsimTask&);
+void ssim_backward(const SsimTask&);
+
+extern const Kernels kTable;
+
+}  // namespace dd::DD_ISA

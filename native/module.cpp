@@ -1,0 +1,234 @@
+// Python bindings: raw float32 buffers in, results written into buffers that the caller owns.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rasterize.h"
+#include "threads.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+template <class... Shape>
+using In = nb::ndarray<const float, nb::c_contig, nb::device::cpu, Shape...>;
+template <class... Shape>
+using Out = nb::ndarray<float, nb::c_contig, nb::device::cpu, Shape...>;
+using InAny = In<>;
+using OutAny = Out<>;
+using Visible = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+struct PyFrame {
+  dd::FrameHandle frame;
+};
+
+// The Gaussians of one call; the arrays are held so that their memory stays.
+struct Gaussians {
+  InAny means, quaternions, scales, opacities, sh;
+  std::optional<InAny> channels, offsets;
+  int sh_degree;
+
+  dd::Inputs inputs() const {
+    dd::Inputs in;
+    in.means = means.data();
+    in.quaternions = quaternions.data();
+    in.scales = scales.data();
+    in.opacities = opacities.data();
+    in.sh = sh.data();
+    in.channels = channels ? channels->data() : nullptr;
+    in.offsets = offsets ? offsets->data() : nullptr;
+    in.n = int64_t(means.shape(0));
+    in.sh_stored = int(sh.shape(1));
+    in.sh_degree = sh_degree;
+    in.n_channels = channels ? int(channels->shape(1)) : 0;
+    return in;
+  }
+};
+
+void expect_size(const char* name, size_t size, size_t expected) {
+  if (size != expected)
+    throw nb::value_error((std::string(name) + ": expected " + std::to_string(expected) + " numbers, got " +
+                           std::to_string(size)).c_str());
+}
+
+Gaussians make_gaussians(InAny means, InAny quaternions, InAny scales, InAny opacities, InAny sh,
+                         std::optional<InAny> channels, std::optional<InAny> offsets, int sh_degree) {
+  if (means.ndim() != 2 || sh.ndim() != 3 || (channels && channels->ndim() != 2))
+    throw nb::value_error("expected means (n, 3), sh (n, k, 3) and channels (n, c)");
+  const size_t n = means.shape(0);
+  expect_size("means", means.size(), 3 * n);
+  expect_size("quaternions", quaternions.size(), 4 * n);
+  expect_size("scales", scales.size(), 3 * n);
+  expect_size("opacities", opacities.size(), n);
+  expect_size("sh", sh.size(), 3 * n * sh.shape(1));
+  if (channels) expect_size("channels", channels->size(), n * channels->shape(1));
+  if (offsets) expect_size("screen_offsets_px", offsets->size(), 2 * n);
+  if (n >= dd::kHidden) throw nb::value_error("means: too many Gaussians");
+  if (sh_degree < 0 || sh_degree > 3 || size_t((sh_degree + 1) * (sh_degree + 1)) > sh.shape(1))
+    throw nb::value_error("sh_degree: expected 0 to 3 and no more than stored");
+  return {means, quaternions, scales, opacities, sh, channels, offsets, sh_degree};
+}
+
+std::unique_ptr<PyFrame> forward(const Gaussians& gaussians, In<nb::shape<4, 4>> camera_from_world, float fx, float fy,
+                                 float cx, float cy, int width, int height, OutAny colour, OutAny alpha, OutAny depth,
+                                 OutAny channels, Visible visible, bool keep) {
+  const dd::Inputs in = gaussians.inputs();
+  if (width < 1 || height < 1) throw nb::value_error("width_px, height_px: expected at least 1");
+  const size_t pixels = size_t(width) * size_t(height);
+  expect_size("colour", colour.size(), 3 * pixels);
+  expect_size("alpha", alpha.size(), pixels);
+  expect_size("depth", depth.size(), pixels);
+  expect_size("channels", channels.size(), pixels * in.n_channels);
+  expect_size("visible", visible.size(), in.n);
+  auto out = std::make_unique<PyFrame>();
+  out->frame = dd::take_frame();
+  out->frame->view = dd::make_view(camera_from_world.data(), fx, fy, cx, cy, width, height);
+  const dd::Images images = {colour.data(), alpha.data(), depth.data(), channels.data()};
+  auto* seen = reinterpret_cast<uint8_t*>(visible.data());
+  {
+    nb::gil_scoped_release release;
+    dd::render_forward(in, *out->frame, keep, images, seen);
+  }
+  return keep ? std::move(out) : nullptr;
+}
+
+const float* pointer(const std::optional<InAny>& array) { return array ? array->data() : nullptr; }
+float* pointer(std::optional<OutAny>& array) { return array ? array->data() : nullptr; }
+
+void backward(const Gaussians& gaussians, PyFrame& frame, std::optional<InAny> colour, std::optional<InAny> alpha,
+              std::optional<InAny> depth, std::optional<InAny> channels, std::optional<OutAny> d_means,
+              std::optional<OutAny> d_quaternions, std::optional<OutAny> d_scales, std::optional<OutAny> d_opacities,
+              std::optional<OutAny> d_sh, std::optional<OutAny> d_channels, std::optional<OutAny> d_screen,
+              Out<nb::shape<4, 4>> d_pose) {
+  const dd::Inputs in = gaussians.inputs();
+  const size_t pixels = size_t(frame.frame->view.width) * size_t(frame.frame->view.height), n = size_t(in.n);
+  if (in.n != frame.frame->n) throw nb::value_error("the frame was made from another number of Gaussians");
+  if (colour) expect_size("colour", colour->size(), 3 * pixels);
+  if (alpha) expect_size("alpha", alpha->size(), pixels);
+  if (depth) expect_size("depth", depth->size(), pixels);
+  if (channels) expect_size("channels", channels->size(), pixels * in.n_channels);
+  if (d_means) expect_size("d_means", d_means->size(), 3 * n);
+  if (d_quaternions) expect_size("d_quaternions", d_quaternions->size(), 4 * n);
+  if (d_scales) expect_size("d_scales", d_scales->size(), 3 * n);
+  if (d_opacities) expect_size("d_opacities", d_opacities->size(), n);
+  if (d_sh) expect_size("d_sh", d_sh->size(), 3 * n * in.sh_stored);
+  if (d_channels) expect_size("d_channels", d_channels->size(), n * in.n_channels);
+  if (d_screen) expect_size("d_screen", d_screen->size(), 2 * n);
+  const dd::ImageGradients upstream = {pointer(colour), pointer(alpha), pointer(depth), pointer(channels)};
+  const dd::Gradients out = {pointer(d_means), pointer(d_quaternions), pointer(d_scales), pointer(d_opacities),
+                             pointer(d_sh),    pointer(d_channels),    pointer(d_screen)};
+  float* pose = d_pose.data();
+  nb::gil_scoped_release release;
+  dd::render_backward(in, *frame.frame, upstream, out, pose);
+}
+
+// Runs one SSIM kernel over bands of rows.
+void run_bands(dd::SsimTask task, void (*kernel)(const dd::SsimTask&)) {
+  constexpr int kBand = 24;
+  const int bands = (task.height + kBand - 1) / kBand;
+  const size_t scratch = size_t(dd::kSsimScratchRows) * dd::ssim_row(task.width);
+  std::vector<float> work(scratch * dd::thread_count());
+  dd::parallel_for(bands, [&](int64_t band, int worker) {
+    dd::SsimTask part = task;
+    part.first_row = int(band) * kBand;
+    part.last_row = std::min(task.height, part.first_row + kBand);
+    part.scratch = work.data() + worker * scratch;
+    kernel(part);
+  });
+}
+
+dd::SsimTask ssim_task(const InAny& image, const InAny& target) {
+  if (image.ndim() != 3 || image.shape(2) != 3) throw nb::value_error("image: expected (h, w, 3)");
+  expect_size("target", target.size(), image.size());
+  dd::SsimTask task = {};
+  task.image = image.data();
+  task.target = target.data();
+  task.height = int(image.shape(0));
+  task.width = int(image.shape(1));
+  return task;
+}
+
+void ssim_forward(InAny image, InAny target, OutAny map, std::optional<OutAny> partials) {
+  dd::SsimTask task = ssim_task(image, target);
+  expect_size("map", map.size(), image.size());
+  task.map = map.data();
+  if (partials) {
+    expect_size("partials", partials->size(), 3 * image.size());
+    task.d_mean = partials->data();
+    task.d_square = task.d_mean + image.size();
+    task.d_product = task.d_square + image.size();
+  }
+  nb::gil_scoped_release release;
+  run_bands(task, dd::kernels().ssim);
+}
+
+void ssim_backward(InAny image, InAny target, InAny partials, InAny d_map, OutAny d_image) {
+  dd::SsimTask task = ssim_task(image, target);
+  expect_size("partials", partials.size(), 3 * image.size());
+  expect_size("d_map", d_map.size(), image.size());
+  expect_size("d_image", d_image.size(), image.size());
+  task.d_mean = const_cast<float*>(partials.data());
+  task.d_square = task.d_mean + image.size();
+  task.d_product = task.d_square + image.size();
+  task.d_map = d_map.data();
+  task.d_image = d_image.data();
+  nb::gil_scoped_release release;
+  run_bands(task, dd::kernels().ssim_backward);
+}
+
+bool all_finite(InAny array) {
+  constexpr int64_t kBlock = 1 << 15;
+  const float* data = array.data();
+  const int64_t n = int64_t(array.size());
+  std::atomic<bool> finite{true};
+  nb::gil_scoped_release release;
+  dd::parallel_for((n + kBlock - 1) / kBlock, [&](int64_t block, int) {
+    const int64_t last = std::min(n, (block + 1) * kBlock);
+    uint32_t bad = 0;
+    for (int64_t i = block * kBlock; i < last; i++) {
+      uint32_t bits;
+      std::memcpy(&bits, data + i, 4);
+      bad |= uint32_t((bits & 0x7f800000u) == 0x7f800000u);
+    }
+    if (bad) finite = false;
+  });
+  return finite;
+}
+
+void set_threads(int count) {
+  if (count < 1 || count > 1024) throw nb::value_error("threads: expected 1 to 1024");
+  nb::gil_scoped_release release;
+  dd::set_thread_count(count);
+}
+
+}  // namespace
+
+NB_MODULE(_native, m) {
+  nb::set_leak_warnings(false);  // a graph that a global still holds when Python exits is no leak
+  nb::class_<PyFrame>(m, "Frame");
+  nb::class_<Gaussians>(m, "Gaussians");
+  m.def("gaussians", &make_gaussians, "means"_a, "quaternions"_a, "scales"_a, "opacities"_a, "sh"_a,
+        "channels"_a.none(), "offsets"_a.none(), "sh_degree"_a);
+  m.def("forward", &forward, "gaussians"_a, "camera_from_world"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a,
+        "height"_a, "colour"_a, "alpha"_a, "depth"_a, "channels"_a, "visible"_a, "keep"_a);
+  m.def("backward", &backward, "gaussians"_a, "frame"_a, "colour"_a.none(), "alpha"_a.none(), "depth"_a.none(),
+        "channels"_a.none(), "d_means"_a.none(), "d_quaternions"_a.none(), "d_scales"_a.none(),
+        "d_opacities"_a.none(), "d_sh"_a.none(), "d_channels"_a.none(), "d_screen"_a.none(), "d_pose"_a);
+  m.def("ssim_forward", &ssim_forward, "image"_a, "target"_a, "map"_a, "partials"_a.none());
+  m.def("ssim_backward", &ssim_backward, "image"_a, "target"_a, "partials"_a, "d_map"_a, "d_image"_a);
+  m.def("all_finite", &all_finite, "array"_a);
+  m.def("set_threads", &set_threads, "count"_a);
+  m.def("threads", &dd::thread_count);
+  m.def("isa", [] { return std::string(dd::kernels().isa); });
+}

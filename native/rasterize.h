@@ -1,0 +1,40 @@
+// Splatting of one view: projection, depth order, tiles, compositing; and back.
+#pragma once
+#include <memory>
+
+#include "buffer.h"
+#include "tiles.h"
+#include "types.h"
+
+namespace dd {
+
+// What one forward pass leaves for its backward pass, with the memory it worked in.
+struct Frame {
+  View view;
+  int64_t n = 0, n_splats = 0;
+  Buffer<Splat> projected, splats;
+  Buffer<uint64_t> keys, spare_keys;
+  Buffer<uint32_t> rank;
+  TileBinner binner;
+  TileLists lists;
+  Buffer<float> transmittance, scratch;
+  Buffer<int32_t> last;
+};
+
+// Frames are returned to a small store when dropped, so that their memory is used again.
+struct FrameReturner {
+  void operator()(Frame* frame) const;
+};
+using FrameHandle = std::unique_ptr<Frame, FrameReturner>;
+FrameHandle take_frame();
+
+View make_view(const float camera_from_world[16], float fx, float fy, float cx, float cy, int width, int height);
+
+// Writes the images and visible (n); keeps what the backward pass needs if `keep`.
+void render_forward(const Inputs& in, Frame& frame, bool keep, const Images& out, uint8_t* visible);
+
+// Writes every gradient that is not null, and the pose's (4 x 4, last row zero).
+void render_backward(const Inputs& in, Frame& frame, const ImageGradients& upstream, const Gradients& out,
+                     float pose[16]);
+
+}  // namespace dd

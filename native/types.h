@@ -1,0 +1,117 @@
+// What the kernels exchange: plain structs over raw pointers, so that one source compiles for several instruction sets
+// without sharing any inline function of the standard library between them.
+#pragma once
+#include <cstdint>
+
+namespace dd {
+
+constexpr int kTile = 16;                       // tile side in pixels
+constexpr int kTilePixels = kTile * kTile;
+constexpr int kChunk = 512;                     // Gaussians handled by one task; fixes the order of summation
+constexpr float kNear = 0.2f;                   // metres
+constexpr float kBlur = 0.3f;                   // added to the projected covariance, square pixels
+constexpr float kMaxAlpha = 0.999f;
+constexpr float kMinAlpha = 1.0f / 255.0f;
+constexpr float kMinPower = -7.99435343685886f; // log2(kMinAlpha)
+constexpr float kMinTransmittance = 1e-4f;
+constexpr float kLog2e = 1.44269504088896f;
+constexpr float kLn2 = 0.693147180559945f;
+constexpr uint32_t kHidden = 0xffffffffu;
+
+struct View {
+  float rotation[9], translation[3];            // camera from world
+  float eye[3];                                 // -R^T t
+  float fx, fy, cx, cy;
+  float min_tx, max_tx, min_ty, max_ty;         // limits of x/z and y/z in the Jacobian
+  int width, height, tiles_x, tiles_y;
+};
+
+struct Inputs {
+  const float *means, *quaternions, *scales, *opacities, *sh;
+  const float* channels;                        // (n, n_channels) or null
+  const float* offsets;                         // (n, 2) or null
+  int64_t n;
+  int sh_stored, sh_degree, n_channels;         // coefficients stored; degree evaluated; extra channels
+};
+
+// A projected Gaussian. alpha at pixel centre (x, y) is 2^(log2_opacity + a dx^2 + b dx dy + c dy^2), dx = x - u.
+struct alignas(64) Splat {
+  float u, v, a, b, c, log2_opacity;
+  float reach_x, reach_y;                       // half extents of alpha >= 1/255, pixels
+  float colour[3];
+  float depth;
+  uint32_t index;                               // of the Gaussian
+  uint32_t padding[3];
+};
+
+// Sums of one Gaussian over the pixels of one tile; v = alpha dL/dalpha, dx and dy from the Gaussian's centre.
+struct EntryGradient {
+  float v, v_x, v_xx, v_y, v_xy, v_yy;
+  float colour[3];
+  float depth;
+  float padding[2];
+};
+
+struct Images {
+  float *colour, *alpha, *depth, *channels;     // (h, w, 3), (h, w), (h, w), (h, w, c)
+};
+struct ImageGradients {
+  const float *colour, *alpha, *depth, *channels;
+};
+
+// One tile's work; transmittance and last (index of the last contributor, -1 if none) are in tile order (256).
+struct TileTask {
+  const View* view;
+  const Splat* splats;                          // in depth order
+  const uint32_t* entries;                      // indices into splats, in depth order
+  int n_entries, tile_x, tile_y;
+  const float* channels;                        // (n, n_channels) of the Gaussians
+  int n_channels;
+  float* transmittance;
+  int32_t* last;                                // null if no gradient is wanted
+  float* scratch;                               // forward: 256 c floats, backward: 256 c + 16 c
+};
+
+struct Gradients {
+  float *means, *quaternions, *scales, *opacities, *sh, *channels, *screen;
+};
+
+struct BackwardTask {
+  const Splat* splats;
+  const uint32_t* rank;                         // of each Gaussian in splats, kHidden where culled
+  const uint32_t *slot_begin, *slots;           // per splat: its places in the entry lists
+  const EntryGradient* entry_gradients;
+  const float* entry_channels;                  // (entries, n_channels)
+  Gradients out;
+};
+
+struct SsimTask {
+  const float *image, *target;                  // (h, w, 3)
+  int height, width, first_row, last_row;
+  float* map;                                   // (h, w, 3)
+  float *d_mean, *d_square, *d_product;         // of the map by E[x], E[x^2], E[xy]; null if no gradient is wanted
+  const float* d_map;                           // upstream gradient
+  float* d_image;
+  float* scratch;                               // kSsimScratchRows * ssim_row(width)
+};
+constexpr int kSsimRadius = 5, kSsimScratchRows = 5 * (1 + 11);
+static inline int ssim_row(int width) { return 3 * (width + 2 * kSsimRadius); }
+
+// The same functions compiled for one instruction set.
+struct Kernels {
+  const char* isa;
+  // Projects Gaussians [first, last), last - first <= kChunk, to projected[i]; appends depth << 32 | i of those
+  // that can be seen to keys; returns how many.
+  int (*project)(const Inputs&, const View&, int64_t first, int64_t last, Splat* projected, uint64_t* keys);
+  // Writes every gradient row of Gaussians [first, last) and 12 sums for the pose (3 x 4, row by row).
+  void (*project_backward)(const Inputs&, const View&, const BackwardTask&, int64_t first, int64_t last,
+                           float* pose);
+  void (*composite)(const TileTask&, const Images&);
+  void (*composite_backward)(const TileTask&, const ImageGradients&, EntryGradient*, float* entry_channels);
+  void (*ssim)(const SsimTask&);
+  void (*ssim_backward)(const SsimTask&);
+};
+
+const Kernels& kernels();                       // the set chosen at run time
+
+}  // namespace dd

@@ -1,0 +1,93 @@
+"""The compiled CPU backend as a differentiable torch function."""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from dreamdrive import _native
+from dreamdrive.scene.render import Render
+from dreamdrive.splat.arguments import SplatArguments, check_dtype
+
+# Position of each differentiable argument of _Rasterize.
+_NAMES = (
+    "means",
+    "quaternions",
+    "scales",
+    "opacities",
+    "sh",
+    "channels",
+    "screen_offsets_px",
+    "camera_from_world",
+)
+
+
+def _buffer(tensor: Any) -> Any:
+    return None if tensor is None else tensor.detach().contiguous()
+
+
+class _Rasterize(torch.autograd.Function):
+    """From the tensors of ``_NAMES`` and the arguments to colour, alpha, depth, channels and visible."""
+
+    @staticmethod
+    def forward(ctx: Any, *inputs: Any) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        *tensors, arguments = inputs
+        means, quaternions, scales, opacities, sh, extra, offsets, camera_from_world = map(_buffer, tensors)
+        gaussians = _native.gaussians(
+            means, quaternions, scales, opacities, sh, extra, offsets, arguments.sh_degree
+        )
+        width, height = arguments.size_px
+        colour, alpha, depth = (torch.empty(height, width, *tail) for tail in ((3,), (), ()))
+        channels = torch.empty(height, width, 0 if extra is None else extra.shape[1])
+        visible = torch.empty(len(means), dtype=torch.bool)
+        keep = any(ctx.needs_input_grad)
+        (fx, fy), (cx, cy) = arguments.focal_px, arguments.centre_px
+        frame = _native.forward(
+            gaussians, camera_from_world, fx, fy, cx, cy, width, height,
+            colour, alpha, depth, channels, visible, keep,
+        )  # fmt: skip
+        if keep:
+            ctx.gaussians, ctx.frame = gaussians, frame
+            ctx.save_for_backward(*tensors)  # so that torch notices what was changed in place before backward
+        ctx.mark_non_differentiable(visible)
+        ctx.set_materialize_grads(False)
+        return colour, alpha, depth, channels, visible
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *upstream: Tensor | None) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        colour, alpha, depth, channels = (_buffer(g) for g in upstream[:4])
+        tensors: tuple[Tensor | None, ...] = ctx.saved_tensors
+        if colour is alpha is depth is channels is None:
+            return (None,) * (len(_NAMES) + 1)
+        gradients = [
+            torch.empty(t.shape) if t is not None and needs else None
+            for t, needs in zip(tensors, ctx.needs_input_grad[:-1], strict=True)
+        ]
+        means, quaternions, scales, opacities, sh, extra, offsets, _ = gradients
+        pose = torch.empty(4, 4)
+        _native.backward(
+            ctx.gaussians, ctx.frame, colour, alpha, depth, channels,
+            means, quaternions, scales, opacities, sh, extra, offsets, pose,
+        )  # fmt: skip
+        return (*gradients[:-1], pose if ctx.needs_input_grad[7] else None, None)
+
+
+def rasterize_native(arguments: SplatArguments) -> Render:
+    """Splat float32 CPU tensors with the compiled core.
+
+    Values and gradients do not depend on the number of threads. Gradients of Gaussians that reach no tile are
+    exactly zero.
+
+    Raises:
+        ValueError: A tensor is not float32 or holds NaN or infinite numbers.
+    """
+    tensors = arguments.tensors()
+    check_dtype(tensors, (torch.float32,))
+    for name, value in tensors.items():
+        if not _native.all_finite(value.detach().contiguous()):
+            raise ValueError(f"{name}: expected finite numbers, got NaN or infinite ones")
+    ordered = [getattr(arguments, name) for name in _NAMES]
+    colour, alpha, depth, channels, visible = _Rasterize.apply(*ordered, arguments)  # pyright: ignore[reportGeneralTypeIssues]
+    return Render(colour=colour, alpha=alpha, depth_m=depth, channels=channels, visible=visible)

@@ -1,0 +1,136 @@
+"""Splatting in plain torch: every pixel against every Gaussian.
+
+It says what the other backends mean; for tests on tiny scenes.
+Sources: EWA projection as in 3DGS (Kerbl et al. 2023), with the limits of gsplat 1.5.3.
+"""
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from dreamdrive.scene.render import Render
+from dreamdrive.splat.arguments import SplatArguments, check_dtype
+
+NEAR_M = 0.2
+BLUR_PX2 = 0.3
+MAX_ALPHA = 0.999
+MIN_ALPHA = 1 / 255
+MIN_TRANSMITTANCE = 1e-4
+
+
+def rotation_matrices(quaternions: Float[Tensor, "n 4"]) -> Float[Tensor, "n 3 3"]:
+    """Rotation matrices of quaternions wxyz of any length."""
+    w, x, y, z = torch.nn.functional.normalize(quaternions, dim=-1, eps=1e-12).unbind(-1)
+    rows = [
+        torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+        torch.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+        torch.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+    ]
+    return torch.stack(rows, -2)
+
+
+def sh_basis(directions: Float[Tensor, "n 3"], degree: int) -> Float[Tensor, "n k"]:
+    """Real spherical harmonics up to ``degree`` (0 to 3) at unit directions; order and signs of 3DGS."""
+    x, y, z = directions.unbind(-1)
+    basis = [torch.full_like(x, 0.28209479177387814)]
+    if degree >= 1:
+        basis += [-0.4886025119029199 * y, 0.4886025119029199 * z, -0.4886025119029199 * x]
+    if degree >= 2:
+        basis += [
+            1.0925484305920792 * x * y,
+            -1.0925484305920792 * y * z,
+            0.31539156525252005 * (2 * z * z - x * x - y * y),
+            -1.0925484305920792 * x * z,
+            0.5462742152960396 * (x * x - y * y),
+        ]
+    if degree >= 3:
+        basis += [
+            -0.5900435899266435 * y * (3 * x * x - y * y),
+            2.890611442640554 * x * y * z,
+            -0.4570457994644658 * y * (4 * z * z - x * x - y * y),
+            0.3731763325901154 * z * (2 * z * z - 3 * x * x - 3 * y * y),
+            -0.4570457994644658 * x * (4 * z * z - x * x - y * y),
+            1.445305721320277 * z * (x * x - y * y),
+            -0.5900435899266435 * x * (x * x - 3 * y * y),
+        ]
+    return torch.stack(basis, -1)
+
+
+def project(
+    arguments: SplatArguments,
+) -> tuple[Int[Tensor, " m"], Float[Tensor, "m 2"], Float[Tensor, "m 3"], Float[Tensor, " m"]]:
+    """Project the Gaussians beyond the near plane, nearest first; equal depths keep their order.
+
+    Returns:
+        Their index, centre in pixels, conic (xx, xy, yy of the inverse covariance in 1/px^2) and depth in m.
+    """
+    rotation, translation = arguments.camera_from_world[:3, :3], arguments.camera_from_world[:3, 3]
+    camera = arguments.means @ rotation.T + translation
+    index = torch.nonzero(camera[:, 2] >= NEAR_M).squeeze(-1)
+    index = index[torch.argsort(camera[index, 2].detach(), stable=True)]
+    x, y, z = camera[index].unbind(-1)
+    (fx, fy), (cx, cy), (width, height) = arguments.focal_px, arguments.centre_px, arguments.size_px
+    tx = (x / z).clamp(-(cx + 0.15 * width) / fx, (width - cx + 0.15 * width) / fx)
+    ty = (y / z).clamp(-(cy + 0.15 * height) / fy, (height - cy + 0.15 * height) / fy)
+    zero = torch.zeros_like(z)
+    jacobian = torch.stack([fx / z, zero, -fx * tx / z, zero, fy / z, -fy * ty / z], -1).reshape(-1, 2, 3)
+    axes = rotation_matrices(arguments.quaternions[index]) * arguments.scales[index, None, :]
+    factor = jacobian @ rotation @ axes
+    covariance = factor @ factor.transpose(-1, -2) + BLUR_PX2 * torch.eye(2, dtype=factor.dtype)
+    inverse = torch.linalg.inv(covariance)
+    conic = torch.stack([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]], -1)
+    centre = torch.stack([fx * x / z + cx, fy * y / z + cy], -1)
+    if arguments.screen_offsets_px is not None:
+        centre = centre + arguments.screen_offsets_px[index]
+    return index, centre, conic, z
+
+
+def colours(arguments: SplatArguments, index: Int[Tensor, " m"]) -> Float[Tensor, "m 3"]:
+    """Colour (M, 3) of the Gaussians at ``index`` as seen from the camera: SH + 0.5, floored at 0."""
+    rotation, translation = arguments.camera_from_world[:3, :3], arguments.camera_from_world[:3, 3]
+    directions = torch.nn.functional.normalize(arguments.means[index] + rotation.T @ translation, dim=-1)
+    basis = sh_basis(directions, arguments.sh_degree)
+    return (torch.einsum("nk,nkc->nc", basis, arguments.sh[index, : basis.shape[1]]) + 0.5).clamp(min=0)
+
+
+def compositing_weights(
+    centre: Float[Tensor, "m 2"],
+    conic: Float[Tensor, "m 3"],
+    opacities: Float[Tensor, " m"],
+    size_px: tuple[int, int],
+) -> tuple[Float[Tensor, "p m"], Bool[Tensor, " m"]]:
+    """Share of each Gaussian, given front to back, in each pixel (rows first), and which reach any pixel."""
+    width, height = size_px
+    grid_y, grid_x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
+    dx = grid_x.reshape(-1, 1).to(centre.dtype) - centre[:, 0]
+    dy = grid_y.reshape(-1, 1).to(centre.dtype) - centre[:, 1]
+    sigma = 0.5 * (conic[:, 0] * dx * dx + conic[:, 2] * dy * dy) + conic[:, 1] * dx * dy
+    alpha = (opacities * torch.exp(-sigma)).clamp(max=MAX_ALPHA)
+    alpha = torch.where(alpha >= MIN_ALPHA, alpha, 0.0)
+    after = torch.cumprod(1 - alpha, dim=1)
+    before = torch.cat([torch.ones_like(after[:, :1]), after[:, :-1]], dim=1)
+    # The transmittance only falls: from the first Gaussian that would take it too low on, nothing is added.
+    weights = torch.where(after > MIN_TRANSMITTANCE, before * alpha, 0.0)
+    return weights, (alpha > 0).any(0)
+
+
+def rasterize_reference(arguments: SplatArguments) -> Render:
+    """Splat tensors of any one floating type; memory grows with pixels x Gaussians."""
+    tensors = arguments.tensors()
+    check_dtype(tensors, (arguments.means.dtype,))
+    index, centre, conic, depth = project(arguments)
+    width, height = arguments.size_px
+    weights, reaching = compositing_weights(centre, conic, arguments.opacities[index], arguments.size_px)
+    colour = (weights @ colours(arguments, index)).reshape(height, width, 3)
+    channels = arguments.channels
+    if channels is None:
+        channels = arguments.means.new_zeros(len(arguments.means), 0)
+    visible = torch.zeros(len(arguments.means), dtype=torch.bool)
+    visible[index[reaching]] = True
+    return Render(
+        colour=colour,
+        alpha=weights.sum(1).reshape(height, width),
+        depth_m=(weights @ depth).reshape(height, width),
+        channels=(weights @ channels[index]).reshape(height, width, -1),
+        visible=visible,
+    )

@@ -1,0 +1,97 @@
+"""Structural similarity of two images (Wang et al. 2004), with the window and padding of 3DGS."""
+
+from typing import Any
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from dreamdrive import _native
+
+WINDOW = 11
+SIGMA_PX = 1.5
+C1 = 0.01**2
+C2 = 0.03**2
+
+
+def _gradient(image: Tensor, target: Tensor, partials: Tensor | None, by_map: Tensor) -> Tensor | None:
+    if partials is None:
+        return None
+    out = torch.empty_like(image)
+    _native.ssim_backward(image, target, partials, by_map, out)
+    return out
+
+
+class _SsimMap(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, image: Tensor, target: Tensor) -> Tensor:
+        a, b = image.detach().contiguous(), target.detach().contiguous()
+        similarity = torch.empty_like(a)
+        by_image, by_target = (torch.empty(3, *a.shape) if needs else None for needs in ctx.needs_input_grad)
+        if by_target is not None:  # symmetric: the target takes the image's place
+            _native.ssim_forward(b, a, similarity, by_target)
+        _native.ssim_forward(a, b, similarity, by_image)
+        ctx.save_for_backward(a, b, by_image, by_target)
+        return similarity
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, Tensor | None]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        a, b, by_image, by_target = ctx.saved_tensors
+        by_map = upstream[0].detach().contiguous()
+        return _gradient(a, b, by_image, by_map), _gradient(b, a, by_target, by_map)
+
+
+def ssim_map(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
+    """SSIM of every pixel and channel, differentiable in both images.
+
+    Args:
+        image: Values in [0, 1], float32, on the CPU.
+        target: The same.
+
+    Returns:
+        Similarity (H, W, 3) in [-1, 1]: Gaussian window of 11 px with sigma 1.5 px, C1 = 0.01^2, C2 = 0.03^2,
+        zero padding.
+    """
+    for name, value in (("image", image), ("target", target)):
+        if (
+            value.ndim != 3
+            or value.shape[2] != 3
+            or value.dtype != torch.float32
+            or value.device.type != "cpu"
+        ):
+            raise ValueError(
+                f"{name}: expected float32 (H, W, 3) on the CPU, got {value.dtype} {tuple(value.shape)}"
+            )
+    if image.shape != target.shape:
+        raise ValueError(
+            f"target: expected the image's shape {tuple(image.shape)}, got {tuple(target.shape)}"
+        )
+    return _SsimMap.apply(image, target)  # pyright: ignore[reportReturnType]
+
+
+def ssim(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> Float[Tensor, ""]:
+    """Mean SSIM of two images with values in [0, 1]; see ``ssim_map``."""
+    return ssim_map(image, target).mean()
+
+
+def ssim_map_reference(
+    image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]
+) -> Float[Tensor, "h w 3"]:
+    """The same in plain torch and any floating type, for tests."""
+    offsets = torch.arange(WINDOW, dtype=image.dtype) - WINDOW // 2
+    window = torch.exp(-(offsets**2) / (2 * SIGMA_PX**2))
+    window = window / window.sum()
+    kernel = (window[:, None] * window[None, :]).expand(3, 1, WINDOW, WINDOW)
+
+    def blurred(values: Tensor) -> Tensor:
+        planes = values.permute(2, 0, 1)[None]
+        return torch.nn.functional.conv2d(planes, kernel, padding=WINDOW // 2, groups=3)[0].permute(1, 2, 0)
+
+    mean_a, mean_b = blurred(image), blurred(target)
+    var_a = blurred(image * image) - mean_a**2
+    var_b = blurred(target * target) - mean_b**2
+    covariance = blurred(image * target) - mean_a * mean_b
+    numerator = (2 * mean_a * mean_b + C1) * (2 * covariance + C2)
+    return numerator / ((mean_a**2 + mean_b**2 + C1) * (var_a + var_b + C2))
