@@ -1,7 +1,7 @@
 """Growing and pruning of Gaussians while they are fitted."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Bool, Float
@@ -10,6 +10,7 @@ from torch import Tensor
 from dreamdrive.fit.parameters import Parameters
 
 
+@runtime_checkable
 class Densifier(Protocol):
     """What the trainer asks of a densification strategy."""
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat.render import render
+from dreamdrive.splat.view import render
 
 Part = Literal["all", "static", "dynamic"]
 

@@ -1,0 +1,69 @@
+import numpy as np
+import torch
+
+from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
+from dreamdrive.fit import SeedOptions, initialise
+from tests.streets import small_street, street_clip, true_geometry
+
+
+def scene(**changes):
+    street = small_street(size=(160, 96), **changes)
+    clip, geometry = street_clip(street), true_geometry(street)
+    return street, clip, geometry, initialise(clip, geometry, SeedOptions())
+
+
+def test_the_majority_of_a_cluster_decides_for_all_of_it():
+    _, clip, geometry, seeds = scene()
+    truth = seeds.features[:, 0] >= 0.5
+    generator = torch.Generator().manual_seed(0)
+    doubt = torch.rand(len(seeds), generator=generator)
+    # One member in four of the moving thing scores below the threshold, but is no certain street either.
+    scores = torch.where(truth, torch.where(doubt < 0.25, 0.4, 0.9), torch.tensor(0.05))
+    grouping = group(clip, geometry, seeds, scores, GroupOptions())
+    assert (grouping.dynamic == truth).float().mean() > 0.995
+    alone = group(clip, geometry, seeds, scores, GroupOptions(clustering=False))
+    assert (alone.dynamic[truth]).float().mean() < 0.8
+
+
+def test_scattered_false_alarms_are_outvoted():
+    _, clip, geometry, seeds = scene(movers=0)
+    generator = torch.Generator().manual_seed(0)
+    scores = torch.where(torch.rand(len(seeds), generator=generator) < 0.004, 0.9, 0.05)
+    assert not group(clip, geometry, seeds, scores, GroupOptions()).dynamic.any()
+
+
+def test_one_car_is_one_actor_whose_track_is_the_cars():
+    street, clip, geometry, seeds = scene()
+    scores = seeds.features[:, 0].clone()
+    grouping = group(clip, geometry, seeds, scores, GroupOptions())
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    assert len(whole.actors) == 1
+    box = next(b for b in street.boxes if b.moving)
+    moved = box.world_from_box[-1, :3, 3] - box.world_from_box[0, :3, 3]
+    track = whole.tracks.translation_m[0]
+    assert np.linalg.norm((track[-1] - track[0]) - moved) < 0.15 * max(1.0, np.linalg.norm(moved))
+
+
+def test_copies_of_one_car_lie_on_top_of_each_other():
+    """Every frame seeds its own copy; merged, they are as compact as one car, not a trail."""
+    street, clip, geometry, seeds = scene()
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    centres = [
+        whole.gaussians.means[whole.gaussians.source_frame == frame].median(dim=0).values
+        for frame in range(len(clip))
+    ]
+    spread = torch.stack(centres).std(dim=0).max()
+    raw = seeds.select(grouping.dynamic)
+    trail = torch.stack([raw.means[raw.source_frame == f].median(dim=0).values for f in range(len(clip))])
+    assert spread < 0.25
+    assert spread < 0.2 * trail.std(dim=0).max()
+
+
+def test_nothing_dynamic_gives_an_empty_cast():
+    _, clip, geometry, seeds = scene()
+    grouping = group(clip, geometry, seeds, torch.zeros(len(seeds)), GroupOptions())
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    assert len(whole.gaussians) == 0
+    assert whole.actors == ()
+    assert whole.tracks is None

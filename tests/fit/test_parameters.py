@@ -1,0 +1,118 @@
+import torch
+
+from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.parameters import LearningRates, Parameters
+from dreamdrive.scene.gaussians import Gaussians
+
+
+def some_gaussians(count: int = 12) -> Gaussians:
+    generator = torch.Generator().manual_seed(0)
+    return Gaussians(
+        means=torch.randn(count, 3, generator=generator),
+        quaternions=torch.randn(count, 4, generator=generator),
+        log_scales=torch.randn(count, 3, generator=generator) * 0.1 - 3,
+        logit_opacities=torch.zeros(count),
+        sh=torch.randn(count, 4, 3, generator=generator),
+        source_frame=torch.arange(count) % 5,
+        features=torch.randn(count, 7, generator=generator),
+        lifespan=torch.rand(count, 2, generator=generator),
+        actor=torch.arange(count) % 2,
+    )
+
+
+def parameters() -> Parameters:
+    gaussians = some_gaussians()
+    return Parameters(gaussians, torch.full((len(gaussians),), 0.1), LearningRates())
+
+
+def one_step(p: Parameters) -> None:
+    now = p.gaussians()
+    (now.means.square().sum() + now.sh.square().sum() + now.log_scales.sum()).backward()
+    p.step()
+
+
+def test_frozen_returns_what_was_put_in():
+    given, frozen = some_gaussians(), parameters().frozen()
+    for name, value in given.tensors().items():
+        torch.testing.assert_close(getattr(frozen, name), value)
+
+
+def test_a_step_of_the_position_is_a_share_of_the_footprint():
+    p = parameters()
+    before = p.frozen().means
+    one_step(p)
+    moved = (p.frozen().means - before).abs()
+    torch.testing.assert_close(
+        moved, torch.full_like(moved, 0.1 * LearningRates().offsets), rtol=1e-3, atol=0
+    )
+
+
+def test_keep_carries_the_moments_along():
+    p = parameters()
+    one_step(p)
+    moments = p.optimiser.state[p.offsets]["exp_avg"].clone()
+    mask = torch.arange(12) % 3 == 0
+    p.keep(mask)
+    assert len(p) == 4
+    torch.testing.assert_close(p.optimiser.state[p.offsets]["exp_avg"], moments[mask])
+    one_step(p)
+
+
+def test_children_inherit_all_but_the_changes_and_start_with_fresh_moments():
+    p = parameters()
+    one_step(p)
+    parents = torch.tensor([3, 7])
+    p.append_children(parents, {"log_scales": torch.full((2, 3), -9.0)})
+    now = p.frozen()
+    assert len(now) == 14
+    for name in ("source_frame", "features", "lifespan", "actor", "means", "sh"):
+        torch.testing.assert_close(getattr(now, name)[-2:], getattr(now, name)[parents])
+    assert (now.log_scales[-2:] == -9).all()
+    assert (p.optimiser.state[p.offsets]["exp_avg"][-2:] == 0).all()
+    assert (p.optimiser.state[p.offsets]["exp_avg"][:12] != 0).any()
+    one_step(p)
+
+
+def test_reset_opacity_lowers_and_forgets():
+    p = parameters()
+    p.logit_opacities.sum().backward()
+    p.step()
+    p.reset_opacity(0.01)
+    assert torch.sigmoid(p.logit_opacities).max() <= 0.0101
+    assert (p.optimiser.state[p.logit_opacities]["exp_avg"] == 0).all()
+
+
+def densified(gradient: float, log_scale: float, **changes: float) -> Parameters:
+    p = parameters()
+    with torch.no_grad():
+        p.log_scales.fill_(log_scale)
+    settings = DensifySettings(every=1, start=0, stop=1, **changes)
+    densifier = GradientDensifier(settings, len(p), (10.0, 10.0))
+    pull = torch.zeros(len(p), 2)
+    pull[:3, 0] = gradient
+    densifier.observe(pull, torch.ones(len(p), dtype=torch.bool))
+    densifier.update(p, 1, 10, torch.Generator().manual_seed(0))
+    return p
+
+
+def test_small_ones_that_want_to_move_are_cloned():
+    assert len(densified(gradient=1.0, log_scale=-3.0)) == 15
+
+
+def test_large_ones_are_split_in_two_and_removed():
+    p = densified(gradient=1.0, log_scale=0.0)
+    assert len(p) == 12 - 3 + 6
+    children = p.frozen().log_scales[-6:]
+    torch.testing.assert_close(children, torch.full_like(children, -float(torch.tensor(1.6).log())))
+
+
+def test_growth_stops_at_the_cap():
+    assert len(densified(gradient=1.0, log_scale=-3.0, most=13)) == 13
+
+
+def test_nothing_grows_below_the_threshold():
+    assert len(densified(gradient=1e-6, log_scale=-3.0)) == 12
+
+
+def test_transparent_ones_are_pruned():
+    assert len(densified(gradient=0.0, log_scale=-3.0, prune_opacity=0.6)) == 0

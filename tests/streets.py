@@ -1,0 +1,53 @@
+"""The built-in street with its exact truth, as the nouns the stages exchange."""
+
+import numpy as np
+
+from dreamdrive.data.street import Street, make_street
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.geometry import Focal, Geometry, Scale
+
+
+def street_clip(street: Street, hold_out: int | None = None) -> Clip:
+    """The frames as a clip with known intrinsics and simple colour features."""
+    count, height, width = street.frames.shape[:3]
+    rig = street.cameras[0]
+    held_out = np.zeros(count, dtype=bool)
+    if hold_out is not None:
+        held_out = np.arange(count) % hold_out == hold_out // 2
+        held_out[[0, -1]] = False
+    colour = street.frames.astype(np.float32) / 255 - 0.5
+    return Clip(
+        frames=street.frames.copy(),
+        times_s=street.times_s,
+        camera=np.zeros(count, dtype=np.int64),
+        rig=(Camera(rig.fx_px, rig.fy_px, rig.cx_px, rig.cy_px, width, height),),
+        valid=np.ones((count, height, width), dtype=bool),
+        held_out=held_out,
+        source_index=np.arange(count),
+        features={"appearance": colour},
+        known=Known(intrinsics=True),
+    )
+
+
+def true_geometry(street: Street, evidence: bool = True) -> Geometry:
+    """Exact cameras, depth, sky and, unless switched off, moving evidence."""
+    moving = street.moving.astype(np.float32)
+    return Geometry(
+        cameras=street.cameras,
+        depth_m=street.depth_m.copy(),
+        confidence=(street.depth_m > 0).astype(np.float32),
+        sky=street.sky.copy(),
+        moving=moving if evidence else np.zeros_like(moving),
+        fixed_regions=np.zeros(street.depth_m.shape[1:], dtype=np.int64),
+        region_names=(),
+        ground=street.ground,
+        scale=Scale("poses", 0.0),
+        focal=Focal(street.cameras[0].fx_px, True),
+    )
+
+
+def small_street(**changes: object) -> Street:
+    """A quick street for tests."""
+    settings: dict[str, object] = {"seed": 3, "frames": 8, "size": (96, 64), "movers": 1, "parked": 3}
+    return make_street(**{**settings, **changes})  # type: ignore[arg-type]
