@@ -1,0 +1,29 @@
+"""``dreamdrive export``: a scene in another program's format."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from rich.console import Console
+from tyro.conf import Positional, arg
+
+from dreamdrive.cli.scene import open_scene
+
+
+def export(
+    out: Annotated[Positional[Path], arg(metavar="OUT")],
+    *,
+    to: Literal["ply"],
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE|DIR")],
+) -> None:
+    """Write a scene in a format that other programs read.
+
+    Args:
+        out: The folder that generate wrote.
+        to: ply is what viewers of 3D Gaussians read.
+        output: NAME.ply for everything at the first recorded time; a folder for static.ply and frames/NNNN.ply,
+            everything at each recorded time.
+    """
+    from dreamdrive.export import export as write
+
+    write(open_scene(out), to, output)
+    Console().print(str(output), soft_wrap=True)

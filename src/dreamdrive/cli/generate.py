@@ -1,0 +1,104 @@
+"""``dreamdrive generate``: from a recording to a scene and its videos."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from rich.console import Console
+from tyro.conf import Positional, arg
+
+from dreamdrive.cli.machine import use_all_cores
+from dreamdrive.cli.progress import Bars
+from dreamdrive.errors import InputError
+
+
+def generate(
+    input: Annotated[Positional[Path | None], arg(metavar="INPUT")] = None,
+    *,
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    prior: Annotated[Literal["replay", "street-world"], arg(metavar="NAME")] = "replay",
+    geometry: Annotated[Literal["classical"], arg(metavar="NAME")] = "classical",
+    quality: Literal["draft", "standard", "high"] = "standard",
+    frames: Annotated[str | None, arg(metavar="START:STOP:STEP")] = None,
+    fps: Annotated[float | None, arg(metavar="F")] = None,
+    size: Annotated[str | None, arg(metavar="WxH")] = None,
+    intrinsics: Annotated[Path | None, arg(metavar="FILE")] = None,
+    poses: Annotated[Path | None, arg(metavar="FILE")] = None,
+    hfov: Annotated[float | None, arg(metavar="DEG")] = None,
+    camera_height: Annotated[float, arg(metavar="M")] = 1.5,
+    hold_out: Annotated[int | None, arg(metavar="N")] = None,
+    representation: Literal["static", "deformable", "hybrid"] = "hybrid",
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    recompute_from: Annotated[
+        Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
+        arg(name="from", metavar="STAGE"),
+    ] = None,
+    force: bool = False,
+) -> None:
+    """Make a 4D scene and its videos from a recording.
+
+    Args:
+        input: A video or a folder of images; leave it out with --prior street-world.
+        out: Output folder. The same command goes on where it stopped.
+        prior: replay takes the recording as it is; street-world draws a street of its own.
+        geometry: How cameras and depth are found.
+        quality: How many steps the fits take.
+        frames: Frames of the input to use, counted from 0.
+        fps: Rate of the input, before the step of --frames.
+        size: Size of the frames; without it 480 wide.
+        intrinsics: Calibration of the camera as JSON, for the size of the input.
+        poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
+        hfov: Horizontal field of view, where there is no calibration.
+        camera_height: Height of the camera above the road in metres; fixes the metric scale.
+        hold_out: Withhold every N-th frame to measure how well it is predicted.
+        representation: hybrid tells static from moving; the others are its baselines.
+        seed: Seed of everything random.
+        recompute_from: Compute this stage and all later ones again.
+        force: Replace a result of other input or options; files that are not dreamdrive's are kept.
+    """
+    from dreamdrive.pipeline import generate as run
+    from dreamdrive.scene.control import Control
+
+    control = Control(
+        path=input,
+        frames=frames,
+        fps=fps,
+        size=None if size is None else parse_size(size),
+        intrinsics=intrinsics,
+        poses=poses,
+        hfov_deg=hfov,
+        hold_out=hold_out,
+        seed=seed,
+    )
+    console = Console()
+    use_all_cores()
+    with Bars(console) as bars:
+        made = run(
+            control,
+            out,
+            prior=prior,
+            geometry_method=geometry,
+            quality=quality,
+            representation=representation,
+            camera_height_m=camera_height,
+            recompute_from=recompute_from,
+            force=force,
+            progress=bars,
+        )
+    if not made:
+        console.print(f"{out} is already finished; --from STAGE computes it again from a stage on")
+    console.print(
+        f"scene   {out / 'scene'}\nvideos  {out / 'video'}\nreport  {out / 'report.json'}", soft_wrap=True
+    )
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height from ``480x270``.
+
+    Raises:
+        InputError: The text has another form.
+    """
+    match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
+    if match is None:
+        raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")
+    return int(match[1]), int(match[2])

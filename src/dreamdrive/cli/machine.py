@@ -1,0 +1,30 @@
+"""What this machine offers, and its use."""
+
+import os
+
+
+def available_cores() -> int:
+    """Cores this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def available_memory_mb() -> int | None:
+    """Memory that is free for use, in megabytes; None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        return int(lines["MemAvailable"].split()[0]) // 1000
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def use_all_cores() -> None:
+    """Let torch and the native core use every core of this process."""
+    import torch
+
+    from dreamdrive.splat import set_threads
+
+    torch.set_num_threads(available_cores())
+    set_threads(available_cores())

@@ -1,0 +1,57 @@
+"""Entry point of ``dreamdrive``."""
+
+import errno
+import logging
+import sys
+
+import tyro
+from rich.console import Console
+from rich.logging import RichHandler
+
+import dreamdrive
+from dreamdrive.cli.doctor import doctor
+from dreamdrive.cli.export import export
+from dreamdrive.cli.generate import generate
+from dreamdrive.cli.render import render
+from dreamdrive.errors import InputError
+
+COMMANDS = {"generate": generate, "render": render, "export": export, "doctor": doctor}
+_USER_ERROR, _INTERRUPTED = 2, 130
+# What the machine may refuse without anything being wrong with the program.
+_REFUSALS = {
+    errno.ENOSPC: "free some space, or choose a folder on another disk",
+    errno.EDQUOT: "free some of your quota, or choose a folder on another disk",
+    errno.EACCES: "check the permissions, or choose another folder",
+    errno.EPERM: "check the permissions, or choose another folder",
+    errno.EROFS: "choose a folder on a disk that can be written to",
+    errno.ENOTDIR: "choose another folder",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
+
+
+def main() -> None:
+    """Run the command that the arguments name and exit with its status.
+
+    Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted.
+    """
+    errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    logging.basicConfig(level="WARNING", format="%(message)s", handlers=[RichHandler(console=errors)])
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="dreamdrive",
+            description=dreamdrive.__doc__,
+            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
+        )
+    except InputError as error:
+        errors.print(f"error: {error}")
+        sys.exit(_USER_ERROR)
+    except KeyboardInterrupt:
+        errors.print("interrupted: finished stages are kept, and the same command goes on from there")
+        sys.exit(_INTERRUPTED)
+    except OSError as error:
+        if error.errno not in _REFUSALS:
+            raise
+        where = f" ({error.filename})" if error.filename else ""
+        errors.print(f"error: {error.strerror}{where}; {_REFUSALS[error.errno]}")
+        sys.exit(_USER_ERROR)

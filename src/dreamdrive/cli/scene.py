@@ -1,0 +1,31 @@
+"""Finding what ``generate`` wrote."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dreamdrive.errors import InputError
+
+if TYPE_CHECKING:
+    from dreamdrive.scene.scene import Scene
+
+
+def open_scene(out: Path) -> "Scene":
+    """The scene in an output folder of ``generate``, or in a scene folder itself.
+
+    Raises:
+        InputError: There is none.
+    """
+    from dreamdrive.scene.folder import load_scene
+
+    if not out.exists():
+        raise InputError(f"{out} does not exist; expected the folder that dreamdrive generate wrote")
+    if (out / "scene.json").is_file():
+        return load_scene(out)
+    if not (out / "scene").is_dir():
+        unfinished = (
+            " (it is unfinished: run the same generate command again)" if (out / "stages").is_dir() else ""
+        )
+        raise InputError(
+            f"{out} holds no scene{unfinished}; expected the folder that dreamdrive generate wrote"
+        )
+    return load_scene(out / "scene")

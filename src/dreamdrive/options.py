@@ -1,0 +1,44 @@
+"""What ``--quality`` means: one row of numbers a name."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from dreamdrive.decompose import GroupOptions, ScoreOptions
+from dreamdrive.decompose.actors import ActorOptions
+from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
+from dreamdrive.scene.deformation import DeformationConfig
+
+QualityName = Literal["draft", "standard", "high"]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How much work each stage does.
+
+    Attributes:
+        static: The fit as if nothing moved.
+        score: Training of the dynamic scores.
+        fit: The joint fit.
+        seeds: How pixels become Gaussians.
+        group: The vote.
+        cast: The actors' tracks.
+        densify: Growing and pruning in the joint fit.
+        network: Size of the deformation field.
+    """
+
+    static: FitOptions
+    score: ScoreOptions
+    fit: FitOptions
+    seeds: SeedOptions = field(default_factory=SeedOptions)
+    group: GroupOptions = field(default_factory=GroupOptions)
+    cast: ActorOptions = field(default_factory=ActorOptions)
+    densify: DensifySettings = field(default_factory=DensifySettings)
+    network: DeformationConfig = field(default_factory=DeformationConfig)
+
+
+# Quality is steps, never seconds: the same command gives the same scene on a slow machine.
+QUALITIES: dict[QualityName, Quality] = {
+    "draft": Quality(FitOptions(steps=150), ScoreOptions(steps=80), FitOptions(steps=300)),
+    "standard": Quality(FitOptions(steps=400), ScoreOptions(steps=150), FitOptions(steps=1800)),
+    "high": Quality(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
+}

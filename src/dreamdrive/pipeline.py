@@ -1,0 +1,250 @@
+"""The paper's pipeline: prior, geometry, Gaussians, decomposition, joint fit; each stage kept on disk."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import UInt8
+
+from dreamdrive.data import read_clip
+from dreamdrive.decompose import cast, error_maps, group, score
+from dreamdrive.errors import InputError
+from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
+from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry.picture import draw_geometry
+from dreamdrive.held_out import score_baselines, score_scene
+from dreamdrive.options import QUALITIES, Quality, QualityName
+from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
+from dreamdrive.prior import choose_prior
+from dreamdrive.report import describe
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+from dreamdrive.stages import STAGES, Progress, StageProgress, Stages, Storage, file_digest, stage_seed
+from dreamdrive.workspace import Workspace, open_workspace
+
+
+def generate(
+    control: Control,
+    out: Path,
+    *,
+    prior: str = "replay",
+    geometry_method: str = "classical",
+    quality: QualityName = "standard",
+    representation: Representation = "hybrid",
+    camera_height_m: float = 1.5,
+    recompute_from: str | None = None,
+    force: bool = False,
+    progress: StageProgress = lambda stage, done, total: None,
+) -> bool:
+    """Make a scene, its videos and a report in the folder ``out``.
+
+    An interrupted run goes on from its last finished stage when called again; the scene is byte-identical to
+    that of a run in one go.
+
+    Args:
+        control: The input and how to read it; its seed is that of everything random.
+        out: The output folder, see ``workspace``.
+        prior: Name in ``prior.PRIORS``.
+        geometry_method: How cameras and depth are found.
+        quality: Name in ``options.QUALITIES``.
+        representation: ``"hybrid"``, or one of its baselines.
+        camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
+            better does.
+        recompute_from: Compute this stage and all later ones again.
+        force: Replace a result of another input or other options.
+        progress: Told of every step of every stage.
+
+    Returns:
+        False if ``out`` already held the finished result.
+
+    Raises:
+        InputError: The input, an option or ``out`` cannot be used.
+    """
+    choose_prior(prior)
+    options = {
+        "prior": prior,
+        "geometry": geometry_method,
+        "quality": quality,
+        "representation": representation,
+        "camera_height_m": camera_height_m,
+        **_reading(control),
+    }
+    request = {"digests": _digests(control), "options": options, "seed": control.seed}
+    recompute = recompute_from is not None
+    workspace = open_workspace(out, request, force=force, recompute=recompute)
+    if workspace is None:
+        return False
+    stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
+    _publish(workspace, stages, control, _make(stages, control, request))
+    return True
+
+
+@dataclass(frozen=True)
+class _Made:
+    """All that a run of the stages leaves."""
+
+    clip: Clip
+    geometry: Geometry
+    scene: Scene
+    scored: Scored | None
+
+
+def _make(stages: Stages, control: Control, request: dict[str, Any]) -> _Made:
+    """The stages in their order, each with the results it depends on and the options that change it."""
+    chosen, height_m = request["options"], request["options"]["camera_height_m"]
+    quality = QUALITIES[chosen["quality"]]
+    seed = {name: stage_seed(control.seed, name) for name in STAGES}
+
+    reading = [chosen["prior"], _reading(control), request["digests"], control.seed]
+    clip = stages.run("prior", (), reading, lambda _: choose_prior(chosen["prior"])(control))
+
+    method = chosen["geometry"]
+    geometry = stages.run(
+        "geometry",
+        ("prior",),
+        [method, height_m, seed["geometry"]],
+        lambda _: reconstruct(clip, camera_height_m=height_m, seed=seed["geometry"], method=method),
+    )
+    seeds = stages.run(
+        "initialise",
+        ("prior", "geometry"),
+        quality.seeds,
+        lambda _: initialise(clip, geometry, quality.seeds),
+    )
+    static = stages.run(
+        "static",
+        ("initialise",),
+        [quality.static, seed["static"]],
+        lambda tell: fit_static(clip, geometry, seeds, quality.static, seed["static"], tell),
+    )
+    mode = chosen["representation"]
+    scored, parts = _decompose(stages, clip, geometry, seeds, static, quality, mode, seed["score"])
+    scene = stages.run(
+        "fit",
+        ("static", "group") if scored else ("static",),
+        [mode, quality.fit, quality.cast, quality.network, quality.densify, seed["fit"]],
+        lambda tell: _fitted(control, clip, geometry, parts, static, quality, seed["fit"], tell),
+        Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
+    )
+    return _Made(clip, geometry, scene, scored)
+
+
+def _decompose(
+    stages: Stages,
+    clip: Clip,
+    geometry: Geometry,
+    seeds: Gaussians,
+    static: StaticFit,
+    settings: Quality,
+    representation: Representation,
+    seed: int,
+) -> tuple[Scored | None, Parts]:
+    """Tell static from moving (eq. 5-10); the baselines take everything as one or the other."""
+    nothing = torch.zeros(0, dtype=torch.int64)
+    if representation == "static":
+        return None, Parts(static.gaussians, static.gaussians.select(nothing), None, ())
+    if representation == "deformable":
+        return None, Parts(seeds.select(nothing), seeds, None, ())
+    scores = stages.run(
+        "score",
+        ("static",),
+        [settings.score, seed],
+        lambda tell: score(
+            clip,
+            geometry,
+            static.gaussians,
+            error_maps(clip, geometry, static.gaussians, static.sky, static.exposure),
+            settings.score,
+            seed,
+            tell,
+        ),
+    )
+    grouping = stages.run(
+        "group",
+        ("initialise", "score"),
+        settings.group,
+        lambda _: group(clip, geometry, seeds, scores, settings.group),
+    )
+    moving = cast(clip, geometry, seeds, grouping, settings.cast)
+    parts = Parts(static.gaussians.select(~grouping.dynamic), moving.gaussians, moving.tracks, moving.actors)
+    return Scored(static.gaussians, scores), parts
+
+
+def _fitted(
+    control: Control,
+    clip: Clip,
+    geometry: Geometry,
+    parts: Parts,
+    start: StaticFit,
+    quality: Quality,
+    seed: int,
+    progress: Progress,
+) -> Scene:
+    """The joint fit (eq. 11-14), with what a scene remembers of its making."""
+    scene = fit(clip, geometry, parts, start, quality.fit, quality.network, quality.densify, seed, progress)
+    about = {
+        "input": None if control.path is None else control.path.name,
+        "source_index": clip.source_index.tolist(),
+        "lens": clip.provenance.get("lens"),
+        "up": None if geometry.ground is None else geometry.ground.normal_world.tolist(),
+        "scale": geometry.scale.source,
+    }
+    return replace(scene, provenance=about)
+
+
+def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made) -> None:
+    """Put scene, videos, withheld frames and report into the output folder, all at once."""
+    staging, clip, scene = workspace.fresh_staging(), made.clip, made.scene
+
+    def show(progress: Progress) -> None:
+        save_scene(scene, staging / "scene")
+        write_videos(staging / "video", scene, _recorded(control, clip, scene), made.scored, progress)
+        write_held_out(staging / "held_out", scene, clip.source_index.tolist())
+        write_png(staging / "report.png", draw_geometry(clip, made.geometry))
+
+    stages.measure("videos", show)
+    report = describe(
+        clip,
+        made.geometry,
+        scene,
+        {**workspace.request, "input": None if control.path is None else str(control.path)},
+        stages.records,
+        score_scene(clip, made.geometry, scene),
+        score_baselines(clip, made.geometry),
+    )
+    workspace.publish(report)
+
+
+def _reading(control: Control) -> dict[str, Any]:
+    """The options of reading that are no files."""
+    return {k: v for k, v in asdict(control).items() if k not in ("path", "intrinsics", "poses", "seed")}
+
+
+def _digests(control: Control) -> dict[str, str]:
+    """Digests of the given files: they count by their content, not by their place."""
+    digests: dict[str, str] = {}
+    for flag, path in (
+        ("", control.path),
+        ("--intrinsics ", control.intrinsics),
+        ("--poses ", control.poses),
+    ):
+        if path is None:
+            continue
+        if not path.exists():
+            expected = "a file" if flag else "a video or a folder of images"
+            raise InputError(f"{flag}{path} does not exist; expected {expected}")
+        digests[flag.strip(" -") or "input"] = file_digest(path)
+    return digests
+
+
+def _recorded(control: Control, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:
+    """The frames in the source's distortion, at the clip's size."""
+    if lens_of(scene) is None or control.path is None:
+        return clip.frames
+    return read_clip(control.path, frames=control.frames, fps=control.fps, size=clip.size).frames

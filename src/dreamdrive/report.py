@@ -1,0 +1,107 @@
+"""``report.json``: what was made, from what, how well, and what went wrong on the way."""
+
+import math
+import platform
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any, cast
+
+import numpy as np
+
+from dreamdrive import __version__
+from dreamdrive.held_out import Likeness
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+from dreamdrive.stages import StageRecord
+
+PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "pycolmap", "av", "safetensors")
+"""Whose versions a result may depend on."""
+
+
+def describe(
+    clip: Clip,
+    geometry: Geometry,
+    scene: Scene,
+    request: dict[str, Any],
+    records: dict[str, StageRecord],
+    held_out: dict[int, Likeness],
+    baselines: dict[str, dict[int, Likeness]],
+) -> dict[str, Any]:
+    """The report as JSON values; a number that is not finite becomes null.
+
+    Args:
+        clip: The frames.
+        geometry: Their geometry.
+        scene: The result.
+        request: Input and options.
+        records: Cost of each stage.
+        held_out: Likeness of the withheld frames, by index in the clip.
+        baselines: The same of predictions that need no scene.
+    """
+    report = {
+        "version": __version__,
+        "versions": {"python": platform.python_version(), **package_versions()},
+        "input": request["input"],
+        "options": request["options"],
+        "seed": request["seed"],
+        "stages": {name: asdict(record) for name, record in records.items()},
+        "frames": {"count": len(clip), "size": list(clip.size), "source_index": clip.source_index.tolist()},
+        "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
+        "actors": [
+            {
+                "name": actor.name,
+                "kind": actor.kind,
+                "gaussians": actor.count,
+                "first_s": actor.first_s,
+                "last_s": actor.last_s,
+                "path_m": actor.path_length_m,
+            }
+            for actor in scene.actors
+        ],
+        "scale": asdict(geometry.scale),
+        "focal": asdict(geometry.focal),
+        "detected": list(geometry.detected),
+        "fallback": geometry.fallback,
+        "notes": list(clip.provenance.get("notes", [])),
+        "geometry": geometry.details,
+        "held_out": _by_source_index(clip, held_out),
+        "held_out_mean": _mean(held_out),
+        "baselines": {
+            name: {"frames": _by_source_index(clip, one), "mean": _mean(one)}
+            for name, one in baselines.items()
+        },
+    }
+    return cast(dict[str, Any], _finite(report))
+
+
+def package_versions() -> dict[str, str | None]:
+    """Installed versions of ``PACKAGES``; None where one is missing."""
+    versions: dict[str, str | None] = {}
+    for name in PACKAGES:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = None
+    return versions
+
+
+def _by_source_index(clip: Clip, scores: dict[int, Likeness]) -> dict[str, dict[str, float]]:
+    return {str(int(clip.source_index[i])): asdict(one) for i, one in scores.items()}
+
+
+def _mean(scores: dict[int, Likeness]) -> dict[str, float] | None:
+    if not scores:
+        return None
+    return {name: float(np.mean([getattr(s, name) for s in scores.values()])) for name in ("psnr", "ssim")}
+
+
+def _finite(value: object) -> object:
+    """The same without numbers that JSON does not have, and without numpy's."""
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in cast(dict[object, object], value).items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in cast(list[object], value)]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
