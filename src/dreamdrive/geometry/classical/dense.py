@@ -1,0 +1,158 @@
+"""The dense half of the classical reconstruction: depth, confidence, sky and motion of posed frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from dreamdrive.geometry.classical.confidence import agreement, combine, temporal_neighbours
+from dreamdrive.geometry.classical.depth import Swept, sweep_frame
+from dreamdrive.geometry.classical.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
+from dreamdrive.geometry.classical.upright import upright_depth
+from dreamdrive.geometry.classical.view import View, make_view, parallel, single_threaded_opencv
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Ground
+
+MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
+_FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
+_BACKDROP_M = 40.0
+_PLANE_CONFIDENCE = 0.3
+_BACKDROP_CONFIDENCE = 0.1
+
+
+@dataclass(frozen=True)
+class Dense:
+    """Per-pixel results, as in ``Geometry``: depth_m, confidence, moving (F, H, W) and sky (F, H, W)."""
+
+    depth_m: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+    sky: Bool[np.ndarray, "f h w"]
+    moving: Float[np.ndarray, "f h w"]
+
+
+def densify(
+    clip: Clip,
+    cameras: tuple[Camera, ...],
+    fixed_regions: Int[np.ndarray, "h w"],
+    ground: Ground | None,
+) -> Dense:
+    """Depth by plane sweep, or as given, of every frame that is not held out.
+
+    Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky.
+
+    Args:
+        clip: The frames; ``clip.known.depth_m`` and ``clip.known.sky`` are used when given.
+        cameras: One posed pinhole a frame, metric.
+        fixed_regions: Nonzero where something fixed to the camera hides the street; stays empty.
+        ground: The road plane, where found.
+    """
+    view = make_view(clip, cameras, fixed_regions, ground)
+    with single_threaded_opencv():
+        sky = _sky(clip, view)
+        if clip.known.depth_m is not None:
+            inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
+            confidence = (inverse > 0).astype(np.float32)
+        else:
+            inverse, confidence = _swept(view, sky)
+        moving = moving_evidence(view, inverse, clip.known.depth_m is not None) * ~sky
+        if clip.known.depth_m is None and ground is not None:
+            inverse, confidence = _stand_movers(inverse, confidence, moving, view)
+    return _finish(view, inverse, confidence, sky, moving)
+
+
+def plane_and_backdrop(
+    clip: Clip,
+    cameras: tuple[Camera, ...],
+    fixed_regions: Int[np.ndarray, "h w"],
+    ground: Ground,
+    standing: bool,
+) -> Dense:
+    """What is left where there is no usable parallax: the road plane and a backdrop at 40 m, little trusted.
+
+    Args:
+        clip: The frames.
+        cameras: One pinhole a frame; for a standing camera all alike.
+        fixed_regions: As for ``densify``.
+        ground: The road plane, found or assumed.
+        standing: Whether the camera stands. Then what differs from the temporal median moves; from poses that
+            cannot be trusted no such evidence is drawn.
+    """
+    view = make_view(clip, cameras, fixed_regions, ground)
+    with single_threaded_opencv():
+        sky = _sky(clip, view)
+        inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
+        confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
+        moving = standing_evidence(view) * ~sky if standing else np.zeros(inverse.shape, np.float32)
+        inverse, confidence = _stand_movers(inverse, confidence.astype(np.float32), moving, view)
+    return _finish(view, inverse, confidence, sky, moving)
+
+
+def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:
+    sky = np.zeros(view.usable.shape, bool)
+    for frame in view.frames:
+        if clip.known.sky is not None:
+            sky[frame] = clip.known.sky[frame] & view.usable[frame]
+        else:
+            above = above_horizon(view.cameras[frame], view.ground)
+            sky[frame] = sky_mask(view.rgb[frame], above, view.usable[frame])
+    return sky
+
+
+def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
+    return np.where(depth_m > 0, 1 / np.maximum(depth_m, 1e-3), 0).astype(np.float32)
+
+
+def _swept(
+    view: View, sky: Bool[np.ndarray, "f h w"]
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    def one(frame: int) -> Swept | None:
+        return sweep_frame(view, frame, sky[frame])
+
+    found = dict(zip(view.frames, parallel(one, view.frames), strict=True))
+    inverse = np.zeros(view.grey.shape, np.float32)
+    confidence = np.zeros(view.grey.shape, np.float32)
+    for frame, swept in found.items():
+        inverse[frame] = swept.inverse_depth if swept is not None else view.plane_inverse[frame]
+    for frame, swept in found.items():
+        if swept is None:
+            continue
+        neighbours = temporal_neighbours(view.used, frame)
+        agreeing = agreement(frame, neighbours, view.cameras, inverse, view.usable)
+        confidence[frame] = combine(agreeing, swept.correlation, swept.on_plane)
+    return inverse, confidence
+
+
+def _stand_movers(
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    moving: Float[np.ndarray, "f h w"],
+    view: View,
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    """Moving pixels get the depth at which their column of the object meets the road."""
+    inverse, confidence = inverse.copy(), confidence.copy()
+    for frame in view.frames:
+        flagged = moving[frame] >= FLAGGED
+        upright = upright_depth(flagged, view.plane_inverse[frame])
+        standing = flagged & (upright > 0)
+        inverse[frame][standing] = upright[standing]
+        confidence[frame][flagged] = np.where(standing, MOVING_CONFIDENCE, 0)[flagged]
+    return inverse, confidence
+
+
+def _finish(
+    view: View,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    moving: Float[np.ndarray, "f h w"],
+) -> Dense:
+    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
+    depth = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
+    return Dense(
+        depth_m=depth,
+        confidence=np.where(shown, confidence, 0).astype(np.float32),
+        sky=sky & view.usable,
+        moving=np.where(view.usable, moving, 0).astype(np.float32),
+    )

@@ -1,0 +1,137 @@
+"""Evidence that pixels belong to something that moves."""
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.geometry.classical import contest
+from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.classical.sweep import sample
+from dreamdrive.geometry.classical.view import View, parallel
+
+FLAGGED = 0.5  # evidence from which a pixel counts as moving
+_EXCESS_PX = 1.0
+_GAIN = 2.5  # grey levels
+_SURE_EXCESS_PX = 3.0
+_SURE_GAIN = 5.0
+_VOTE = 0.45
+_VOTING_REACH = 2
+_CLOSE_PX = 9
+_OPEN_PX = 5
+_MIN_AREA = 0.0006  # of the image
+_MIN_SURE_SHARE = 0.1  # of a component
+_MIN_SURE_PX = 12
+_STANDING_LEVELS = 18.0  # grey levels from the temporal median
+
+
+def moving_evidence(
+    view: View, inverse_depth: Float[np.ndarray, "f h w"], known_depth: bool
+) -> Float[np.ndarray, "f h w"]:
+    """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
+
+    Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
+    enough sure pixels are kept and filled. Oncoming vehicles that the road hides nothing of look like nearer static
+    things and are found only where their flow leaves the epipolar line.
+
+    Args:
+        view: The posed frames.
+        inverse_depth: Static depth in 1/m.
+        known_depth: Whether that depth was given rather than found.
+    """
+    flows = neighbour_flows(view)
+
+    def judged(frame: int) -> contest.Verdict:
+        return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
+
+    verdicts = dict(zip(view.frames, parallel(judged, view.frames), strict=True))
+    likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
+    evidence = np.zeros(inverse_depth.shape, np.float32)
+
+    def decided(frame: int) -> np.ndarray:
+        votes = _vote(likely, frame, flows[frame])
+        return decide(votes, _sure(verdicts[frame]), view.usable[frame])
+
+    for frame, result in zip(view.frames, parallel(decided, view.frames), strict=True):
+        evidence[frame] = result
+    return evidence
+
+
+def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
+    """Evidence (F, H, W) in [0, 1] for a standing camera: pixels that differ from their temporal median."""
+    evidence = np.zeros(view.grey.shape, np.float32)
+    rgb = view.rgb[view.used].astype(np.float32)
+    median = np.median(rgb, axis=0)
+    for frame, picture in zip(view.frames, rgb, strict=True):
+        difference = cv2.GaussianBlur(np.abs(picture - median).max(axis=-1), (0, 0), 1.0)
+        votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
+        evidence[frame] = decide(votes, difference > 2 * _STANDING_LEVELS, view.usable[frame])
+    return evidence
+
+
+def _likely(verdict: contest.Verdict) -> Float[np.ndarray, "h w"]:
+    beyond = (verdict.excess_px > _EXCESS_PX) & (verdict.gain > _GAIN)
+    return (beyond | verdict.off_line).astype(np.float32)
+
+
+def _sure(verdict: contest.Verdict) -> Bool[np.ndarray, "h w"]:
+    return ((verdict.excess_px > _SURE_EXCESS_PX) & (verdict.gain > _SURE_GAIN)) | verdict.off_line
+
+
+def _vote(
+    likely: Mapping[int, Float[np.ndarray, "h w"]], frame: int, flows: list[PairFlow]
+) -> Float[np.ndarray, "h w"]:
+    """Mean of the frame's own opinion, counted twice, and of its neighbours' at the same thing."""
+    total = 2 * likely[frame]
+    count = np.full_like(total, 2)
+    for flow in flows:
+        if abs(flow.offset) <= _VOTING_REACH:
+            total = total + np.where(flow.trusted, sample(likely[flow.source], flow.x, flow.y), 0)
+            count = count + flow.trusted
+    return total / count
+
+
+def decide(
+    votes: Float[np.ndarray, "h w"], sure: Bool[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
+) -> Float[np.ndarray, "h w"]:
+    """Votes to evidence: at least ``FLAGGED`` inside kept and filled regions, less outside.
+
+    Args:
+        votes: In [0, 1].
+        sure: Pixels of which a region needs some to be kept.
+        usable: Evidence is 0 elsewhere.
+    """
+    mask = ((votes >= _VOTE) & usable).astype(np.uint8)
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_PX))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _ellipse(_OPEN_PX))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
+    sure_px = np.bincount(labels[sure], minlength=count)
+    area = stats[:, cv2.CC_STAT_AREA]
+    keep = (area >= _MIN_AREA * mask.size) & (sure_px >= np.maximum(_MIN_SURE_PX, _MIN_SURE_SHARE * area))
+    flagged = np.zeros(mask.shape, bool)
+    for label in np.flatnonzero(keep[1:]) + 1:
+        flagged |= fill(labels == label)
+    inside = np.maximum(votes, FLAGGED)
+    return np.where(usable, np.where(flagged, inside, np.minimum(votes, 0.9 * FLAGGED)), 0).astype(np.float32)
+
+
+def fill(region: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    """The region with everything that lies between parts of it, both along its row and its column.
+
+    Where it touches an edge of the image it is taken to go on beyond.
+    """
+    padded = np.pad(region, 1)
+    padded[0, 1:-1], padded[-1, 1:-1] = region[0].any(), region[-1].any()
+    padded[1:-1, 0], padded[1:-1, -1] = region[:, 0].any(), region[:, -1].any()
+
+    def between(axis: int) -> np.ndarray:
+        ahead = np.logical_or.accumulate(padded, axis=axis)
+        behind = np.flip(np.logical_or.accumulate(np.flip(padded, axis), axis=axis), axis)
+        return ahead & behind
+
+    return (between(0) & between(1))[1:-1, 1:-1]
+
+
+def _ellipse(size_px: int) -> np.ndarray:
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size_px, size_px))

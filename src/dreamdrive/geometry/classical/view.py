@@ -1,0 +1,84 @@
+"""The posed frames as the dense steps read them."""
+
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Ground
+
+_THREADS = 2
+
+A = TypeVar("A")
+B = TypeVar("B")
+
+
+@dataclass(frozen=True)
+class View:
+    """Posed frames; a held-out frame is blank here, so that no dense step can see it.
+
+    Attributes:
+        rgb: Frames (F, H, W, 3).
+        grey: The same in grey levels, float32 (F, H, W).
+        usable: Pixels that show the street (F, H, W).
+        used: Frames that may be looked at (F,).
+        cameras: One posed pinhole a frame.
+        plane_inverse: Inverse depth of the road plane (F, H, W) in 1/m; 0 above the horizon or without one.
+        ground: The road plane, where found.
+    """
+
+    rgb: UInt8[np.ndarray, "f h w 3"]
+    grey: Float[np.ndarray, "f h w"]
+    usable: Bool[np.ndarray, "f h w"]
+    used: Bool[np.ndarray, " f"]
+    cameras: tuple[Camera, ...]
+    plane_inverse: Float[np.ndarray, "f h w"]
+    ground: Ground | None
+
+    @property
+    def positions_m(self) -> Float[np.ndarray, "f 3"]:
+        """Camera centres (F, 3)."""
+        return np.array([camera.world_from_camera[:3, 3] for camera in self.cameras])
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """Indices of the frames that may be looked at."""
+        return tuple(np.flatnonzero(self.used).tolist())
+
+
+def make_view(
+    clip: Clip, cameras: tuple[Camera, ...], fixed_regions: Int[np.ndarray, "h w"], ground: Ground | None
+) -> View:
+    """The clip with its poses; frames that are held out are blanked."""
+    used = ~clip.held_out
+    rgb = np.where(used[:, None, None, None], clip.frames, np.uint8(0))
+    grey = np.stack([cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in rgb]).astype(np.float32)
+    usable = clip.valid & (fixed_regions == 0) & used[:, None, None]
+    plane = np.zeros(grey.shape, np.float32)
+    if ground is not None:
+        plane = np.stack([1.0 / ground.depth_m(camera) for camera in cameras]).astype(np.float32)
+    return View(rgb, grey, usable, used, cameras, plane, ground)
+
+
+@contextmanager
+def single_threaded_opencv() -> Generator[None]:
+    """Keep OpenCV on one thread: DIS flow depends on the number of stripes it is cut into."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+def parallel(function: Callable[[A], B], items: Iterable[A]) -> list[B]:
+    """``function`` of each item, in order, two at a time; the result does not depend on the threads."""
+    with ThreadPoolExecutor(_THREADS) as pool:
+        return list(pool.map(function, items))
