@@ -7,57 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.scene.scenes import make_scene
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.actor import Actor
-from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
-from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.folder import load_scene, save_scene
-from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene
-from dreamdrive.scene.sky import Sky
-
-
-def gaussians(count: int, seed: int, **more: torch.Tensor) -> Gaussians:
-    g = torch.Generator().manual_seed(seed)
-    return Gaussians(
-        means=torch.randn(count, 3, generator=g),
-        quaternions=torch.randn(count, 4, generator=g),
-        log_scales=torch.randn(count, 3, generator=g),
-        logit_opacities=torch.randn(count, generator=g),
-        sh=torch.randn(count, 4, 3, generator=g),
-        source_frame=torch.arange(count) % 3,
-        **more,
-    )
-
-
-def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
-    config = DeformationConfig(depth=6, width=8, actors=2, track_times=3)
-    tracks = Tracks(
-        np.array([0.0, 0.5, 1.0]),
-        np.random.default_rng(0).normal(size=(2, 3, 3)),
-        np.ones((2, 3)),
-        np.ones((2, 3)),
-    )
-    domain = Domain(np.array([1.0, 2, 3]), 4.0, 0.0, 1.0, np.array([0, -1.0, 0]))
-    field = DeformationField(config, domain, tracks)
-    torch.nn.init.constant_(field.head_mean.bias, 0.25)
-    more = {"lifespan": torch.ones(dynamic, 2), "actor": torch.arange(dynamic) % 3 - 1}
-    return Scene(
-        static=gaussians(7, 1, features=torch.ones(7, 2)),
-        dynamic=gaussians(dynamic, 2, **more),
-        deformation=field if full else None,
-        actors=(Actor(0, "actor 0", "vehicle", 2, np.array([0.0, 0.1]), np.ones((2, 3)) / 3),)
-        if full
-        else (),
-        sky=Sky(torch.rand(4, 6, 3), (-1.0, 1.0), (-0.1, 0.8)) if full else None,
-        exposure=Exposure(torch.eye(3, 4).repeat(2, 1, 1), np.array([0.0, 0.1])) if full else None,
-        cameras=tuple(Camera(50.0, 51.0, 16.5, 12.0, 33, 24) for _ in range(3)),
-        times_s=np.array([0.0, 0.1, 0.2]) + 1 / 3,
-        held_out=np.array([False, True, False]),
-        provenance={"seed": 1, "per_frame": {10: "a", 2: "b"}},
-    )
 
 
 def contents(path: Path) -> dict[str, bytes]:

@@ -1,0 +1,115 @@
+"""Sky by direction alone, exposure by time, the scene that joins them."""
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.exposure import Exposure, ExposureNetwork, transform_colour
+from dreamdrive.scene.sky import Sky
+
+
+def camera(yaw_deg: float = 0.0, pitch_deg: float = 0.0, position: tuple[float, ...] = (0, 0, 0)) -> Camera:
+    """Yaw to the right, pitch upwards."""
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler("yx", [yaw_deg, pitch_deg], degrees=True).as_matrix()
+    pose[:3, 3] = position
+    return Camera(40.0, 40.0, 20.0, 15.0, 40, 30, pose)
+
+
+def compass(height: int = 90, width: int = 360) -> Sky:
+    """Red says azimuth / pi, green elevation / (pi / 2), over the whole upper half."""
+    azimuth = (np.arange(width) + 0.5) / width * 2 - 1
+    elevation = 1 - (np.arange(height) + 0.5) / height
+    texture = np.stack([*np.meshgrid(azimuth, elevation), np.zeros((height, width))], -1)
+    return Sky(torch.tensor(texture, dtype=torch.float32), (-np.pi, np.pi), (0.0, np.pi / 2))
+
+
+@given(st.floats(-170, 170), st.floats(5, 80))
+@settings(max_examples=40, deadline=None)
+def test_every_pixel_gets_the_colour_of_its_direction(yaw_deg: float, pitch_deg: float) -> None:
+    view = camera(yaw_deg, pitch_deg)
+    rays = view.rays() @ view.world_from_camera[:3, :3].T
+    azimuth = np.arctan2(rays[..., 0], rays[..., 2])
+    elevation = np.arctan2(-rays[..., 1], np.hypot(rays[..., 0], rays[..., 2]))
+    inside = (np.abs(azimuth) < np.pi * 0.99) & (elevation > 0.02) & (elevation < np.pi / 2 - 0.02)
+    seen = compass().colour(view).numpy()
+    np.testing.assert_allclose(seen[inside, 0], azimuth[inside] / np.pi, atol=2e-3)
+    np.testing.assert_allclose(seen[inside, 1], elevation[inside] / (np.pi / 2), atol=2e-3)
+
+
+def test_position_does_not_matter() -> None:
+    assert torch.equal(compass().colour(camera(20, 30)), compass().colour(camera(20, 30, (5, -1, 9))))
+
+
+def test_outside_the_edge_goes_on() -> None:
+    sky = Sky(torch.tensor([[[0.1] * 3, [0.9] * 3]]), (-0.2, 0.2), (0.0, 0.5))
+    assert sky.colour(camera(90))[:, 20].mean().item() == pytest.approx(0.9)
+    assert sky.colour(camera(-90))[:, 20].mean().item() == pytest.approx(0.1)
+
+
+def test_a_range_around_the_back_has_no_jump_inside() -> None:
+    texture = torch.linspace(0, 1, 50)[None, :, None].expand(4, -1, 3).contiguous()
+    sky = Sky(texture, (np.pi - 0.6, np.pi + 0.6), (-0.5, 0.5))
+    row = sky.colour(camera(180))[15, :, 0]
+    assert (row.diff() > 0).all()
+
+
+def test_sky_gradients() -> None:
+    texture = torch.rand(3, 4, 3, dtype=torch.float64, requires_grad=True)
+    small = Camera(5.0, 5.0, 3.0, 2.0, 6, 4)
+
+    def look(values: torch.Tensor) -> torch.Tensor:
+        return Sky(values, (-0.7, 0.7), (-0.4, 0.5)).colour(small)
+
+    assert torch.autograd.gradcheck(look, [texture])
+
+
+def test_exposure_is_linear_between_frames_and_constant_outside() -> None:
+    transforms = torch.stack([torch.eye(3, 4), 3 * torch.eye(3, 4), torch.zeros(3, 4)])
+    exposure = Exposure(transforms, np.array([0.0, 1.0, 4.0]))
+    for t_s, gain in ((-1.0, 1), (0.0, 1), (0.25, 1.5), (1.0, 3), (2.5, 1.5), (4.0, 0), (9.0, 0)):
+        torch.testing.assert_close(exposure.at(t_s), gain * torch.eye(3, 4))
+    image = torch.rand(2, 2, 3)
+    torch.testing.assert_close(exposure.apply(image, 0.5), 2 * image)
+
+
+def test_exposure_network_starts_at_the_identity_and_learns_each_frame_apart() -> None:
+    network = ExposureNetwork(3, seed=1)
+    torch.testing.assert_close(network(2), torch.eye(3, 4))
+    gains = (0.8, 1.0, 1.3)
+    optimiser = torch.optim.Adam(network.parameters(), lr=0.02)
+    for _ in range(150):
+        loss = sum(((network(i) - gain * torch.eye(3, 4)) ** 2).sum() for i, gain in enumerate(gains))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+    frozen = network.freeze(np.array([0.0, 0.1, 0.2]), np.array([True, False, True]))
+    torch.testing.assert_close(frozen.transforms[0], 0.8 * torch.eye(3, 4), atol=0.03, rtol=0)
+    # The middle frame was withheld: its neighbours say what it looked like.
+    torch.testing.assert_close(frozen.at(0.1), 1.05 * torch.eye(3, 4), atol=0.03, rtol=0)
+    assert not frozen.transforms.requires_grad
+
+
+def test_exposure_gradients() -> None:
+    network = ExposureNetwork(2).double()
+    torch.nn.init.normal_(network.output.weight, std=0.1)
+    image = torch.rand(2, 3, 3, dtype=torch.float64, requires_grad=True)
+    affine = network(1).detach().requires_grad_()
+    assert torch.autograd.gradcheck(transform_colour, [image, affine])
+    transform_colour(image, network(1)).sum().backward()
+    assert network.embedding.grad is not None
+    assert network.embedding.grad[1].abs().sum() > 0
+    assert network.embedding.grad[0].abs().sum() == 0
+
+
+def test_wrong_values_are_refused() -> None:
+    with pytest.raises(ValueError, match="grow"):
+        Sky(torch.zeros(2, 2, 3), (0.5, -0.5), (0.0, 1.0))
+    with pytest.raises(ValueError, match="increasing"):
+        Exposure(torch.zeros(2, 3, 4), np.array([1.0, 0.0]))
+    with pytest.raises(ValueError, match="2 times for 3 frames"):
+        ExposureNetwork(3).freeze(np.array([0.0, 1.0]), np.array([True, True]))
