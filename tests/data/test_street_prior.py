@@ -1,0 +1,43 @@
+"""The street as a prior."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.street_world import street_world
+from dreamdrive.scene.control import Control
+
+SMALL = (64, 48)
+
+
+def test_only_the_intrinsics_are_given_unless_asked() -> None:
+    prior: Prior = street_world
+    clip = prior(Control(frames="0:3", size=SMALL, seed=2))
+    assert len(clip) == 3
+    assert clip.known.intrinsics
+    assert clip.known.world_from_camera is None
+    assert clip.known.depth_m is None
+    assert clip.features["appearance"].shape[:3] == (3, 24, 32)
+
+
+def test_truth_is_that_of_the_selected_frames() -> None:
+    clip = street_world(Control(frames="2:9:3", size=SMALL, hold_out=2), truth=True)
+    assert clip.source_index.tolist() == [2, 5, 8]
+    np.testing.assert_allclose(clip.times_s, [0, 0.3, 0.6])
+    assert clip.held_out.tolist() == [False, True, False]
+    poses, depth = clip.known.world_from_camera, clip.known.depth_m
+    assert poses is not None
+    assert depth is not None
+    np.testing.assert_array_equal(poses[0], np.eye(4))
+    assert np.linalg.norm(poses[2, :3, 3]) == pytest.approx(4.8, rel=0.1)
+    assert depth.shape == (3, 48, 64)
+
+
+def test_what_it_cannot_use_is_refused() -> None:
+    with pytest.raises(InputError, match="takes no path"):
+        street_world(Control(path=Path("video.mp4")))
+    with pytest.raises(InputError, match="even numbers"):
+        street_world(Control(size=(63, 48)))
