@@ -1,19 +1,21 @@
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.data.pictures import texture
+
 from dreamdrive.data.distortion import Distortion
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.size import choose_size
 from dreamdrive.scene.camera import Camera
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from tests.data.conftest import texture
 
 UDACITY = Distortion("opencv", (-0.24879, -0.01577, -0.00061, 0.00017, 0.0))
 FISHEYE = Distortion("fisheye", (0.04, -0.01, 0.003, -0.0008))
 PINCUSHION = Distortion("opencv", (0.15, 0.02, 0.001, -0.001))
 RATIONAL = Distortion("opencv", (0.2, -0.05, 0.0003, -0.0002, 0.01, 0.4, -0.02, 0.01))
+PRISM = Distortion("opencv", (*RATIONAL.coefficients, 0.01, -0.002, 0.003, 0.001))
+TILTED = Distortion("opencv", (*PRISM.coefficients, 0.05, -0.03))
 LENSES = [UDACITY, FISHEYE, PINCUSHION, RATIONAL]
 SOURCE = Camera(1155.74, 1150.36, 673.0, 389.06, 1280, 720)
 
@@ -47,14 +49,11 @@ def test_points_agree_with_opencv(points):
     k = np.array(FISHEYE.coefficients)
     expected = cv2.fisheye.distortPoints(ideal[:, None], np.eye(3), k)[:, 0]
     np.testing.assert_allclose(FISHEYE.distort(ideal), expected, atol=1e-9)
-    r2 = (ideal**2).sum(axis=1)
-    k1, k2, p1, p2 = PINCUSHION.coefficients
-    radial = ideal * (1 + k1 * r2 + k2 * r2**2)[:, None]
-    x, y = ideal.T
-    tangential = np.stack(
-        [2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=1
-    )
-    np.testing.assert_allclose(PINCUSHION.distort(ideal), radial + tangential, atol=1e-9)
+    rays = np.concatenate([ideal, np.ones((len(ideal), 1))], axis=1)
+    for distortion in (UDACITY, PINCUSHION, RATIONAL, PRISM, TILTED):
+        k = np.array(distortion.coefficients)
+        expected = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), k)[0][:, 0]
+        np.testing.assert_allclose(distortion.distort(ideal), expected, atol=1e-9)
 
 
 def test_points_behind_the_fold_have_no_ideal():
@@ -125,6 +124,15 @@ def test_a_very_wide_fisheye_is_covered_up_to_a_limit():
     image = lens.apply(np.ones((540, 960, 3)), wide)
     assert (image[lens.covered(wide)] == 1).all()
     assert (image[~lens.covered(wide)] == 0).all()
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_the_rim_of_a_render_is_not_darkened(kind):
+    lens, _ = lens_of(UDACITY)
+    image = lens.apply(np.full((270, 480, 3), 0.4, dtype=kind))
+    assert image.dtype == kind
+    np.testing.assert_allclose(image[lens.covered()], 0.4, atol=1e-6)
+    assert 0.8 < lens.covered().mean() < 0.95
 
 
 def test_a_pincushion_lens_leaves_invalid_corners():

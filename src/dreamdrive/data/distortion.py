@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
 _NEWTON_STEPS = 20
-_BLOCK = 1 << 15
-"""Points given to OpenCV at once; its scratch memory is 500 bytes a point."""
 _STEP = 1e-6
 _TOLERANCE = 1e-7
 """Largest error of an inverted point, in units of the focal length: under a thousandth of a pixel."""
@@ -44,10 +41,7 @@ class Distortion:
             angle = np.arctan(radius)
             bent = _fisheye_radius(angle, coefficients)
             return points * (bent / np.maximum(radius, 1e-12))[:, None]
-        rays = np.concatenate([points, np.ones((len(points), 1))], axis=1)[:, None]
-        blocks = (rays[start : start + _BLOCK] for start in range(0, len(rays), _BLOCK))
-        found = [cv2.projectPoints(b, np.zeros(3), np.zeros(3), np.eye(3), coefficients)[0] for b in blocks]
-        return np.concatenate(found).astype(np.float64).reshape(-1, 2)
+        return _polynomial(points, coefficients)
 
     def undistort(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """The inverse of ``distort``; NaN where no ideal point in front of the camera leads there.
@@ -82,7 +76,10 @@ class Distortion:
         """Smallest angle to the axis, at most 90 degrees, at which the radial part stops growing."""
         angle = np.linspace(0, np.pi / 2, 4097)[:-1]
         k = np.array(self.coefficients)
-        radius = _fisheye_radius(angle, k) if self.model == "fisheye" else _radial(np.tan(angle), k)
+        if self.model == "fisheye":
+            radius = _fisheye_radius(angle, k)
+        else:
+            radius = np.tan(angle) * _radial(np.tan(angle) ** 2, _padded(k))
         shrinking = np.flatnonzero(np.diff(radius) <= 0)
         return float(angle[shrinking[0]] if len(shrinking) else np.pi / 2)
 
@@ -105,11 +102,36 @@ def _fisheye_radius(angle: Float[np.ndarray, " n"], k: Float[np.ndarray, "4"]) -
     return angle * (1 + square * (k[0] + square * (k[1] + square * (k[2] + square * k[3]))))
 
 
-def _radial(radius: Float[np.ndarray, " n"], k: Float[np.ndarray, " k"]) -> Float[np.ndarray, " n"]:
-    """The rational radial part of OpenCV's model, without its tangential terms."""
-    k1, k2, k3, k4, k5, k6 = [*k[:2], *k[4:8], *np.zeros(4)][:6]
-    s = radius * radius
-    return radius * (1 + s * (k1 + s * (k2 + s * k3))) / (1 + s * (k4 + s * (k5 + s * k6)))
+def _radial(square: Float[np.ndarray, " n"], c: Float[np.ndarray, "14"]) -> Float[np.ndarray, " n"]:
+    """The rational radial factor of OpenCV's model at squared radii."""
+    above = 1 + square * (c[0] + square * (c[1] + square * c[4]))
+    return above / (1 + square * (c[5] + square * (c[6] + square * c[7])))
+
+
+def _polynomial(points: Float[np.ndarray, "n 2"], given: Float[np.ndarray, " k"]) -> Float[np.ndarray, "n 2"]:
+    """OpenCV's model: rational radial, tangential, thin prism, and tilt of the sensor."""
+    c = _padded(given)
+    x, y = points[:, 0], points[:, 1]
+    square, cross = x * x + y * y, 2 * x * y
+    radial = _radial(square, c)
+    u = x * radial + c[2] * cross + c[3] * (square + 2 * x * x) + square * (c[8] + square * c[9])
+    v = y * radial + c[2] * (square + 2 * y * y) + c[3] * cross + square * (c[10] + square * c[11])
+    if not c[12:].any():
+        return np.stack([u, v], axis=1)
+    tilted = np.stack([u, v, np.ones_like(u)], axis=1) @ _tilt(*c[12:]).T
+    return tilted[:, :2] / tilted[:, 2:]
+
+
+def _tilt(x_rad: float, y_rad: float) -> Float[np.ndarray, "3 3"]:
+    """Projection onto a sensor turned about its x and then its y axis."""
+    cx, sx, cy, sy = np.cos(x_rad), np.sin(x_rad), np.cos(y_rad), np.sin(y_rad)
+    turn = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+    back = np.array([[turn[2, 2], 0, -turn[0, 2]], [0, turn[2, 2], -turn[1, 2]], [0, 0, 1]])
+    return back @ turn
+
+
+def _padded(given: Float[np.ndarray, " k"]) -> Float[np.ndarray, "14"]:
+    return np.concatenate([given, np.zeros(14 - len(given))])
 
 
 def _undistort_fisheye(

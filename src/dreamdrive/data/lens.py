@@ -71,9 +71,10 @@ class Lens:
                 f"the image is {image.shape[:2]}, its camera {(camera.height_px, camera.width_px)}"
             )
         spot = self._spots(camera).astype(np.float32) - 0.5
-        seen = cv2.remap(image, spot[..., 0], spot[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        seen = np.clip(np.asarray(seen), image.min(), image.max())
-        return np.where(self.covered(camera)[..., None], seen, np.zeros((), image.dtype))
+        single = image.astype(np.float32)  # OpenCV 5.0 rounds doubles to whole numbers along the border
+        seen = cv2.remap(single, spot[..., 0], spot[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        seen = np.clip(np.asarray(seen), single.min(), single.max())
+        return np.where(self.covered(camera)[..., None], seen, np.float32(0)).astype(image.dtype)
 
     def covered(self, rendered: Camera | None = None) -> Bool[np.ndarray, "h2 w2"]:
         """Where ``apply`` finds a picture: the part of the distorted image that the pinhole sees."""

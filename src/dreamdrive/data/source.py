@@ -6,7 +6,6 @@ from dreamdrive.data.images import SUFFIXES, ImageFolder
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 
-
 Source = ImageFolder | Video
 """A numbered sequence of pictures."""
 

@@ -14,6 +14,9 @@ NAMES = tuple(
     for name in ("L", "a", "b", "gradient of L", "contrast of L")
 )
 """What each channel holds, in order."""
+FLAT = 0.1
+"""Deviation, in units of Lab, below which a channel says nothing: grey clips reach 0.03 in a and b by
+rounding, while real clips have 0.5 or more in every channel."""
 
 
 def appearance(
@@ -50,7 +53,7 @@ def appearance(
         seen += len(inside)
     mean = sums[0] / max(seen, 1)
     deviation = np.sqrt(np.maximum(sums[1] / max(seen, 1) - mean**2, 0.0))
-    scale = np.where(deviation > 1e-2, 1 / np.maximum(deviation, 1e-2), 0.0)
+    scale = np.where(deviation > FLAT, 1 / np.maximum(deviation, FLAT), 0.0)
     for index, weight in enumerate(weights):
         features[index] = (features[index] - mean) * scale * (weight > 0)[..., None]
     return features

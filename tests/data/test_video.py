@@ -1,0 +1,103 @@
+import av
+import numpy as np
+import pytest
+
+from dreamdrive.data.select import UNBOUNDED
+from dreamdrive.data.video import Video
+from dreamdrive.errors import InputError
+
+ALL = range(0, UNBOUNDED)
+
+
+def brightness(frame) -> float:
+    """What ``make_video`` made of the index."""
+    return (float(frame.rgb[:, -10:].mean()) - 40) / 3
+
+
+def test_frames_come_in_order_with_their_times(make_video):
+    video = Video.open(make_video(12, rate=20))
+    frames = list(video.read(ALL))
+    assert [f.index for f in frames] == list(range(12))
+    np.testing.assert_allclose([f.time_s for f in frames], np.arange(12) / 20, atol=1e-6)
+    np.testing.assert_allclose([brightness(f) for f in frames], np.arange(12), atol=0.5)
+    assert video.count() == 12
+    assert video.rate_hz == 20
+
+
+def test_only_the_wanted_frames_are_read(make_video):
+    frames = list(Video.open(make_video(12)).read(range(3, 11, 3)))
+    np.testing.assert_allclose([brightness(f) for f in frames], [3, 6, 9], atol=0.5)
+    assert [f.time_s for f in frames] == pytest.approx([0.15, 0.3, 0.45])
+
+
+def test_decoding_stops_behind_the_last_wanted_frame(make_video):
+    """The damage behind it does not matter."""
+    path = make_video(60, movflags="faststart")
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.7)])
+    assert len(list(Video.open(path).read(range(0, 10, 2)))) == 5
+
+
+@pytest.mark.parametrize("wanted", [range(0, 60, 2), ALL])
+def test_a_video_cut_short_says_how_far_it_goes(make_video, wanted):
+    path = make_video(60, movflags="faststart")
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.7)])
+    with pytest.raises(InputError, match=r"only \d+ frames could be read") as caught:
+        list(Video.open(path).read(wanted))
+    assert ("frame 58 is asked for" in str(caught.value)) == (wanted is not ALL)
+
+
+@pytest.mark.parametrize("wanted", [range(8, 20, 2), range(15, UNBOUNDED)])
+def test_asking_beyond_the_end_is_refused(make_video, wanted):
+    with pytest.raises(InputError, match=r"asks for frame (18|15), but .* has only 12 frames"):
+        list(Video.open(make_video(12)).read(wanted))
+
+
+def test_a_video_without_its_index_is_refused(make_video):
+    path = make_video(12)
+    path.write_bytes(path.read_bytes()[:1500])
+    with pytest.raises(InputError, match="not a readable video"):
+        Video.open(path)
+
+
+def test_an_empty_file_is_refused(tmp_path):
+    (tmp_path / "a.mp4").touch()
+    with pytest.raises(InputError, match=r"a.mp4 is empty; expected a video"):
+        Video.open(tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.txt", "a"])
+def test_text_is_no_video(tmp_path, name):
+    (tmp_path / name).write_text("This is not a video.\n" * 200)
+    with pytest.raises(InputError, match=r"not a readable video|is not a video"):
+        Video.open(tmp_path / name)
+
+
+def test_sound_alone_is_refused(tmp_path):
+    path = tmp_path / "a.wav"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("pcm_s16le", rate=8000)
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), format="s16", layout="mono")
+        sound.rate = 8000
+        container.mux(stream.encode(sound))
+    with pytest.raises(InputError, match="no picture track"):
+        Video.open(path)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "quarters"), [((0, 1, -1, 0), -1), ((0, -1, 1, 0), 1), ((-1, 0, 0, -1), 2)]
+)
+def test_a_phone_held_upright_gives_upright_frames(make_video, matrix, quarters):
+    path = make_video(3)
+    plain = next(Video.open(path).read(ALL)).rgb
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + 4 + 40  # the 3x3 matrix: a b u, c d v, x y w
+    for place, value in zip((0, 4, 12, 16), matrix, strict=True):
+        data[at + place : at + place + 4] = (value * 65536).to_bytes(4, "big", signed=True)
+    path.write_bytes(data)
+    frame = next(Video.open(path).read(ALL))
+    np.testing.assert_array_equal(frame.rgb, np.rot90(plain, quarters))
+    assert "upright" in frame.notes[0]
+
+
+def test_golden_a_real_video_has_the_frames_its_notes_say(data_dir):
+    assert Video.open(data_dir / "clips/udacity_highway_two_cars/video.mp4").count() == 160

@@ -1,0 +1,46 @@
+import inspect
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from tests.data.pictures import texture
+
+from dreamdrive.data import read_clip
+from dreamdrive.errors import InputError
+from dreamdrive.prior import PRIORS, Prior, choose_prior, replay
+from dreamdrive.scene.control import Control
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for index in range(6):
+        cv2.imwrite(str(tmp_path / f"{index}.png"), texture(48, 64, index))
+    return tmp_path
+
+
+def test_replay_is_the_recording_with_features(folder):
+    clip = replay(Control(folder, frames="0:6:2", fps=4.0, size=(32, 24), hold_out=2, hfov_deg=80.0))
+    read = read_clip(folder, frames="0:6:2", fps=4.0, size=(32, 24), hold_out=2, hfov_deg=80.0)
+    np.testing.assert_array_equal(clip.frames, read.frames)
+    np.testing.assert_array_equal(clip.times_s, read.times_s)
+    assert clip.rig[0].matrix.tolist() == read.rig[0].matrix.tolist()
+    assert clip.features["appearance"].shape == (3, 12, 16, 15)
+
+
+def test_every_control_reaches_the_reader():
+    """A field of the control that the reader also knows must be handed on: both have the same names."""
+    fields = set(Control.__dataclass_fields__) - {"path", "seed"}
+    assert fields == set(inspect.signature(read_clip).parameters) - {"path"}
+
+
+def test_replay_needs_an_input():
+    with pytest.raises(InputError, match="needs an input"):
+        replay(Control())
+
+
+def test_priors_are_found_by_name():
+    assert choose_prior("replay") is replay
+    assert all(isinstance(prior, Prior) for prior in PRIORS.values())
+    with pytest.raises(InputError, match="--prior sora: unknown; available are replay"):
+        choose_prior("sora")
