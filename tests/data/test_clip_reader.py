@@ -86,7 +86,7 @@ def test_16_bit_grey_and_alpha_folders(make_folder):
     clear = read_clip(make_folder([np.dstack([image, alpha])] * 2, name="clear"))
     np.testing.assert_array_equal(clear.valid[0], alpha > 0)
     assert (clear.frames[~clear.valid] == 0).all()
-    for clip, word in ((deep, "16-bit"), (grey, "grey"), (clear, "transparent")):
+    for clip, word in ((deep, "16-bit"), (grey, "grey"), (clear, "Transparent")):
         assert any(word in note for note in clip.provenance["notes"])
 
 

@@ -71,7 +71,7 @@ def test_transparent_pixels_are_marked(make_folder, suffix):
     read = read_image(make_folder([np.dstack([texture(48, 64), alpha])], suffix=suffix) / f"0{suffix}")
     np.testing.assert_array_equal(read.opaque, alpha > 0)
     np.testing.assert_array_equal(read.rgb, texture(48, 64))
-    assert "transparent" in read.notes[0]
+    assert "Transparent" in read.notes[0]
 
 
 def test_opaque_alpha_is_nothing_special(make_folder):

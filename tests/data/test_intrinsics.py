@@ -113,7 +113,7 @@ def test_the_guess_is_a_usual_dashcam():
     guess = guess_camera((1920, 1080))
     assert (guess.camera.fx_px, guess.camera.cx_px, guess.camera.cy_px) == (0.85 * 1920, 960, 540)
     assert not guess.known
-    assert "lens distortion unknown, taken as zero" in guess.notes
+    assert "The lens distortion is unknown and taken as zero." in guess.notes
     assert guess_camera((1080, 1920)).camera.fx_px == guess.camera.fx_px
 
 

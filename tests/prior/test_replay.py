@@ -42,5 +42,5 @@ def test_replay_needs_an_input():
 def test_priors_are_found_by_name():
     assert choose_prior("replay") is replay
     assert all(isinstance(prior, Prior) for prior in PRIORS.values())
-    with pytest.raises(InputError, match="--prior sora: unknown; available are replay"):
+    with pytest.raises(InputError, match="--prior sora: unknown; available are replay, street-world"):
         choose_prior("sora")

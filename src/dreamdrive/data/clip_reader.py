@@ -175,7 +175,7 @@ def _gather(
     picked.notes += picked.sampler.calibration.notes
     if picked.sampler.sizing.shrink < 1:
         picked.notes.append(
-            f"frames enlarged {1 / picked.sampler.sizing.shrink:.2f} times: they hold no more detail"
+            f"The frames are enlarged {1 / picked.sampler.sizing.shrink:.2f} times; they hold no more detail."
         )
     return picked
 
@@ -197,14 +197,16 @@ def _times(
     if fps is not None:
         return index / fps, ()
     if not isinstance(source, Video):
-        return index / FOLDER_RATE_HZ, (f"no --fps given: the images count as {FOLDER_RATE_HZ:g} Hz",)
+        return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if all(t is not None for t in clock_s):
         times_s = np.array(clock_s, dtype=np.float64)
         if (np.diff(times_s) > 0).all():
             return times_s, ()
     if source.rate_hz is None:
         raise InputError(f"{source.path} has no usable times; give its rate with --fps")
-    return index / source.rate_hz, (f"the video's times are unusable: taken as {source.rate_hz:g} Hz",)
+    return index / source.rate_hz, (
+        f"The video's own times are unusable: its frames count as {source.rate_hz:g} Hz.",
+    )
 
 
 def _provenance(source: Source, picked: _Picked, notes: list[str]) -> dict[str, Any]:

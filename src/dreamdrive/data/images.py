@@ -76,14 +76,14 @@ def read_image(path: Path, index: int = 0) -> RawFrame:
     if raw.ndim == 3 and raw.shape[2] == 4:
         opaque = _opaque(raw, image)
     if opaque is not None:
-        notes.append("images have transparent pixels: these count as holding no picture")
+        notes.append("Transparent pixels of the images count as holding no picture.")
     if image.dtype == np.uint16:
         image = ((image.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
-        notes.append("16-bit images: scaled to 8 bits, 65535 becoming 255")
+        notes.append("The 16-bit images are scaled to 8 bits, 65535 becoming 255.")
     if image.dtype != np.uint8:
         raise InputError(f"{path} holds {image.dtype} numbers; expected 8 or 16 bits a channel")
     if image.ndim == 2:
-        notes.append("grey images: red, green and blue are equal")
+        notes.append("The images are grey: red, green and blue are equal.")
         rgb = np.repeat(image[..., None], 3, axis=2)
     else:
         rgb = np.ascontiguousarray(image[..., ::-1])

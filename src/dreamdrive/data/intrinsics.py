@@ -46,14 +46,14 @@ def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibr
     width, height = size
     if hfov_deg is None:
         focal = DEFAULT_FOCAL * max(size)
-        said = f"no calibration: focal length taken as {DEFAULT_FOCAL} times the longer side"
+        said = f"No calibration: the focal length is taken as {DEFAULT_FOCAL} times the longer side."
     elif not 1 <= hfov_deg <= 179:
         raise InputError(f"--hfov {hfov_deg:g}: expected degrees between 1 and 179, such as 60")
     else:
         focal = 0.5 * width / tan(radians(hfov_deg) / 2)
-        said = f"no calibration: focal length from the given horizontal field of view of {hfov_deg:g} degrees"
+        said = f"No calibration: the focal length follows from --hfov, {hfov_deg:g} degrees."
     camera = Camera(focal, focal, width / 2, height / 2, width, height)
-    return Calibration(camera, None, False, (said, "lens distortion unknown, taken as zero"))
+    return Calibration(camera, None, False, (said, "The lens distortion is unknown and taken as zero."))
 
 
 def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
@@ -90,7 +90,7 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
                 f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
                 f"{size[0]}x{size[1]}, another shape; give the calibration of this input"
             )
-        notes.append(f"calibration scaled from {width:g}x{height:g} to {size[0]}x{size[1]}")
+        notes.append(f"The calibration is scaled from {width:g}x{height:g} to {size[0]}x{size[1]}.")
     sx, sy = size[0] / width, size[1] / height
     camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
     distortion = _distortion(path, values.get("distortion"), notes)
@@ -124,7 +124,7 @@ def _number(path: Path, values: dict[str, Any], name: str) -> float:
 def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | None:
     if value is None or isinstance(value, str):
         said = f' (the calibration says "{value}")' if value else ""
-        notes.append(f"no distortion coefficients given: lens distortion taken as zero{said}")
+        notes.append(f"No distortion coefficients are given: the lens distortion is taken as zero{said}.")
         return None
     values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
     name, numbers = values.get("model"), values.get("coefficients")

@@ -10,7 +10,7 @@ from dreamdrive.data.pose_files import PoseRows, read_pose_file, write_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
 
-_CLOCK_NOTE = "times in the pose file are counted from its first row, which is taken as frame 0 of the input"
+_CLOCK_NOTE = "The times of the pose file count from its first row, taken as frame 0 of the input."
 
 
 def read_trajectory(path: Path) -> Trajectory:

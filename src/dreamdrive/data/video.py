@@ -102,10 +102,10 @@ def _raw(frame: VideoFrame, index: int, first_s: float | None) -> RawFrame:
     quarters = round(frame.rotation / 90) % 4
     notes: list[str] = []
     if frame.is_corrupt:
-        notes.append(f"frame {index} of the video is damaged")
+        notes.append(f"Frame {index} of the video is damaged.")
     if quarters:
         rgb = np.ascontiguousarray(np.rot90(rgb, quarters))
-        notes.append("the video is turned upright as its header asks")
+        notes.append("The video is turned upright as its header asks.")
     now_s = _time_s(frame)
     time_s = None if now_s is None or first_s is None else now_s - first_s
     return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes))

@@ -6,10 +6,12 @@ from types import MappingProxyType
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.replay import replay
+from dreamdrive.prior.street_world import street_world
 
 PRIORS: Mapping[str, Prior] = MappingProxyType(
     {
         "replay": replay,
+        "street-world": street_world,
     }
 )
 """Every prior by the name that ``--prior`` takes."""
@@ -26,4 +28,4 @@ def choose_prior(name: str) -> Prior:
     return PRIORS[name]
 
 
-__all__ = ["PRIORS", "Prior", "choose_prior", "replay"]
+__all__ = ["PRIORS", "Prior", "choose_prior", "replay", "street_world"]
