@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.geometry.classical.confidence import agreement, combine, temporal_neighbours
-from dreamdrive.geometry.classical.depth import Swept, sweep_frame
+from dreamdrive.geometry.classical.depth import sweep_frames
 from dreamdrive.geometry.classical.moving import FLAGGED, moving_evidence, standing_evidence
 from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
 from dreamdrive.geometry.classical.upright import upright_depth
-from dreamdrive.geometry.classical.view import View, make_view, parallel, single_threaded_opencv
+from dreamdrive.geometry.classical.view import View, make_view, single_threaded_opencv
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Ground
@@ -107,10 +107,7 @@ def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
 def _swept(
     view: View, sky: Bool[np.ndarray, "f h w"]
 ) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
-    def one(frame: int) -> Swept | None:
-        return sweep_frame(view, frame, sky[frame])
-
-    found = dict(zip(view.frames, parallel(one, view.frames), strict=True))
+    found = sweep_frames(view, sky)
     inverse = np.zeros(view.grey.shape, np.float32)
     confidence = np.zeros(view.grey.shape, np.float32)
     for frame, swept in found.items():

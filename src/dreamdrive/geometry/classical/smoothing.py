@@ -1,5 +1,6 @@
 """Semi-global smoothing of a cost volume (Hirschmueller, 2008)."""
 
+import cv2
 import numpy as np
 from jaxtyping import Float
 
@@ -8,28 +9,40 @@ _P2 = 0.9  # a jump, on a featureless neighbourhood
 _P2_GRADIENT = 8.0  # grey levels at which the jump costs half
 
 
-def semi_global(
-    cost: Float[np.ndarray, "h labels w"], grey: Float[np.ndarray, "h w"]
-) -> Float[np.ndarray, "h labels w"]:
-    """Sum of the path costs over four directions (H, labels, W), float32.
+class Workspace:
+    """Buffers for one cost volume: fresh memory of this size costs more than the arithmetic on it."""
+
+    def __init__(self, height: int, labels: int, width: int) -> None:
+        self.cost = np.zeros((height, labels, width), np.float32)
+        self.total = np.zeros_like(self.cost)
+        self.turned_cost = np.zeros((width, labels, height), np.float32)
+        self.turned_total = np.zeros_like(self.turned_cost)
+
+
+def semi_global(work: Workspace, grey: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h labels w"]:
+    """Sum of the path costs over four directions (H, labels, W), float32, in ``work.total``.
 
     Args:
-        cost: Matching cost, lower is better.
+        work: ``work.cost`` holds the matching cost, lower is better; it is left as it is.
         grey: The picture; jumps are cheaper across its edges.
     """
-    total = _both_ways(cost, grey)
-    sideways = _both_ways(np.ascontiguousarray(cost.transpose(2, 1, 0)), np.ascontiguousarray(grey.T))
-    total += sideways.transpose(2, 1, 0)
-    return total
+    for label in range(work.cost.shape[1]):
+        work.turned_cost[:, label] = cv2.transpose(np.ascontiguousarray(work.cost[:, label]))
+    _both_ways(work.cost, grey, work.total)
+    _both_ways(work.turned_cost, np.ascontiguousarray(grey.T), work.turned_total)
+    for label in range(work.cost.shape[1]):
+        work.total[:, label] += cv2.transpose(np.ascontiguousarray(work.turned_total[:, label]))
+    return work.total
 
 
 def _both_ways(
-    cost: Float[np.ndarray, "n labels m"], grey: Float[np.ndarray, "n m"]
-) -> Float[np.ndarray, "n labels m"]:
-    """Path costs down and up the first axis, added."""
+    cost: Float[np.ndarray, "n labels m"],
+    grey: Float[np.ndarray, "n m"],
+    total: Float[np.ndarray, "n labels m"],
+) -> None:
+    """Path costs down and up the first axis, added, into ``total``."""
     jump = np.float32(_P2) / (1 + np.abs(np.diff(grey, axis=0)) / np.float32(_P2_GRADIENT))
     jump = np.maximum(jump, np.float32(_P1)).astype(np.float32)
-    total = np.empty_like(cost)
     total[0] = path = cost[0].copy()
     for i in range(1, len(cost)):
         path = _step(path, cost[i], jump[i - 1])
@@ -39,7 +52,6 @@ def _both_ways(
     for i in range(len(cost) - 2, -1, -1):
         path = _step(path, cost[i], jump[i])
         total[i] += path
-    return total
 
 
 def _step(

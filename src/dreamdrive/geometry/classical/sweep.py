@@ -11,10 +11,16 @@ from dreamdrive.scene.camera import Camera
 LABELS = 64
 MAX_INVERSE_DEPTH = 0.30  # 1/m; nearest plane 3.3 m
 BASELINES_M = (0.8, 2.0)
+UNSEEN_SCORE = 0.0
 REACH_FRAMES = 5
 _WINDOW_PX = 5
 _NOISE = 6.0**2  # grey levels squared, added to both variances: noise on bare asphalt must not correlate
+_CENTRE = 128.0
 _OUTSIDE_PX = -10.0
+_UNSEEN = np.float32(-2)
+_MIN_Z = 0.05  # of the reference's depth; nearer to the source's image plane a point is not projected
+_LINEAR = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+_NEAREST = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
 
 
 def inverse_depths() -> Float[np.ndarray, " labels"]:
@@ -50,9 +56,19 @@ class Warp:
     def __init__(self, reference: Camera, source: Camera) -> None:
         relative = source.camera_from_world @ reference.world_from_camera
         rotated = reference.rays() @ relative[:3, :3].T
-        self.source = source
+        self.reference, self.source = reference, source
+        self.rotation = relative[:3, :3]
         self.translation = relative[:3, 3]
         self.rotated = np.ascontiguousarray(np.moveaxis(rotated, -1, 0)).astype(np.float32)
+
+    def homography(self, inverse_depth: float) -> Float[np.ndarray, "3 3"]:
+        """Source from reference pixel indices (3, 3) for the plane z = 1 / inverse_depth of the reference."""
+        shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+        plane = self.rotation.copy()
+        plane[:, 2] += inverse_depth * self.translation
+        return (
+            np.linalg.inv(shift) @ self.source.matrix @ plane @ np.linalg.inv(self.reference.matrix) @ shift
+        )
 
     def __call__(
         self, inverse_depth: Float[np.ndarray, "h w"] | float
@@ -62,7 +78,7 @@ class Warp:
             self.rotated[k] + np.float32(self.translation[k]) * np.asarray(inverse_depth, np.float32)
             for k in range(3)
         )
-        front = z > 0.05
+        front = z > _MIN_Z
         z = np.where(front, z, 1).astype(np.float32)
         camera = self.source
         u = np.float32(camera.fx_px) * x / z + np.float32(camera.cx_px - 0.5)
@@ -72,25 +88,39 @@ class Warp:
 
 
 class Correlation:
-    """Normalised cross-correlation of one reference picture with warped pictures, over a square window."""
+    """Normalised cross-correlation of one reference picture with warped pictures, over a square window.
+
+    Keeps working buffers, so one object serves one thread.
+    """
 
     def __init__(self, grey: Float[np.ndarray, "h w"], window_px: int = _WINDOW_PX) -> None:
-        self.window = (window_px, window_px)
+        self._row = np.full(window_px, 1 / window_px, np.float32)
         # Centred values keep the differences of squares exact enough in float32.
-        self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(128)
-        self.mean = self._box(self.grey)
-        self.variance = np.maximum(self._box(self.grey * self.grey) - self.mean * self.mean, 0)
+        self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(_CENTRE)
+        self._buffers = [np.empty_like(self.grey) for _ in range(4)]
+        self.mean = self._box(self.grey, np.empty_like(self.grey))
+        square = self._box(self.grey * self.grey, np.empty_like(self.grey))
+        self.variance = np.maximum(square - self.mean * self.mean, 0)
 
-    def _box(self, image: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
-        return cv2.boxFilter(image, cv2.CV_32F, self.window, borderType=cv2.BORDER_REFLECT)
+    def _box(self, image: Float[np.ndarray, "h w"], out: np.ndarray) -> Float[np.ndarray, "h w"]:
+        # Faster than boxFilter on one channel of float32.
+        return np.asarray(cv2.sepFilter2D(image, cv2.CV_32F, self._row, self._row, out))
 
     def __call__(self, warped: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
         """Correlation in [-1, 1] with a picture (H, W) on the reference's grid, values in grey levels."""
-        other = warped - np.float32(128)
-        mean = self._box(other)
-        variance = np.maximum(self._box(other * other) - mean * mean, 0)
-        covariance = self._box(self.grey * other) - self.mean * mean
-        return covariance / np.sqrt((self.variance + _NOISE) * (variance + _NOISE))
+        other, mean, product, square = self._buffers
+        np.subtract(warped, np.float32(_CENTRE), out=other)
+        self._box(other, mean)
+        self._box(np.multiply(other, other, out=product), square)
+        np.subtract(square, np.multiply(mean, mean, out=product), out=square)
+        np.maximum(square, 0, out=square)
+        square += np.float32(_NOISE)
+        square *= self.variance + np.float32(_NOISE)
+        np.sqrt(square, out=square)
+        covariance = self._box(np.multiply(self.grey, other, out=product), np.empty_like(other))
+        covariance -= np.multiply(self.mean, mean, out=mean)
+        covariance /= square
+        return covariance
 
 
 def sample(
@@ -111,38 +141,64 @@ def inside(
     return within & (cv2.remap(valid.astype(np.uint8), x, y, cv2.INTER_NEAREST) > 0)
 
 
+class BestTwo:
+    """Running mean of the best two correlations of each pixel."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.best = np.full(shape, _UNSEEN, np.float32)
+        self.second = self.best.copy()
+
+    def add(self, score: Float[np.ndarray, "h w"], seen: Bool[np.ndarray, "h w"]) -> None:
+        """Take in the correlations with one source, where it sees the point; ``score`` is used up."""
+        # Arithmetic instead of a masked copy, which is several times slower.
+        score -= _UNSEEN
+        score *= seen.view(np.uint8)
+        score += _UNSEEN
+        np.maximum(self.second, np.minimum(self.best, score), out=self.second)
+        np.maximum(self.best, score, out=self.best)
+
+    def mean(self) -> Float[np.ndarray, "h w"]:
+        """Mean of the best two, the only one, or ``UNSEEN_SCORE`` where no source sees the point."""
+        two = np.where(self.second > _UNSEEN, (self.best + self.second) * np.float32(0.5), self.best)
+        return np.where(self.best > _UNSEEN, two, np.float32(UNSEEN_SCORE))
+
+
+Source = tuple[Warp, np.ndarray, np.ndarray]
+"""Warp into a source, its grey picture and its usable pixels."""
+
+
 def similarity(
-    correlation: Correlation,
-    sources: Sequence[tuple[Warp, Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]],
-    inverse_depth: Float[np.ndarray, "h w"] | float,
+    correlation: Correlation, sources: Sequence[Source], inverse_depth: Float[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w"]:
-    """Mean of the best two correlations over the sources; 0 where no source sees the point.
-
-    Args:
-        correlation: The reference picture.
-        sources: Warp, grey picture and usable pixels of each source.
-        inverse_depth: One plane or a value a pixel, in 1/m.
-    """
-    best = second = np.full(correlation.grey.shape, -2, np.float32)
-    for warp, grey, valid in sources:
+    """Mean of the best two correlations over the sources, at an inverse depth (H, W) in 1/m."""
+    found = BestTwo(correlation.grey.shape)
+    for warp, grey, usable in sources:
         x, y = warp(inverse_depth)
-        seen = inside(x, y, valid)
-        score = np.where(seen, correlation(sample(grey, x, y)), np.float32(-2))
-        best, second = np.maximum(best, score), np.maximum(second, np.minimum(best, score))
-    two = np.where(second > -2, (best + second) / 2, best)
-    return np.where(best > -2, two, np.float32(0))
+        found.add(correlation(sample(grey, x, y)), inside(x, y, usable))
+    return found.mean()
 
 
-def matching_volume(
-    correlation: Correlation,
-    sources: Sequence[tuple[Warp, Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]],
-) -> Float[np.ndarray, "h labels w"]:
-    """``similarity`` for every plane of ``inverse_depths()`` (H, labels, W), float32."""
+def matching_cost(
+    correlation: Correlation, sources: Sequence[Source], cost: Float[np.ndarray, "h labels w"]
+) -> None:
+    """One minus ``similarity`` for every plane of ``inverse_depths()``, into ``cost`` (H, labels, W)."""
     height, width = correlation.grey.shape
-    volume = np.empty((height, LABELS, width), np.float32)
     for label, inverse in enumerate(inverse_depths()):
-        volume[:, label] = similarity(correlation, sources, float(inverse))
-    return volume
+        found = BestTwo((height, width))
+        for warp, grey, usable in sources:
+            # A plane parallel to the image maps by a homography, which OpenCV walks faster than a map.
+            homography = warp.homography(float(inverse))
+            warped = cv2.warpPerspective(
+                grey, homography, (width, height), flags=_LINEAR, borderMode=cv2.BORDER_REPLICATE
+            )
+            seen = cv2.warpPerspective(
+                usable.view(np.uint8), homography, (width, height), flags=_NEAREST
+            ).view(np.bool_)
+            z = warp.rotated[2] + np.float32(warp.translation[2] * inverse)
+            if z.min() <= _MIN_Z:
+                seen &= z > _MIN_Z
+            found.add(correlation(warped), seen)
+        np.subtract(1, found.mean(), out=cost[:, label])
 
 
 def nearest_label(inverse_depth: Float[np.ndarray, "h w"]) -> Int[np.ndarray, "h w"]:

@@ -14,7 +14,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Ground
 
-_THREADS = 2
+THREADS = 2
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -80,5 +80,5 @@ def single_threaded_opencv() -> Generator[None]:
 
 def parallel(function: Callable[[A], B], items: Iterable[A]) -> list[B]:
     """``function`` of each item, in order, two at a time; the result does not depend on the threads."""
-    with ThreadPoolExecutor(_THREADS) as pool:
+    with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(function, items))
