@@ -130,3 +130,9 @@ def test_a_standing_camera_and_an_empty_street() -> None:
 def test_nonsense_is_refused() -> None:
     with pytest.raises(ValueError, match="cannot make 0 frames"):
         make_street(frames=0)
+
+
+def test_the_ground_plane_gives_the_depth_of_the_road(street: Street) -> None:
+    depth = street.ground.depth_m(street.cameras[0])
+    road = (street.instance[0] == 0)[80:, 50:110]
+    np.testing.assert_allclose(depth[80:, 50:110][road], street.depth_m[0][80:, 50:110][road], rtol=1e-4)

@@ -42,7 +42,7 @@ def labelled(image: Image, text: str) -> Image:
 
 
 def score_colours(score: Float[np.ndarray, "h w"]) -> Image:
-    """A share in [0, 1] from black (static) through red to yellow (dynamic)."""
+    """A share in [0, 1] from black (static) through red and yellow to white (dynamic)."""
     scaled = np.rint(np.clip(score, 0, 1) * 255).astype(np.uint8)
     return cv2.cvtColor(cv2.applyColorMap(scaled, cv2.COLORMAP_HOT), cv2.COLOR_BGR2RGB)
 

@@ -49,7 +49,7 @@ class Ground:
 
     def height_m(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
         """Height of points (..., 3) above the plane."""
-        return points_world @ self.normal_world + self.offset_m
+        return np.asarray(points_world @ self.normal_world + self.offset_m)
 
     def depth_m(self, camera: Camera) -> Float[np.ndarray, "h w"]:
         """Depth along z (H, W) at which each pixel's ray meets the plane; infinite above the horizon."""
