@@ -45,12 +45,12 @@ static inline V masked(I mask, V v) { return (V)((I)v & mask); }
 static inline V vabs(V v) { return (V)((I)v & 0x7fffffff); }
 
 static inline V vsqrt(V v) {
-  V r;
+  V r = V{};
   for (int l = 0; l < kLanes; l++) r[l] = __builtin_sqrtf(v[l]);
   return r;
 }
 static inline V vlog2(V v) {
-  V r;
+  V r = V{};
   for (int l = 0; l < kLanes; l++) r[l] = __builtin_log2f(v[l]);
   return r;
 }

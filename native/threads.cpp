@@ -40,31 +40,40 @@ class Pool {
       task_ = &task;
       size_ = n;
       next_ = 0;
-      busy_ = count_ - 1;
       round_++;
     }
     wake_.notify_all();
-    work(0);
+    work(0, task, n);
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      task_ = nullptr;  // who wakes up only now has nothing to do, and is not waited for
+    }
     for (int spin = 0; busy_ != 0; spin++)
       if (spin > kSpins) std::this_thread::yield();
   }
 
  private:
-  void work(int worker) {
-    for (int64_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < size_;) (*task_)(i, worker);
+  void work(int worker, const std::function<void(int64_t, int)>& task, int64_t n) {
+    for (int64_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < n;) task(i, worker);
   }
 
   void serve(int worker) {
     for (uint64_t seen = 0;;) {
       for (int spin = 0; spin < kSpins && round_ == seen; spin++) {
       }
+      const std::function<void(int64_t, int)>* task = nullptr;
+      int64_t n = 0;
       {
         std::unique_lock<std::mutex> lock(mutex_);
         wake_.wait(lock, [&] { return stopping_ || round_ != seen; });
         if (stopping_) return;
         seen = round_;
+        if (!task_) continue;
+        task = task_;
+        n = size_;
+        busy_++;
       }
-      work(worker);
+      work(worker, *task, n);
       busy_--;
     }
   }

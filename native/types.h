@@ -95,7 +95,8 @@ struct SsimTask {
   float* scratch;                               // kSsimScratchRows * ssim_row(width)
 };
 constexpr int kSsimRadius = 5, kSsimScratchRows = 5 * (1 + 11);
-static inline int ssim_row(int width) { return 3 * (width + 2 * kSsimRadius); }
+// Floats of one row with its padding, rounded up so that whole lanes may be read past the end.
+static inline int ssim_row(int width) { return (3 * (width + 2 * kSsimRadius) + 31) / 16 * 16; }
 
 // The same functions compiled for one instruction set.
 struct Kernels {
