@@ -1,0 +1,228 @@
+"""Cameras of a clip: the order of work from known poses over structure from motion to the fallback."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical import evidence as looking
+from dreamdrive.geometry.classical import odometry, scale
+from dreamdrive.geometry.classical.evidence import Evidence
+from dreamdrive.geometry.classical.known import depth_points, depth_ratios
+from dreamdrive.geometry.classical.paths import fill, rebase
+from dreamdrive.geometry.classical.reconstruct import Outcome, reconstruct
+from dreamdrive.geometry.classical.scale import Metric, Street
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Focal, Ground, Scale
+
+MIN_TRACKS = 10
+FALLBACK_SPREAD, STANDING_SPREAD = 0.35, 0.5
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A clip with cameras, in metres, in the frame of the first camera.
+
+    Attributes:
+        cameras: One posed pinhole a frame.
+        fixed_regions: 0 for the street, else 1 + index into ``region_names`` (H, W).
+        region_names: Names of what is fixed to the camera.
+        ground: The road plane, where found.
+        scale: What fixed the metric scale.
+        focal: Focal length and whether it was observed.
+        standing: Whether the whole clip stands still.
+        fallback: Why structure from motion was not used, in words, or None.
+        detected: What was noticed, a sentence each.
+        details: Figures, as JSON values.
+    """
+
+    cameras: tuple[Camera, ...]
+    fixed_regions: Int[np.ndarray, "h w"]
+    region_names: tuple[str, ...]
+    ground: Ground | None
+    scale: Scale
+    focal: Focal
+    standing: bool
+    fallback: str | None
+    detected: tuple[str, ...]
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Posed:
+    """Pose every frame of a clip.
+
+    Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
+    motion, which would register it on whatever drives through the picture. Else structure from motion is tried
+    and judged, and frame-to-frame odometry takes over when it is refused.
+
+    Args:
+        clip: Frames of one camera, or of several whose poses are known.
+        camera_height_m: Height of the camera above the road, when the user gave it; None assumes 1.5 m.
+        seed: Seed of everything random; the same seed gives the same poses.
+
+    Raises:
+        InputError: Without frames; for several cameras without poses; for a camera height that is not positive.
+    """
+    _check(clip, camera_height_m)
+    evidence = looking.look(clip)
+    if clip.known.world_from_camera is not None:
+        return _from_known(clip, evidence, camera_height_m, seed)
+    if evidence.motion.tracks < MIN_TRACKS and len(clip) > 1:
+        reason = "the frames are too dark or too blank to follow anything: the camera is taken to stand still"
+        return _standing(clip, evidence, camera_height_m, reason)
+    if evidence.motion.standing:
+        reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
+        return _standing(clip, evidence, camera_height_m, reason)
+    grey, usable = looking.working_frames(clip, evidence)
+    outcome = reconstruct(
+        grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed
+    )
+    if outcome.settled is None:
+        return _from_odometry(clip, evidence, outcome, camera_height_m)
+    return _from_model(clip, evidence, outcome, camera_height_m, seed)
+
+
+def _check(clip: Clip, camera_height_m: float | None) -> None:
+    if len(clip) == 0:
+        raise InputError("The clip holds no frame; at least two are needed for geometry from motion.")
+    if camera_height_m is not None and not (np.isfinite(camera_height_m) and camera_height_m > 0):
+        raise InputError(f"The camera height is {camera_height_m} m; give a positive height above the road.")
+    if len(clip.rig) > 1 and clip.known.world_from_camera is None:
+        raise InputError(
+            f"The clip has {len(clip.rig)} cameras and no poses; classical geometry poses one camera only. "
+            "Give the poses, or select the frames of one camera."
+        )
+
+
+def _from_model(
+    clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int
+) -> Posed:
+    """Cameras of an accepted sparse model, scaled to metres."""
+    assert outcome.settled is not None
+    model, observed = outcome.settled.model, outcome.settled.observed
+    camera = clip.rig[0]
+    if not clip.known.intrinsics and observed:
+        factor = float(model.lens[0]) / evidence.working.fx_px
+        camera = replace(camera, fx_px=camera.fx_px * factor, fy_px=camera.fy_px * factor)
+    filled = fill(model.world_from_camera, clip.times_s)
+    poses, points = rebase(filled, model.points)
+    small = camera.resized(evidence.small.width_px, evidence.small.height_px)
+    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
+    ratios = depth_ratios(clip, camera, poses, points, model.seen)
+    if len(ratios):
+        metric = scale.from_depth(ratios, street, seed)
+    else:
+        metric = scale.from_ground(street, height_m, observed, seed)
+    poses[:, :3, 3] *= metric.factor
+    placed = int(model.registered.sum())
+    notes = list(outcome.notes) + list(metric.notes)
+    if placed < len(clip):
+        notes.append(f"{len(clip) - placed} of {len(clip)} frames were placed between their neighbours")
+    details = {**outcome.figures, "residual_radial": float(model.lens[4]), "metres_per_unit": metric.factor}
+    return _posed(clip, evidence, poses, camera, metric, observed, notes, details)
+
+
+def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
+    """The user's poses, moved so that the first frame's camera is the world; the road is only looked for."""
+    assert clip.known.world_from_camera is not None
+    points = depth_points(clip)
+    poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
+    one_camera = clip.camera == clip.camera[0]
+    street = Street(
+        evidence.grey[one_camera],
+        evidence.street[one_camera],
+        clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px),
+        poses[one_camera],
+        points,
+        clip.times_s[one_camera],
+    )
+    plane, _ = scale.find_ground(street, seed, scale.KNOWN_HEIGHTS_M)
+    ground = None if plane is None else Ground(plane.normal, plane.offset)
+    metric = Metric(1.0, ground, Scale("poses", 0.0), ())
+    notes = ["the given poses are used"]
+    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > 0.15:
+        notes.append(f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m")
+    posed = _posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, {})
+    return replace(posed, standing=evidence.motion.standing and _path_m(poses) < 0.5)
+
+
+def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:
+    """One pose for all frames above an assumed level road."""
+    poses = np.tile(np.eye(4), (len(clip), 1, 1))
+    points = depth_points(clip)
+    camera = clip.rig[0]
+    street = Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
+    plane = None
+    if len(points):
+        plane, _ = scale.find_ground(street, 0)
+    metric = _level_road(height_m, STANDING_SPREAD)
+    if clip.known.depth_m is not None:
+        ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
+        metric = replace(metric, ground=ground, scale=Scale("depth", 0.0))
+    posed = _posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
+    return replace(posed, standing=True, fallback=reason)
+
+
+def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None) -> Posed:
+    """Frame-to-frame odometry over an assumed level road."""
+    metric = _level_road(height_m, FALLBACK_SPREAD)
+    wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
+    if len(clip) == 1:
+        path = odometry.Odometry(np.eye(4)[None], np.zeros(0), True)
+    else:
+        path = odometry.drive(evidence.grey, evidence.street, evidence.small, clip.times_s, wanted)
+    reason = "structure from motion was refused: " + "; ".join(outcome.reasons)
+    notes = [reason, "the path comes from frame-to-frame odometry and is rough"]
+    if not path.measured:
+        speed = odometry.DEFAULT_SPEED_M_S
+        notes.append(f"the road shows no clear motion: a constant speed of {speed:.0f} m/s is assumed")
+        metric = replace(metric, scale=Scale(f"none: a speed of {speed:.0f} m/s is assumed", scale.SPEED_SPREAD))
+    details = {**outcome.figures, "odometry_measured": path.measured}
+    observed = clip.known.intrinsics
+    posed = _posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
+    return replace(posed, fallback=reason)
+
+
+def _level_road(height_m: float | None, spread: float) -> Metric:
+    wanted, word = (scale.USUAL_HEIGHT_M, "assumed") if height_m is None else (height_m, "given")
+    source = f"level road assumed, camera height {wanted:.2f} m ({word})"
+    return Metric(1.0, Ground(np.array([0.0, -1.0, 0.0]), wanted), Scale(source, spread), ())
+
+
+def _posed(
+    clip: Clip,
+    evidence: Evidence,
+    poses: Float[np.ndarray, "f 4 4"],
+    camera: Camera,
+    metric: Metric,
+    observed: bool,
+    notes: list[str],
+    details: dict[str, Any],
+) -> Posed:
+    rig = [camera, *clip.rig[1:]]
+    cameras = tuple(rig[int(index)].at(pose) for index, pose in zip(clip.camera, poses, strict=True))
+    figures = {
+        "flow_px_at_320": float(np.median(evidence.motion.flow_px)) if len(clip) > 1 else 0.0,
+        "moving_steps": int(evidence.motion.moving.sum()),
+        "brightness": evidence.motion.brightness,
+        "path_m": _path_m(poses),
+    }
+    return Posed(
+        cameras=cameras,
+        fixed_regions=evidence.fixed.regions,
+        region_names=evidence.fixed.names,
+        ground=metric.ground,
+        scale=metric.scale,
+        focal=Focal(camera.fx_px, observed),
+        standing=False,
+        fallback=None,
+        detected=evidence.detected + tuple(notes),
+        details=figures | details,
+    )
+
+
+def _path_m(poses: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())

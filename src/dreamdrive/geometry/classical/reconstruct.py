@@ -1,0 +1,102 @@
+"""Structure from motion of a clip with its gate: a believable model, or why there is none."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from dreamdrive.geometry.classical import features, gate, sfm
+from dreamdrive.geometry.classical.features import Features
+from dreamdrive.geometry.classical.focal import Settled, settle
+from dreamdrive.scene.camera import Camera
+
+MIN_FRAMES = 3
+MIN_FEATURES = 60
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What structure from motion gave.
+
+    Attributes:
+        settled: The accepted model, or None.
+        reasons: Why there is none, in words.
+        notes: What else was noticed, a sentence each.
+        figures: Figures of the gate and the focal test, as JSON values.
+    """
+
+    settled: Settled | None
+    reasons: tuple[str, ...]
+    notes: tuple[str, ...]
+    figures: dict[str, Any]
+
+
+def reconstruct(
+    grey: UInt8[np.ndarray, "f h w"],
+    usable: Bool[np.ndarray, "f h w"],
+    camera: Camera,
+    moving: Bool[np.ndarray, " s"],
+    calibrated: bool,
+    seed: int,
+) -> Outcome:
+    """Global mapping, focal test and gate; incremental mapping when the gate refuses; else the reasons.
+
+    Args:
+        grey: Frames at the working size.
+        usable: Pixels in which features may lie.
+        camera: Pinhole of the working size.
+        moving: Steps in which the picture moves.
+        calibrated: Whether the focal length is known.
+        seed: Seed of everything random.
+    """
+    if len(grey) < MIN_FRAMES:
+        return _refused(f"{len(grey)} frames are too few for structure from motion")
+    found = features.extract(grey, usable)
+    typical = int(np.median([len(entry.keypoints_px) for entry in found]))
+    if typical < MIN_FEATURES:
+        return _refused(f"the frames show too little: {typical} features in a typical one")
+    square, found = _square_pixels(camera, found)
+    notes: list[str] = []
+    reasons: tuple[str, ...] = ()
+    figures: dict[str, Any] = {"features": typical}
+    with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
+        database = Path(folder) / "matches.db"
+        sfm.match(database, found, square, seed)
+        for name, mapper in (("global", sfm.map_globally), ("incremental", sfm.map_incrementally)):
+            model = mapper(database, len(grey), seed)
+            if model is None or model.registered.mean() < 0.5:
+                failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
+            else:
+                settled = settle(database, model, square, calibrated, seed)
+                verdict = gate.judge(settled.model, moving)
+                failed = verdict.reasons
+                figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
+                if not failed:
+                    notes += [settled.note] if settled.note else []
+                    notes += ["the camera drives backwards"] if verdict.backwards else []
+                    notes += [f"{reasons[0]}: mapped again, frame by frame"] if reasons else []
+                    return Outcome(settled, (), tuple(notes), figures)
+            reasons = reasons or failed
+    return Outcome(None, reasons, (), figures)
+
+
+def _refused(reason: str) -> Outcome:
+    return Outcome(None, (reason,), (), {})
+
+
+def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[Features]]:
+    """Stretch y so that both focal lengths agree: COLMAP's radial model has only one."""
+    stretch = camera.fx_px / camera.fy_px
+    square = Camera(
+        camera.fx_px,
+        camera.fx_px,
+        camera.cx_px,
+        camera.cy_px * stretch,
+        camera.width_px,
+        max(1, round(camera.height_px * stretch)),
+    )
+    factor = np.array([1.0, stretch], np.float32)
+    return square, [Features(entry.keypoints_px * factor, entry.descriptors) for entry in found]

@@ -1,0 +1,123 @@
+"""Metric scale and the road plane of a posed clip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.geometry.classical.ground_points import Plane, fit_points
+from dreamdrive.geometry.classical.ground_sweep import Road, sweep
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Ground, Scale
+
+USUAL_HEIGHT_M = 1.5
+KNOWN_HEIGHTS_M = (0.6, 5.0)
+MIN_INLIERS, MIN_SHARE = 100, 0.25
+SPEEDS_M_S = (0.5, 45.0)
+ASSUMED_SPEED_M_S = 8.0
+GIVEN_SPREAD, USUAL_SPREAD, FOCAL_SPREAD, SPEED_SPREAD = 0.03, 0.15, 0.35, 0.6
+
+
+@dataclass(frozen=True)
+class Street:
+    """A clip with poses, in which the road is looked for.
+
+    Attributes:
+        grey: Frames at 320 px width.
+        usable: Pixels that belong to the street.
+        camera: Pinhole at that size.
+        world_from_camera: Poses (F, 4, 4), the first the identity.
+        points: Sparse points (P, 3) in the same units.
+        times_s: Times (F,).
+    """
+
+    grey: UInt8[np.ndarray, "f h w"]
+    usable: Bool[np.ndarray, "f h w"]
+    camera: Camera
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    points: Float[np.ndarray, "p 3"]
+    times_s: Float[np.ndarray, " f"]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How to get to metres.
+
+    Attributes:
+        factor: Metres per unit of the poses.
+        ground: The road in metres, where found.
+        scale: What fixed the scale.
+        notes: What went wrong, a sentence each.
+    """
+
+    factor: float
+    ground: Ground | None
+    scale: Scale
+    notes: tuple[str, ...]
+
+
+def find_ground(street: Street, seed: int, heights: tuple[float, float] | None = None) -> tuple[Plane | None, str]:
+    """The road plane and the name of the estimator that gave it.
+
+    Sparse points decide when at least 100 of them, a quarter of those near the path, lie in the plane; smooth
+    asphalt has too few, and there the plane that best warps the road between frames decides.
+    """
+    plane = fit_points(street.points, street.world_from_camera, seed)
+    if plane is not None and plane.support >= MIN_INLIERS and plane.share >= MIN_SHARE:
+        return plane, "points"
+    road = Road(street.grey, street.usable, street.camera, street.world_from_camera)
+    return sweep(road, heights), "road texture"
+
+
+def from_ground(street: Street, height_m: float | None, focal_observed: bool, seed: int) -> Metric:
+    """Scale from the height of the camera above the road; from an assumed speed when no road is found.
+
+    Args:
+        street: Posed clip in arbitrary units.
+        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
+        focal_observed: A focal length that is only a prior makes the scale as uncertain as itself.
+        seed: Seed of RANSAC.
+    """
+    plane, how = find_ground(street, seed)
+    if plane is None:
+        return _from_speed(street, "no road plane was found")
+    wanted = USUAL_HEIGHT_M if height_m is None else height_m
+    factor = wanted / plane.height
+    speed = _speed(street, factor)
+    if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
+        return _from_speed(street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives")
+    terms = (
+        plane.spread,
+        USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
+        0.0 if focal_observed else FOCAL_SPREAD,
+    )
+    word = "assumed" if height_m is None else "given"
+    source = f"ground plane ({how}), camera height {wanted:.2f} m ({word})"
+    return Metric(
+        factor, Ground(plane.normal, plane.offset * factor), Scale(source, float(np.linalg.norm(terms))), ()
+    )
+
+
+def from_depth(
+    ratios: Float[np.ndarray, " n"], street: Street, seed: int
+) -> Metric:
+    """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
+    factor = float(np.median(ratios))
+    spread = float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
+    plane, _ = find_ground(street, seed)
+    ground = None if plane is None else Ground(plane.normal, plane.offset * factor)
+    return Metric(factor, ground, Scale("depth", spread), ())
+
+
+def _from_speed(street: Street, problem: str) -> Metric:
+    factor = ASSUMED_SPEED_M_S / max(_speed(street, 1.0), 1e-9)
+    words = f"none: {problem}; a speed of {ASSUMED_SPEED_M_S:.0f} m/s is assumed"
+    return Metric(factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on an assumed speed",))
+
+
+def _speed(street: Street, factor: float) -> float:
+    """Median speed (m/s) of the steps that move."""
+    step = np.linalg.norm(np.diff(street.world_from_camera[:, :3, 3], axis=0), axis=1) * factor
+    speed = step / np.maximum(np.diff(street.times_s), 1e-6)
+    moving = speed > 0.15 * speed.max()
+    return float(np.median(speed[moving])) if moving.any() else 0.0
