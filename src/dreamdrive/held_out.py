@@ -113,8 +113,8 @@ def _flow(
     first: UInt8[np.ndarray, "h w 3"], second: UInt8[np.ndarray, "h w 3"]
 ) -> Float[np.ndarray, "h w 2"]:
     method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    grey = [cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second)]
-    return np.asarray(method.calc(*grey, np.zeros((*first.shape[:2], 2), np.float32)))
+    grey, other = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second))
+    return np.asarray(method.calc(grey, other, np.zeros((*first.shape[:2], 2), np.float32)))
 
 
 def _warped(

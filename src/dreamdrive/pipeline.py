@@ -13,6 +13,7 @@ from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry.files import attach
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.options import QUALITIES, Quality, QualityName
@@ -35,6 +36,7 @@ def generate(
     *,
     prior: str = "replay",
     geometry_method: str = "classical",
+    geometry_files: Path | None = None,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
     camera_height_m: float = 1.5,
@@ -52,6 +54,7 @@ def generate(
         out: The output folder, see ``workspace``.
         prior: Name in ``prior.PRIORS``.
         geometry_method: How cameras and depth are found.
+        geometry_files: Folder with cameras and depth to use, see ``geometry.files``.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
@@ -75,13 +78,13 @@ def generate(
         "camera_height_m": camera_height_m,
         **_reading(control),
     }
-    request = {"digests": _digests(control), "options": options, "seed": control.seed}
+    request = {"digests": _digests(control, geometry_files), "options": options, "seed": control.seed}
     recompute = recompute_from is not None
     workspace = open_workspace(out, request, force=force, recompute=recompute)
     if workspace is None:
         return False
     stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-    _publish(workspace, stages, control, _make(stages, control, request))
+    _publish(workspace, stages, control, _make(stages, control, geometry_files, request))
     return True
 
 
@@ -95,21 +98,27 @@ class _Made:
     scored: Scored | None
 
 
-def _make(stages: Stages, control: Control, request: dict[str, Any]) -> _Made:
+def _make(stages: Stages, control: Control, geometry_files: Path | None, request: dict[str, Any]) -> _Made:
     """The stages in their order, each with the results it depends on and the options that change it."""
     chosen, height_m = request["options"], request["options"]["camera_height_m"]
     quality = QUALITIES[chosen["quality"]]
     seed = {name: stage_seed(control.seed, name) for name in STAGES}
 
-    reading = [chosen["prior"], _reading(control), request["digests"], control.seed]
+    files = {name: value for name, value in request["digests"].items() if name != "geometry-files"}
+    reading = [chosen["prior"], _reading(control), files, control.seed]
     clip = stages.run("prior", (), reading, lambda _: choose_prior(chosen["prior"])(control))
 
     method = chosen["geometry"]
     geometry = stages.run(
         "geometry",
         ("prior",),
-        [method, height_m, seed["geometry"]],
-        lambda _: reconstruct(clip, camera_height_m=height_m, seed=seed["geometry"], method=method),
+        [method, height_m, request["digests"].get("geometry-files"), seed["geometry"]],
+        lambda _: reconstruct(
+            clip if geometry_files is None else attach(clip, geometry_files),
+            camera_height_m=height_m,
+            seed=seed["geometry"],
+            method=method,
+        ),
     )
     seeds = stages.run(
         "initialise",
@@ -226,20 +235,22 @@ def _reading(control: Control) -> dict[str, Any]:
     return {k: v for k, v in asdict(control).items() if k not in ("path", "intrinsics", "poses", "seed")}
 
 
-def _digests(control: Control) -> dict[str, str]:
+def _digests(control: Control, geometry_files: Path | None) -> dict[str, str]:
     """Digests of the given files: they count by their content, not by their place."""
+    given = {
+        "input": (control.path, "a video or a folder of images"),
+        "intrinsics": (control.intrinsics, "a calibration file"),
+        "poses": (control.poses, "a file with poses"),
+        "geometry-files": (geometry_files, "a folder with cameras.json"),
+    }
     digests: dict[str, str] = {}
-    for flag, path in (
-        ("", control.path),
-        ("--intrinsics ", control.intrinsics),
-        ("--poses ", control.poses),
-    ):
+    for name, (path, expected) in given.items():
         if path is None:
             continue
         if not path.exists():
-            expected = "a file" if flag else "a video or a folder of images"
+            flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
-        digests[flag.strip(" -") or "input"] = file_digest(path)
+        digests[name] = file_digest(path, deep=name == "geometry-files")
     return digests
 
 

@@ -170,16 +170,19 @@ def _plain(value: object) -> object:
     raise TypeError(f"a stage's options hold a {type(value).__name__}")
 
 
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's content, or of names and contents of the files directly in a folder.
+def file_digest(path: Path, *, deep: bool = False) -> str:
+    """SHA-256 of a file's content, or of names and contents of the files in a folder.
 
-    Hidden files and deeper folders do not count.
+    Args:
+        path: A file or a folder; hidden files in it do not count.
+        deep: Whether the folders in a folder count.
     """
     if path.is_file():
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    files = sorted(f for f in path.iterdir() if f.is_file() and not f.name.startswith("."))
-    return digest([[f.name, file_digest(f)] for f in files])
+    found = path.rglob("*") if deep else path.iterdir()
+    files = sorted(f for f in found if f.is_file() and not f.name.startswith("."))
+    return digest([[f.relative_to(path).as_posix(), file_digest(f)] for f in files])
 
 
 def stage_seed(seed: int, name: str) -> int:

@@ -20,8 +20,8 @@ def export(
     Args:
         out: The folder that generate wrote.
         to: ply is what viewers of 3D Gaussians read.
-        output: NAME.ply for everything at the first recorded time; a folder for static.ply and frames/NNNN.ply,
-            everything at each recorded time.
+        output: NAME.ply for everything at the first recorded time; else a folder for static.ply and, with
+            everything at each recorded time, frames/NNNN.ply.
     """
     from dreamdrive.export import export as write
 

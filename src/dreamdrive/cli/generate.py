@@ -13,25 +13,26 @@ from dreamdrive.errors import InputError
 
 
 def generate(
-    input: Annotated[Positional[Path | None], arg(metavar="INPUT")] = None,
+    input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     prior: Annotated[Literal["replay", "street-world"], arg(metavar="NAME")] = "replay",
     geometry: Annotated[Literal["classical"], arg(metavar="NAME")] = "classical",
     quality: Literal["draft", "standard", "high"] = "standard",
-    frames: Annotated[str | None, arg(metavar="START:STOP:STEP")] = None,
-    fps: Annotated[float | None, arg(metavar="F")] = None,
-    size: Annotated[str | None, arg(metavar="WxH")] = None,
-    intrinsics: Annotated[Path | None, arg(metavar="FILE")] = None,
-    poses: Annotated[Path | None, arg(metavar="FILE")] = None,
-    hfov: Annotated[float | None, arg(metavar="DEG")] = None,
+    frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
+    fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
+    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
+    intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    poses: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    geometry_files: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float, arg(metavar="M")] = 1.5,
-    hold_out: Annotated[int | None, arg(metavar="N")] = None,
+    hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     representation: Literal["static", "deformable", "hybrid"] = "hybrid",
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
-        arg(name="from", metavar="STAGE"),
+        arg(name="from", metavar="STAGE", help_behavior_hint=""),
     ] = None,
     force: bool = False,
 ) -> None:
@@ -48,6 +49,7 @@ def generate(
         size: Size of the frames; without it 480 wide.
         intrinsics: Calibration of the camera as JSON, for the size of the input.
         poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
+        geometry_files: Folder with known cameras and depth: cameras.json and depth/NNNN.npz or .png.
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         hold_out: Withhold every N-th frame to measure how well it is predicted.
@@ -78,6 +80,7 @@ def generate(
             out,
             prior=prior,
             geometry_method=geometry,
+            geometry_files=geometry_files,
             quality=quality,
             representation=representation,
             camera_height_m=camera_height,

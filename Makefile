@@ -1,0 +1,62 @@
+# make demo, make test: each does its own set-up. Needs Python 3.11 or newer, a C++17 compiler and make.
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+PYTEST := $(BIN)/python -m pytest
+PARALLEL ?= -n 2
+
+# Where the demo's results go, and what is reconstructed; nothing means the built-in street.
+OUT ?= out/demo
+INPUT ?=
+OPTIONS ?=
+
+.PHONY: help install demo test ci check format clean
+
+help:
+	@echo "make demo [INPUT=clip.mp4] [OUT=out/demo] [OPTIONS='--quality draft']   a scene and its videos"
+	@echo "make test      the quick tests"
+	@echo "make ci        lint, types, slow tests, examples"
+	@echo "make install   only the set-up, into $(VENV)"
+
+# Third-party packages, pinned; again only when what is wanted changes.
+$(VENV)/.packages: constraints.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0] + "; choose another with make PYTHON=...")'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) install --quiet --constraint constraints.txt scikit-build-core nanobind cmake ninja
+	touch $@
+
+# The package itself: Python is used in place, the C++ core is compiled.
+$(VENV)/.installed: $(VENV)/.packages CMakeLists.txt $(wildcard native/*)
+	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
+	touch $@
+
+install: $(VENV)/.installed
+
+demo: install
+	$(BIN)/dreamdrive generate $(if $(INPUT),'$(INPUT)',--prior street-world) --out '$(OUT)' $(OPTIONS)
+	@echo "Watch $(OUT)/video: drive.mp4, shift.mp4, recorded_beside_rendered.mp4, panels.mp4"
+
+test: install
+	$(PYTEST) $(PARALLEL) -m "not slow and not gpu"
+
+check: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+ci: check
+	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
+	for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)"; done
+
+format: install
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf build out

@@ -1,0 +1,162 @@
+"""The whole pipeline on a street of a few pixels: what it leaves, and that it always leaves the same."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from dreamdrive import Control, InputError, generate, load_scene, options, pipeline
+from dreamdrive.fit import FitOptions
+from dreamdrive.stages import STAGES
+
+TINY = Control(frames="0:6", size=(64, 40), hold_out=4, seed=1)
+
+
+@pytest.fixture(autouse=True)
+def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    draft = options.QUALITIES["draft"]
+    quick = replace(
+        draft, static=FitOptions(steps=6), score=replace(draft.score, steps=6), fit=FitOptions(steps=8)
+    )
+    monkeypatch.setitem(options.QUALITIES, "draft", quick)
+
+
+def make(out: Path, control: Control = TINY, **changes: object) -> bool:
+    settings: dict[str, object] = {"prior": "street-world", "quality": "draft", **changes}
+    return generate(control, out, **settings)  # type: ignore[arg-type]
+
+
+def scene_bytes(out: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in sorted((out / "scene").iterdir())}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """One finished output folder; tests that change it work on their own."""
+    out = tmp_path_factory.mktemp("pipeline") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        few_steps.__wrapped__(patch)  # type: ignore[attr-defined]
+        assert make(out)
+    yield out
+
+
+def test_the_output_folder_holds_what_is_promised(finished: Path) -> None:
+    assert sorted(p.name for p in finished.iterdir()) == [
+        "held_out",
+        "report.json",
+        "report.png",
+        "scene",
+        "stages",
+        "video",
+    ]
+    assert sorted(p.name for p in (finished / "held_out").iterdir()) == ["0002.png"]
+    assert cv2.imread(str(finished / "held_out" / "0002.png")).shape == (40, 64, 3)
+    videos = {p.name: _size(p) for p in (finished / "video").iterdir()}
+    assert videos == {
+        "drive.mp4": (11, 64, 40),
+        "shift.mp4": (11, 64, 40),
+        "recorded_beside_rendered.mp4": (6, 128, 40),
+        "panels.mp4": (6, 128, 80),
+    }
+
+
+def test_the_report_says_what_the_design_promises(finished: Path) -> None:
+    report = json.loads((finished / "report.json").read_text())
+    assert report["version"]
+    assert report["seed"] == 1
+    assert report["options"]["quality"] == "draft"
+    assert set(STAGES) <= set(report["stages"])
+    for record in report["stages"].values():
+        assert set(record) == {"seconds", "peak_rss_mb", "cached"}
+        assert record["peak_rss_mb"] > 50
+    scene = load_scene(finished / "scene")
+    assert report["gaussians"] == {"static": len(scene.static), "dynamic": len(scene.dynamic)}
+    assert set(report["scale"]) == {"source", "spread"}
+    assert set(report["focal"]) == {"px", "observed"}
+    assert list(report["held_out"]) == ["2"]
+    assert set(report["held_out"]["2"]) == {"psnr", "ssim"}
+    assert set(report["baselines"]) == {"repeat_previous", "average_neighbours", "flow_interpolation"}
+    assert "detected" in report
+    assert "fallback" in report
+
+
+def test_a_finished_output_is_left_alone(finished: Path) -> None:
+    before = {p: p.stat().st_mtime_ns for p in finished.rglob("*")}
+    assert not make(finished)
+    assert {p: p.stat().st_mtime_ns for p in finished.rglob("*")} == before
+
+
+def test_two_runs_are_byte_identical(finished: Path, tmp_path: Path) -> None:
+    make(tmp_path / "again")
+    assert scene_bytes(tmp_path / "again") == scene_bytes(finished)
+
+
+@pytest.mark.parametrize("victim", ["fit_static", "fit", "write_videos"])
+def test_a_killed_run_goes_on_to_the_same_bytes(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, victim: str
+) -> None:
+    def killed(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, victim, killed)
+        with pytest.raises(KeyboardInterrupt):
+            make(tmp_path)
+    assert not (tmp_path / "report.json").exists()
+    seen: list[str] = []
+    assert make(tmp_path, progress=lambda stage, done, total: seen.append(stage) if total == 0 else None)
+    assert "prior" not in seen
+    assert "geometry" not in seen
+    assert scene_bytes(tmp_path) == scene_bytes(finished)
+
+
+def test_from_recomputes_and_gives_the_same_bytes(finished: Path, tmp_path: Path) -> None:
+    make(tmp_path)
+    assert make(tmp_path, recompute_from="group")
+    cached = {k: v["cached"] for k, v in json.loads((tmp_path / "report.json").read_text())["stages"].items()}
+    assert [name for name in STAGES if not cached[name]] == ["group", "fit"]
+    assert scene_bytes(tmp_path) == scene_bytes(finished)
+
+
+@pytest.mark.parametrize("representation", ["static", "deformable"])
+def test_the_baselines_come_from_the_same_code(tmp_path: Path, representation: str) -> None:
+    make(tmp_path, representation=representation)
+    scene = load_scene(tmp_path / "scene")
+    assert (len(scene.static) == 0) == (representation == "deformable")
+    assert (len(scene.dynamic) == 0) == (representation == "static")
+    assert (scene.deformation is None) == (representation == "static")
+
+
+def test_another_request_is_refused_and_loses_nothing(finished: Path, tmp_path: Path) -> None:
+    make(tmp_path)
+    before = scene_bytes(tmp_path)
+    with pytest.raises(InputError, match="seed differs"):
+        make(tmp_path, replace(TINY, seed=2))
+    assert scene_bytes(tmp_path) == before
+    make(tmp_path, replace(TINY, hold_out=None), force=True)
+    assert scene_bytes(tmp_path) != before
+    assert not list((tmp_path / "held_out").iterdir())
+
+
+def test_the_input_counts_by_its_content(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (40, 64, 3), np.uint8)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        for i in range(3):
+            cv2.imwrite(str(tmp_path / folder / f"{i}.png"), np.roll(picture, 2 * i, axis=1))
+    make(tmp_path / "out", Control(tmp_path / "a", size=(64, 40)), prior="replay")
+    assert not make(tmp_path / "out", Control(tmp_path / "b", size=(64, 40)), prior="replay")
+    cv2.imwrite(str(tmp_path / "b" / "1.png"), picture)
+    with pytest.raises(InputError, match="another input"):
+        make(tmp_path / "out", Control(tmp_path / "b", size=(64, 40)), prior="replay")
+
+
+def _size(path: Path) -> tuple[int, int, int]:
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        return sum(1 for _ in container.decode(stream)), stream.width, stream.height
