@@ -55,7 +55,9 @@ class Camera:
     @property
     def matrix(self) -> Float[np.ndarray, "3 3"]:
         """Intrinsic matrix (3, 3) for pixel coordinates with centres at +0.5."""
-        return np.array([[self.fx_px, 0, self.cx_px], [0, self.fy_px, self.cy_px], [0, 0, 1]], dtype=np.float64)
+        return np.array(
+            [[self.fx_px, 0, self.cx_px], [0, self.fy_px, self.cy_px], [0, 0, 1]], dtype=np.float64
+        )
 
     @property
     def camera_from_world(self) -> Float[np.ndarray, "4 4"]:

@@ -39,7 +39,7 @@ class Clip:
         valid: False where the frame holds no picture, such as the corners of an undistorted image (F, H, W).
         held_out: Frames that no fit may see (F,).
         source_index: Index of each frame in the source, in file or decode order (F,).
-        features: Named per-pixel features (F, h, w, C), h and w a whole fraction of H and W: the paper's Z_ref.
+        features: Named per-pixel features (F, h, w, C), the paper's Z_ref; h and w a whole fraction of H, W.
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list

@@ -224,9 +224,9 @@ class DeformationField(nn.Module):
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
-        A cubic through the key frames whose slopes are those of their neighbours (Catmull-Rom): between two key
-        frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off. Before
-        the first and after the last key frame the velocity there continues.
+        A cubic through the key frames whose slopes are those of their neighbours (Catmull-Rom): between two
+        key frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off.
+        Before the first and after the last key frame the velocity there continues.
         """
         times = self.track_times_s.tolist()
         if len(times) < 2:

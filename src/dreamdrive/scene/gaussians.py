@@ -18,10 +18,10 @@ class Gaussians:
         quaternions: Rotations (N, 4), wxyz, not necessarily of unit length.
         log_scales: Natural logarithm of the standard deviations (N, 3) in metres.
         logit_opacities: Logit of the opacities (N,).
-        sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16; colour = SH(direction) + 0.5, floored at 0.
+        sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16; colour = SH(direction) + 0.5, at least 0.
         source_frame: Index of the frame each was seeded from (N,); children keep their parent's.
         features: Pixel-aligned features Z_ref (N, C), or None.
-        lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None when always visible.
+        lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None: always visible.
             Opacity is multiplied by exp(-(t - centre)^2 / (2 deviation^2)).
         actor: Index of the actor each belongs to (N,), or None.
     """

@@ -14,7 +14,7 @@ class Scale:
     """What fixed the metric scale.
 
     Attributes:
-        source: ``"poses"``, ``"depth"``, ``"ground plane, camera height 1.50 m"`` or ``"none: ..."``, in words.
+        source: ``"poses"``, ``"depth"``, ``"ground plane, camera height 1.50 m"``, ``"none: ..."``: in words.
         spread: Relative spread of the scale, as a fraction; infinite when there is no metric scale.
     """
 
