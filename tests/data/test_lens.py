@@ -112,7 +112,7 @@ def test_the_covering_pinhole_reaches_every_pixel(distortion):
     x = lens.apply(rays, wide)[..., 0] * 2 - 1
     ideal = distortion.undistort(lens.camera.rays()[..., :2].reshape(-1, 2))[:, 0].reshape(x.shape)
     pixel = 1 / lens.camera.fx_px
-    assert np.abs(x - ideal).max() < 0.06 * pixel  # OpenCV's lookups are to 1/32 of a pixel
+    assert np.abs(x - ideal).max() < 0.08 * pixel  # OpenCV's lookups are to 1/32 of a pixel
 
 
 def test_a_very_wide_fisheye_is_covered_up_to_a_limit():

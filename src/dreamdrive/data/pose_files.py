@@ -145,10 +145,10 @@ def _pandaset(values: dict[str, Any], where: str, camera: str | None) -> PoseRow
         )
     entry = cast("dict[str, Any]", cameras[camera] if isinstance(cameras[camera], dict) else {})
     poses = _rigid(_array(entry.get("camera_to_world", []), where), where, _pose_name)
-    frames = np.atleast_1d(_array(entry.get("frames", list(range(len(poses)))), where)).astype(int)
-    if ((frames < 0) | (frames >= len(poses))).any():
-        raise InputError(f"{where}: {camera} lists frames beyond its {len(poses)} poses")
-    return PoseRows(poses[frames], None)
+    frames = _array(entry.get("frames", list(range(len(poses)))), where)
+    if frames.ndim != 1 or not len(frames) or not np.isin(frames, np.arange(len(poses))).all():
+        raise InputError(f"{where}: frames of {camera}: expected a list of indices of its {len(poses)} poses")
+    return PoseRows(poses[frames.astype(int)], None)
 
 
 def _array(values: object, where: str) -> Float[np.ndarray, "..."]:

@@ -21,7 +21,7 @@ rounding, while real clips have 0.5 or more in every channel."""
 
 def appearance(
     frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"]
-) -> Float16[np.ndarray, "..."]:
+) -> Float16[np.ndarray, "f _ _ _"]:
     """Colour, edge strength and contrast in neighbourhoods of three sizes.
 
     Per scale five channels (``NAMES``): mean CIE Lab colour, size of the gradient of the mean lightness, and
