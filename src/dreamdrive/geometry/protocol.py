@@ -9,14 +9,14 @@ from dreamdrive.scene.geometry import Geometry
 class Reconstruct(Protocol):
     """The stage F_MVS (eq. 4): from a clip to posed cameras and dense depth."""
 
-    def __call__(self, clip: Clip, *, camera_height_m: float, seed: int) -> Geometry:
+    def __call__(self, clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Geometry:
         """Reconstruct a clip.
 
         Args:
             clip: The frames; what ``clip.known`` holds is used instead of being estimated. Held-out frames
                 get a pose but no depth.
             camera_height_m: Height of the camera above the road, for the metric scale where nothing else
-                gives it.
+                gives it; None assumes 1.5 m.
             seed: Seed of everything random; same clip and seed, same geometry.
         """
         ...

@@ -1,1 +1,34 @@
-""""""
+"""Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
+
+from dreamdrive.geometry.classical.dense import densify
+from dreamdrive.geometry.classical.poses import pose_clip
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+
+def reconstruct(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Geometry:
+    """Pose a clip and find its depth, see ``geometry.protocol``."""
+    posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
+    dense = densify(clip, posed)
+    used = ~clip.held_out
+    shares = {
+        "depth_share": float((dense.depth_m[used] > 0).mean()),
+        "confident_share": float((dense.confidence[used] > 0.25).mean()),
+        "sky_share": float(dense.sky[used].mean()),
+        "moving_share": float((dense.moving[used] >= 0.5).mean()),
+    }
+    return Geometry(
+        cameras=posed.cameras,
+        depth_m=dense.depth_m,
+        confidence=dense.confidence,
+        sky=dense.sky,
+        moving=dense.moving,
+        fixed_regions=posed.fixed_regions,
+        region_names=posed.region_names,
+        ground=posed.ground,
+        scale=posed.scale,
+        focal=posed.focal,
+        detected=posed.detected,
+        fallback=posed.fallback,
+        details={**posed.details, **shares},
+    )

@@ -3,17 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.classical.confidence import agreement, combine, temporal_neighbours
 from dreamdrive.geometry.classical.depth import sweep_frames
 from dreamdrive.geometry.classical.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.classical.poses import Posed
 from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
 from dreamdrive.geometry.classical.upright import upright_depth
 from dreamdrive.geometry.classical.view import View, make_view, single_threaded_opencv
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.geometry import Ground
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
@@ -32,61 +31,47 @@ class Dense:
     moving: Float[np.ndarray, "f h w"]
 
 
-def densify(
-    clip: Clip,
-    cameras: tuple[Camera, ...],
-    fixed_regions: Int[np.ndarray, "h w"],
-    ground: Ground | None,
-) -> Dense:
-    """Depth by plane sweep, or as given, of every frame that is not held out.
+def densify(clip: Clip, posed: Posed) -> Dense:
+    """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
-    Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky.
-
-    Args:
-        clip: The frames; ``clip.known.depth_m`` and ``clip.known.sky`` are used when given.
-        cameras: One posed pinhole a frame, metric.
-        fixed_regions: Nonzero where something fixed to the camera hides the street; stays empty.
-        ground: The road plane, where found.
+    Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
+    as given in ``clip.known.depth_m``, else from the plane sweep, else (standing camera, or poses from the
+    fallback) from the road plane and a backdrop at 40 m, little trusted. What moves is found against the
+    parallax of a moving camera or against the temporal median of a standing one; from fallback poses no such
+    evidence is drawn.
     """
-    view = make_view(clip, cameras, fixed_regions, ground)
+    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground)
+    given = clip.known.depth_m is not None
+    rough = posed.standing or posed.fallback is not None
     with single_threaded_opencv():
         sky = _sky(clip, view)
         if clip.known.depth_m is not None:
             inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
             confidence = (inverse > 0).astype(np.float32)
+        elif rough:
+            inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = _swept(view, sky)
-        moving = moving_evidence(view, inverse, clip.known.depth_m is not None) * ~sky
-        if clip.known.depth_m is None and ground is not None:
+        moving = _moving(view, inverse, given, posed) * ~sky
+        if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _finish(view, inverse, confidence, sky, moving)
 
 
-def plane_and_backdrop(
-    clip: Clip,
-    cameras: tuple[Camera, ...],
-    fixed_regions: Int[np.ndarray, "h w"],
-    ground: Ground,
-    standing: bool,
-) -> Dense:
-    """What is left where there is no usable parallax: the road plane and a backdrop at 40 m, little trusted.
+def _moving(
+    view: View, inverse: Float[np.ndarray, "f h w"], given: bool, posed: Posed
+) -> Float[np.ndarray, "f h w"]:
+    if posed.standing:
+        return standing_evidence(view)
+    if posed.fallback is not None:
+        return np.zeros(inverse.shape, np.float32)
+    return moving_evidence(view, inverse, given)
 
-    Args:
-        clip: The frames.
-        cameras: One pinhole a frame; for a standing camera all alike.
-        fixed_regions: As for ``densify``.
-        ground: The road plane, found or assumed.
-        standing: Whether the camera stands. Then what differs from the temporal median moves; from poses that
-            cannot be trusted no such evidence is drawn.
-    """
-    view = make_view(clip, cameras, fixed_regions, ground)
-    with single_threaded_opencv():
-        sky = _sky(clip, view)
-        inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
-        confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
-        moving = standing_evidence(view) * ~sky if standing else np.zeros(inverse.shape, np.float32)
-        inverse, confidence = _stand_movers(inverse, confidence.astype(np.float32), moving, view)
-    return _finish(view, inverse, confidence, sky, moving)
+
+def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
+    confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
+    return inverse, confidence.astype(np.float32)
 
 
 def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:

@@ -81,7 +81,7 @@ def _flow_from(
 ) -> tuple[np.ndarray, np.ndarray]:
     map_x, map_y = Warp(view.cameras[frame], view.cameras[other])(inverse_depth)
     warped = sample(view.grey[other], map_x, map_y)
-    estimator = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    estimator = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     start = np.zeros((*warped.shape, 2), np.float32)
     flow = estimator.calc(view.grey[frame].astype(np.uint8), np.rint(warped).astype(np.uint8), start)
     x, y = pixel_grid(*warped.shape)
