@@ -17,9 +17,12 @@ REFERENCES, NEIGHBOURS = 7, 3
 MIN_TEXTURE = 2.0
 NOISE = 2.0
 MIN_PEAK = 0.05
+MIN_RADIAL = 0.1
+STILL_NCC = 0.5
+MIN_PIXELS = 50
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class Pair:
     """The road of one frame and the frame it is warped from."""
 
@@ -39,43 +42,70 @@ class Road:
     ) -> None:
         self.grey, self.poses = grey, world_from_camera
         self.intrinsics = camera.matrix
+        self.inverse = np.linalg.inv(self.intrinsics)
         height, width = grey.shape[1:]
-        self.top, self.bottom = round(ROWS[0] * height), round(ROWS[1] * height)
-        self.left, self.right = round(COLUMNS[0] * width), round(COLUMNS[1] * width)
-        rows, columns = np.mgrid[self.top : self.bottom, self.left : self.right]
+        rows, columns = np.mgrid[
+            round(ROWS[0] * height) : round(ROWS[1] * height), round(COLUMNS[0] * width) : round(COLUMNS[1] * width)
+        ]
         self.pixels = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1)
-        road = (slice(None), slice(self.top, self.bottom), slice(self.left, self.right))
-        patches = grey[road].astype(np.float32)
-        self.mean = np.stack([_box(patch) for patch in patches])
-        self.variance = np.stack([_box(patch**2) for patch in patches]) - self.mean**2
-        self.patches = patches
+        road = (slice(None), slice(rows[0, 0], rows[-1, 0] + 1), slice(columns[0, 0], columns[0, -1] + 1))
+        self.patches = grey[road].astype(np.float32)
+        self.mean = np.stack([_box(patch) for patch in self.patches])
+        self.variance = np.stack([_box(patch**2) for patch in self.patches]) - self.mean**2
         self.textured = (self.variance > MIN_TEXTURE**2) & usable[road]
+        self._telling: dict[Pair, np.ndarray] = {}
 
     def agreement(self, pair: Pair, normal: np.ndarray, offset: float) -> float:
-        """Mean clipped NCC (5x5) of the textured road pixels when warped by the plane; NaN without any."""
-        first, second = self.poses[pair.reference], self.poses[pair.source]
-        height = float(normal @ first[:3, 3] + offset)
+        """Mean clipped NCC (5x5) of the telling road pixels when warped by the plane; NaN with too few."""
+        height = float(normal @ self.poses[pair.reference, :3, 3] + offset)
         if height <= 0:
             return 0.0
+        ncc, inside = self._warp(pair, normal, 1 / height)
+        good = inside & self.telling(pair)
+        return float(np.clip(ncc[good], 0, 1).mean()) if good.sum() >= MIN_PIXELS else float("nan")
+
+    def telling(self, pair: Pair) -> np.ndarray:
+        """Pixels that can tell one plane from another.
+
+        Texture must vary along the lines through the point the camera heads for: a lane line along them looks the
+        same at any height. And what does not move at all once rotation is undone is no road: a car ahead that
+        keeps its distance, or a reflection.
+        """
+        if pair not in self._telling:
+            still, _ = self._warp(pair, np.array([0.0, -1.0, 0.0]), 0.0)
+            self._telling[pair] = self.textured[pair.reference] & self._radial(pair) & (still < STILL_NCC)
+        return self._telling[pair]
+
+    def _radial(self, pair: Pair) -> np.ndarray:
+        first, second = self.poses[pair.reference], self.poses[pair.source]
+        towards = self.intrinsics @ (first[:3, :3].T @ (second[:3, 3] - first[:3, 3]))
+        if abs(towards[2]) < 1e-9:
+            return np.ones(self.pixels.shape[:2], bool)
+        ray = self.pixels[..., :2] - towards[:2] / towards[2]
+        ray = (ray / np.maximum(np.linalg.norm(ray, axis=-1, keepdims=True), 1e-9)).astype(np.float32)
+        patch = self.patches[pair.reference]
+        along_x = cv2.Scharr(patch, cv2.CV_32F, 1, 0, scale=1 / 32)
+        along_y = cv2.Scharr(patch, cv2.CV_32F, 0, 1, scale=1 / 32)
+        along = _box((along_x * ray[..., 0] + along_y * ray[..., 1]) ** 2)
+        across = _box((along_x * ray[..., 1] - along_y * ray[..., 0]) ** 2)
+        return (along > 1.0) & (along > MIN_RADIAL * across)
+
+    def _warp(self, pair: Pair, normal: np.ndarray, inverse_height: float) -> tuple[np.ndarray, np.ndarray]:
+        """NCC of the reference's road with the source warped by a plane, and where the warp falls inside."""
+        first, second = self.poses[pair.reference], self.poses[pair.source]
         relative = second[:3, :3].T @ first[:3, :3]
         shift = second[:3, :3].T @ (first[:3, 3] - second[:3, 3])
-        plane = relative - np.outer(shift, first[:3, :3].T @ normal) / height
-        matrix = self.intrinsics @ plane @ np.linalg.inv(self.intrinsics)
-        mapped = (self.pixels @ matrix.T).astype(np.float32)
+        plane = relative - np.outer(shift, first[:3, :3].T @ normal) * inverse_height
+        mapped = (self.pixels @ (self.intrinsics @ plane @ self.inverse).T).astype(np.float32)
         depth = np.maximum(mapped[..., 2], 1e-6)
         x, y = mapped[..., 0] / depth - 0.5, mapped[..., 1] / depth - 0.5
         warped = cv2.remap(self.grey[pair.source], x, y, cv2.INTER_LINEAR, borderValue=0).astype(np.float32)
         rows, columns = self.grey.shape[1:]
-        good = self.textured[pair.reference] & (mapped[..., 2] > 0)
-        good &= (x > 2) & (y > 2) & (x < columns - 3) & (y < rows - 3)
-        if good.sum() < 50:
-            return float("nan")
-        here, mean = self.patches[pair.reference], self.mean[pair.reference]
-        other = _box(warped)
-        covariance = _box(here * warped) - mean * other
-        variance = _box(warped**2) - other**2
-        ncc = covariance / np.sqrt((self.variance[pair.reference] + NOISE) * (np.maximum(variance, 0) + NOISE))
-        return float(np.clip(ncc[good], 0, 1).mean())
+        inside = (mapped[..., 2] > 0) & (x > 2) & (y > 2) & (x < columns - 3) & (y < rows - 3)
+        mean = _box(warped)
+        covariance = _box(self.patches[pair.reference] * warped) - self.mean[pair.reference] * mean
+        variance = np.maximum(_box(warped**2) - mean**2, 0) + NOISE
+        return covariance / np.sqrt((self.variance[pair.reference] + NOISE) * variance), inside
 
 
 def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | None:
@@ -123,7 +153,7 @@ def _pairs(poses: np.ndarray, typical: float) -> list[Pair]:
             source = int(np.argmin(np.abs(apart - wanted * typical)))
             if source != reference and apart[source] > 0.3 * typical:
                 pairs.append(Pair(int(reference), source))
-    return sorted(set(pairs), key=lambda pair: (pair.reference, pair.source))
+    return sorted(set(pairs))
 
 
 def _tilted(poses: np.ndarray, pitch_deg: float, roll_deg: float) -> np.ndarray:

@@ -107,8 +107,9 @@ def _road_scores(
     normal = np.array([0.0, -1.0, 0.0])
     for step, seconds in enumerate(interval):
         poses = np.tile(np.eye(4), (2, 1, 1))
-        poses[1, :3, :3] = turns[step]
+        poses[1, :3, :3], poses[1, :3, 3] = turns[step], directions[step]
         road = Road(grey[step : step + 2], usable[step : step + 2], camera, poses)
+        road.telling(Pair(0, 1))
         for index, speed in enumerate(ladder):
             poses[1, :3, 3] = directions[step] * speed * seconds
             value = road.agreement(Pair(0, 1), normal, height_m)
