@@ -52,16 +52,17 @@ int start(const TileTask& task, const ImageGradients& in, State& state) {
   return deepest + 1;
 }
 
-// Sums over the rows of one strip, still one per column.
-struct ColumnSums {
-  V v = V{}, v_y = V{}, v_yy = V{}, red = V{}, green = V{}, blue = V{}, depth = V{};
+// The sums of EntryGradient, still one per lane.
+struct LaneSums {
+  V v = V{}, v_e = V{}, v_ee = V{}, v_y = V{}, v_ey = V{}, v_yy = V{};
+  V red = V{}, green = V{}, blue = V{}, depth = V{};
 };
 
 static inline void add(V& sum, V value, V factor) { sum += value * factor; }
 
 template <bool kChannels>
-static inline void row_gradient(const TileTask& task, State& state, const Splat& s, int i, int k, V p, float dy,
-                                const float* values, ColumnSums& sums) {
+static inline void row_gradient(const TileTask& task, State& state, const Splat& s, int i, int k, V e, V p,
+                                float dy, const float* values, LaneSums& sums) {
   const I seen = (p >= kMinPower) & (load(state.last + k) >= broadcast(int32_t(i)));
   const V raw = masked(seen, exp2_bounded(p)), alpha = vmin(raw, broadcast(kMaxAlpha));
   const V inverse = 1.0f / (1.0f - alpha);
@@ -83,9 +84,13 @@ static inline void row_gradient(const TileTask& task, State& state, const Splat&
   store(state.behind + k, behind + weight * value);
   const V by_alpha = before * value - behind * inverse;
   const V v = masked(raw <= kMaxAlpha, alpha * by_alpha);
+  const V v_e = v * e, v_y = v * dy;
   sums.v += v;
-  sums.v_y += v * dy;
-  sums.v_yy += v * (dy * dy);
+  sums.v_e += v_e;
+  sums.v_y += v_y;
+  add(sums.v_ee, v_e, e);
+  add(sums.v_ey, v_y, e);
+  sums.v_yy += v_y * dy;
 }
 
 template <bool kChannels>
@@ -94,27 +99,20 @@ void entry_gradient(const TileTask& task, State& state, int i, float left, float
   const Splat& s = task.splats[task.entries[i]];
   const float* values = kChannels ? task.channels + int64_t(s.index) * task.n_channels : nullptr;
   const Span reach = span(s, left, top);
-  V v = V{}, v_x = V{}, v_xx = V{}, v_y = V{}, v_xy = V{}, v_yy = V{};
-  ColumnSums sums;
+  LaneSums sums;
   if (kChannels) __builtin_memset(state.sums, 0, sizeof(float) * kLanes * task.n_channels);
   for (int strip = reach.first_strip; strip <= reach.last_strip; strip++) {
-    const V dx = iota() + (left + 0.5f + float(strip * kLanes) - s.u);
-    const RowPower power(s, dx);
-    sums.v = sums.v_y = sums.v_yy = V{};
+    const Strip lanes(s, left + float(strip * kLanes));
     for (int row = reach.first_row; row <= reach.last_row; row++) {
       if (state.last_of_row[strip * kTile + row] < i) continue;
       const float dy = top + 0.5f + float(row) - s.v;
-      row_gradient<kChannels>(task, state, s, i, at(strip, row), power.at(dy), dy, values, sums);
+      const V e = lanes.e(dy);
+      row_gradient<kChannels>(task, state, s, i, at(strip, row), e, lanes.power(e, dy), dy, values, sums);
     }
-    v += sums.v;
-    v_x += sums.v * dx;
-    v_xx += sums.v * dx * dx;
-    v_y += sums.v_y;
-    v_xy += sums.v_y * dx;
-    v_yy += sums.v_yy;
   }
   float* to = &out.v;
-  const V4 a = sum_lanes(v, v_x, v_xx, v_y), b = sum_lanes(v_xy, v_yy, sums.red, sums.green);
+  const V4 a = sum_lanes(sums.v, sums.v_e, sums.v_ee, sums.v_y);
+  const V4 b = sum_lanes(sums.v_ey, sums.v_yy, sums.red, sums.green);
   const V4 c = sum_lanes(sums.blue, sums.depth, V{}, V{});
   __builtin_memcpy(to, &a, 16);
   __builtin_memcpy(to + 4, &b, 16);
@@ -126,12 +124,15 @@ void entry_gradient(const TileTask& task, State& state, int i, float left, float
 }  // namespace
 
 void composite_backward(const TileTask& task, const ImageGradients& in, EntryGradient* out, float* out_channels) {
+  constexpr int kAhead = 6;
   State state;
   const int n = start(task, in, state), channels = task.n_channels;
   const float left = float(task.tile_x * kTile), top = float(task.tile_y * kTile);
-  for (int i = n - 1; i >= 0; i--)
+  for (int i = n - 1; i >= 0; i--) {
+    if (i >= kAhead) __builtin_prefetch(&task.splats[task.entries[i - kAhead]]);
     channels ? entry_gradient<true>(task, state, i, left, top, out[i], out_channels + int64_t(i) * channels)
              : entry_gradient<false>(task, state, i, left, top, out[i], nullptr);
+  }
   __builtin_memset(out + n, 0, sizeof(EntryGradient) * (task.n_entries - n));
   __builtin_memset(out_channels + int64_t(n) * channels, 0, sizeof(float) * channels * (task.n_entries - n));
 }

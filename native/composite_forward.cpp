@@ -47,11 +47,12 @@ void blend(const TileTask& task, State& state, int i, float left, float top) {
   const V depth = broadcast(s.depth);
   const I number = broadcast(int32_t(i));
   for (int strip = reach.first_strip; strip <= reach.last_strip; strip++) {
-    const RowPower power(s, iota() + (left + 0.5f + float(strip * kLanes) - s.u));
+    const Strip lanes(s, left + float(strip * kLanes));
     for (int row = reach.first_row; row <= reach.last_row; row++) {
       if (!(state.alive[strip] >> row & 1)) continue;
       Cell& cell = state.cells[strip][row];
-      const V p = power.at(top + 0.5f + float(row) - s.v);
+      const float dy = top + 0.5f + float(row) - s.v;
+      const V p = lanes.power(lanes.e(dy), dy);
       const I seen = p >= kMinPower;
       const V alpha = vmin(masked(seen, exp2_bounded(p)), broadcast(kMaxAlpha));
       const V before = cell.transmittance, part = before * alpha, after = before - part;

@@ -8,7 +8,7 @@ namespace {
 
 // Gradient by the splat of kLanes Gaussians, gathered from their tiles.
 struct SplatGradient {
-  alignas(64) float v[kLanes], v_x[kLanes], v_xx[kLanes], v_y[kLanes], v_xy[kLanes], v_yy[kLanes];
+  alignas(64) float v[kLanes], v_e[kLanes], v_ee[kLanes], v_y[kLanes], v_ey[kLanes], v_yy[kLanes];
   alignas(64) float colour[3][kLanes], depth[kLanes];
 };
 
@@ -23,10 +23,10 @@ void gather_entries(const BackwardTask& task, uint32_t rank, int lane, SplatGrad
     for (int j = 0; j < 12; j++) sum[j] += from[j];
   }
   g.v[lane] = sum[0];
-  g.v_x[lane] = sum[1];
-  g.v_xx[lane] = sum[2];
+  g.v_e[lane] = sum[1];
+  g.v_ee[lane] = sum[2];
   g.v_y[lane] = sum[3];
-  g.v_xy[lane] = sum[4];
+  g.v_ey[lane] = sum[4];
   g.v_yy[lane] = sum[5];
   for (int ch = 0; ch < 3; ch++) g.colour[ch][lane] = task.splats[rank].colour[ch] > 0 ? sum[6 + ch] : 0.0f;
   g.depth[lane] = sum[9];
@@ -101,16 +101,14 @@ struct FootprintGradient {
   V by_u, by_v;
 };
 
-// Conic and centre to the projected covariance, its factor M, and from there to scale and rotation.
+// Splat to the projected covariance, its factor M, and from there to scale and rotation.
 FootprintGradient footprint_gradient(const Projection& p, V3 scale, const SplatGradient& g, const uint32_t* index,
                                      int count, const Gradients& out) {
-  const V a = p.cov_yy * p.inverse_det, b = -p.cov_xy * p.inverse_det, c = p.cov_xx * p.inverse_det;
-  const V v_x = load(g.v_x), v_y = load(g.v_y);
-  // sigma = (a dx^2 + c dy^2) / 2 + b dx dy and v = -dL/dsigma; half of dL/db stands on either side of the diagonal.
-  const V by_a = -0.5f * load(g.v_xx), half_b = -0.5f * load(g.v_xy), by_c = -0.5f * load(g.v_yy);
-  const V r00 = a * by_a + b * half_b, r01 = a * half_b + b * by_c;
-  const V r10 = b * by_a + c * half_b, r11 = b * half_b + c * by_c;
-  const V k00 = -2.0f * (r00 * a + r01 * b), k01 = -2.0f * (r00 * b + r01 * c), k11 = -2.0f * (r10 * b + r11 * c);
+  // With (e, f) = inverse covariance times (dx, dy): by the centre v (e, f), by the covariance v (e, f)(e, f)^T / 2.
+  // The tiles summed powers of e and dy; f = (dy - cov_xy e) / cov_yy.
+  const V inverse = 1.0f / p.cov_yy, share = p.cov_xy * inverse;
+  const V v_ee = load(g.v_ee), v_ey = load(g.v_ey) * inverse, v_yy = load(g.v_yy) * inverse * inverse;
+  const V k00 = v_ee, k01 = v_ey - share * v_ee, k11 = v_yy - share * (2.0f * v_ey - share * v_ee);
   const V3 by_m0 = {k00 * p.m0.x + k01 * p.m1.x, k00 * p.m0.y + k01 * p.m1.y, k00 * p.m0.z + k01 * p.m1.z};
   const V3 by_m1 = {k01 * p.m0.x + k11 * p.m1.x, k01 * p.m0.y + k11 * p.m1.y, k01 * p.m0.z + k11 * p.m1.z};
   const V3 n0 = {by_m0.x * scale.x, by_m0.y * scale.y, by_m0.z * scale.z};
@@ -118,8 +116,8 @@ FootprintGradient footprint_gradient(const Projection& p, V3 scale, const SplatG
   FootprintGradient f;
   f.by_t0 = {dot(p.axis[0], n0), dot(p.axis[1], n0), dot(p.axis[2], n0)};
   f.by_t1 = {dot(p.axis[0], n1), dot(p.axis[1], n1), dot(p.axis[2], n1)};
-  f.by_u = a * v_x + b * v_y;
-  f.by_v = b * v_x + c * v_y;
+  f.by_u = load(g.v_e);
+  f.by_v = load(g.v_y) * inverse - share * f.by_u;
   const V t0[3] = {p.t0.x, p.t0.y, p.t0.z}, t1[3] = {p.t1.x, p.t1.y, p.t1.z};
   V3 by_axis[3], by_scale;
   for (int k = 0; k < 3; k++) {

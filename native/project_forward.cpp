@@ -18,7 +18,7 @@ I geometry(const Inputs& in, const View& view, const uint32_t* index, Splat* out
     v += gather(in.offsets, 2, index, 1);
   }
   const V opacity = gather(in.opacities, 1, index, 0);
-  I seen = (p.camera.z >= kNear) & (opacity >= kMinAlpha) & (p.inverse_det > 0.0f);
+  I seen = (p.camera.z >= kNear) & (p.camera.z <= kFar) & (opacity >= kMinAlpha) & (p.inverse_det > 0.0f);
   if (!any(seen)) return seen;
   const V log2_opacity = vlog2(opacity);
   // The slack covers rounding; the alpha of each pixel decides in the end.
@@ -26,13 +26,14 @@ I geometry(const Inputs& in, const View& view, const uint32_t* index, Splat* out
   const V reach_x = range * vsqrt(p.cov_xx), reach_y = range * vsqrt(p.cov_yy);
   seen &= (u + reach_x >= 0.5f) & (u - reach_x <= float(view.width) - 0.5f) & (v + reach_y >= 0.5f) &
           (v - reach_y <= float(view.height) - 0.5f);
-  const V half = -0.5f * kLog2e * p.inverse_det;
-  const V a = half * p.cov_yy, b = -2.0f * half * p.cov_xy, c = half * p.cov_xx;
-  seen &= (a < 0.0f) & (c < 0.0f) & (reach_x < 1e9f) & (reach_y < 1e9f);  // false for what overflowed
+  const V conic_xx = p.cov_yy * p.inverse_det, conic_xy = -p.cov_xy * p.inverse_det;
+  const V along = (-0.5f * kLog2e) / conic_xx, across = (-0.5f * kLog2e) / p.cov_yy;
+  const V slope_x = p.cov_xy / p.cov_yy, slope_y = p.cov_xy / p.cov_xx;
+  seen &= (conic_xx > 0.0f) & (reach_x < 1e9f) & (reach_y < 1e9f);  // false for what overflowed
   for (int l = 0; l < kLanes; l++)
     if (seen[l])
-      out[index[l]] = {u[l],       v[l],       a[l],      b[l],           c[l],     log2_opacity[l],
-                       reach_x[l], reach_y[l], {0, 0, 0}, p.camera.z[l], index[l], {0, 0, 0}};
+      out[index[l]] = {u[l],       v[l],       conic_xx[l], conic_xy[l], along[l],  across[l],     log2_opacity[l],
+                       reach_x[l], reach_y[l], slope_x[l],  slope_y[l],  {0, 0, 0}, p.camera.z[l], index[l]};
   return seen;
 }
 

@@ -26,12 +26,15 @@ static inline Span span(const Splat& s, float left, float top) {
   return out;
 }
 
-// Logarithm (base 2) of the alpha of a row of lanes: along x the base and slope are those of the row.
-struct RowPower {
-  V dx, base;
-  float b, c;
-  RowPower(const Splat& s, V dx_) : dx(dx_), base(s.a * dx_ * dx_ + s.log2_opacity), b(s.b), c(s.c) {}
-  V at(float dy) const { return dx * (b * dy) + (base + c * dy * dy); }
+// e (see Splat) and the logarithm (base 2) of alpha along a row of lanes.
+struct Strip {
+  V part;  // of e that all rows share
+  float conic_xy, along, across, log2_opacity;
+  Strip(const Splat& s, float left)
+      : part(s.conic_xx * (iota() + (left + 0.5f - s.u))), conic_xy(s.conic_xy), along(s.along), across(s.across),
+        log2_opacity(s.log2_opacity) {}
+  V e(float dy) const { return part + conic_xy * dy; }
+  V power(V e, float dy) const { return (along * e) * e + (log2_opacity + across * dy * dy); }
 };
 
 }  // namespace dd::DD_ISA

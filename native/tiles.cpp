@@ -17,10 +17,10 @@ struct Ellipse {
   float reach_x, reach_y, slant, half_width, extreme_y;
 
   explicit Ellipse(const Splat& s) : reach_x(s.reach_x), reach_y(s.reach_y) {
-    // -a dx^2 - b dx dy - c dy^2 <= log2(255 opacity); at given dy the centre of the range is -b dy / 2a.
-    slant = -0.5f * s.b / s.a;
-    half_width = 1.0001f * std::sqrt((s.log2_opacity - kMinPower) / -s.a) + 1e-3f;
-    extreme_y = -0.5f * s.b / s.c * s.reach_x;  // where the right-most point lies
+    // At dy = 0 the form is along (conic_xx dx)^2.
+    slant = s.slope_x;
+    half_width = 1.0001f * std::sqrt((s.log2_opacity - kMinPower) / -s.along) / s.conic_xx + 1e-3f;
+    extreme_y = s.slope_y * s.reach_x;  // where the right-most point lies
   }
 
   float side(float y) const {

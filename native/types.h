@@ -8,7 +8,7 @@ namespace dd {
 constexpr int kTile = 16;                       // tile side in pixels
 constexpr int kTilePixels = kTile * kTile;
 constexpr int kChunk = 512;                     // Gaussians handled by one task; fixes the order of summation
-constexpr float kNear = 0.2f;                   // metres
+constexpr float kNear = 0.2f, kFar = 1e10f;     // metres
 constexpr float kBlur = 0.3f;                   // added to the projected covariance, square pixels
 constexpr float kMaxAlpha = 0.999f;
 constexpr float kMinAlpha = 1.0f / 255.0f;
@@ -34,19 +34,21 @@ struct Inputs {
   int sh_stored, sh_degree, n_channels;         // coefficients stored; degree evaluated; extra channels
 };
 
-// A projected Gaussian. alpha at pixel centre (x, y) is 2^(log2_opacity + a dx^2 + b dx dy + c dy^2), dx = x - u.
+// A projected Gaussian. With dx = x - u, dy = y - v and e = conic_xx dx + conic_xy dy, alpha at pixel centre (x, y) is
+// 2^(log2_opacity + along e^2 + across dy^2): the quadratic form without the cancellation of its three terms, which for
+// long thin footprints are thousands of times larger than their sum.
 struct alignas(64) Splat {
-  float u, v, a, b, c, log2_opacity;
+  float u, v, conic_xx, conic_xy, along, across, log2_opacity;
   float reach_x, reach_y;                       // half extents of alpha >= 1/255, pixels
+  float slope_x, slope_y;                       // centre of the row at dy is slope_x dy; of the column at dx slope_y dx
   float colour[3];
   float depth;
   uint32_t index;                               // of the Gaussian
-  uint32_t padding[3];
 };
 
-// Sums of one Gaussian over the pixels of one tile; v = alpha dL/dalpha, dx and dy from the Gaussian's centre.
+// Sums of one Gaussian over the pixels of one tile of v = alpha dL/dalpha times powers of e and y (dy above).
 struct EntryGradient {
-  float v, v_x, v_xx, v_y, v_xy, v_yy;
+  float v, v_e, v_ee, v_y, v_ey, v_yy;
   float colour[3];
   float depth;
   float padding[2];

@@ -83,8 +83,8 @@ def check_shapes(tensors: dict[str, Tensor | None]) -> None:
             isinstance(e, str) or e == s for e, s in zip(shape, value.shape, strict=True)
         )
         if not fits:
-            expected = ", ".join(str(e) for e in shape)
-            raise ValueError(f"{name}: expected shape ({expected}), got {tuple(value.shape)}")
+            expected = str(shape).replace("'", "")
+            raise ValueError(f"{name}: expected shape {expected}, got {tuple(value.shape)}")
         if value.device.type != "cpu":
             raise ValueError(f"{name}: expected a tensor on the CPU, got one on {value.device}")
     sh = tensors["sh"]

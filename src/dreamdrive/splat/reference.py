@@ -12,6 +12,7 @@ from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, check_dtype
 
 NEAR_M = 0.2
+FAR_M = 1e10
 BLUR_PX2 = 0.3
 MAX_ALPHA = 0.999
 MIN_ALPHA = 1 / 255
@@ -66,7 +67,7 @@ def project(
     """
     rotation, translation = arguments.camera_from_world[:3, :3], arguments.camera_from_world[:3, 3]
     camera = arguments.means @ rotation.T + translation
-    index = torch.nonzero(camera[:, 2] >= NEAR_M).squeeze(-1)
+    index = torch.nonzero((camera[:, 2] >= NEAR_M) & (camera[:, 2] <= FAR_M)).squeeze(-1)
     index = index[torch.argsort(camera[index, 2].detach(), stable=True)]
     x, y, z = camera[index].unbind(-1)
     (fx, fy), (cx, cy), (width, height) = arguments.focal_px, arguments.centre_px, arguments.size_px
