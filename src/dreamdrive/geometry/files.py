@@ -62,7 +62,7 @@ def _camera(record: dict[str, Any], size: tuple[int, int], path: Path) -> Camera
         width, height = int(record["width"]), int(record["height"])
         fx, fy, cx, cy = (float(record["intrinsics"][key]) for key in ("fx", "fy", "cx", "cy"))
         camera = Camera(fx, fy, cx + 0.5, cy + 0.5, width, height)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{path}: width, height and intrinsics fx, fy, cx, cy expected ({error})") from error
     if not np.isfinite([fx, fy, cx, cy]).all():
         raise InputError(f"{path}: the intrinsics hold NaN or infinite numbers")
@@ -79,7 +79,7 @@ def _poses(record: dict[str, Any], clip: Clip, path: Path) -> Float[np.ndarray, 
         matrices = np.asarray(record["world_from_camera"], np.float64)
         frames = [int(i) for i in record.get("frames", range(len(matrices)))]
         check_rigid(matrices.reshape(-1, *matrices.shape[-2:]), "world_from_camera")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{path}: {error}") from error
     if matrices.ndim != 3 or len(frames) != len(matrices):
         raise InputError(f"{path}: {len(frames)} frames for world_from_camera of shape {matrices.shape}")

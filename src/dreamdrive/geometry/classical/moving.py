@@ -18,10 +18,10 @@ _SURE_EXCESS_PX = 3.0
 _SURE_GAIN = 5.0
 _VOTE = 0.45
 _VOTING_REACH = 2
-_CLOSE_PX = 9
-_OPEN_PX = 5
+_CLOSE_SHARE = 9 / 480  # of the image width
+_OPEN_SHARE = 5 / 480
 _MIN_AREA = 0.0006  # of the image
-_MIN_SURE_SHARE = 0.1  # of a component
+_MIN_SURE_SHARE = 0.05  # of a component
 _MIN_SURE_PX = 12
 _STANDING_LEVELS = 18.0  # grey levels from the temporal median
 
@@ -66,7 +66,7 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
     for frame, picture in zip(view.frames, rgb, strict=True):
         difference = cv2.GaussianBlur(np.abs(picture - median).max(axis=-1), (0, 0), 1.0)
         votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
-        evidence[frame] = decide(votes, difference > 2 * _STANDING_LEVELS, view.usable[frame])
+        evidence[frame] = decide(votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame])
     return evidence
 
 
@@ -103,8 +103,8 @@ def decide(
         usable: Evidence is 0 elsewhere.
     """
     mask = ((votes >= _VOTE) & usable).astype(np.uint8)
-    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_PX))
-    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _ellipse(_OPEN_PX))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_SHARE * mask.shape[1]))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _ellipse(_OPEN_SHARE * mask.shape[1]))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
     sure_px = np.bincount(labels[sure], minlength=count)
     area = stats[:, cv2.CC_STAT_AREA]
@@ -133,5 +133,6 @@ def fill(region: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
     return (between(0) & between(1))[1:-1, 1:-1]
 
 
-def _ellipse(size_px: int) -> np.ndarray:
+def _ellipse(about_px: float) -> np.ndarray:
+    size_px = max(3, 2 * round((about_px - 1) / 2) + 1)
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size_px, size_px))

@@ -1,0 +1,93 @@
+"""The dense half as a whole: what it may look at, what stays empty, what is taken as given."""
+
+import cv2
+import numpy as np
+import pytest
+import toy
+
+from dreamdrive.geometry.classical import view as viewing
+from dreamdrive.geometry.classical.dense import densify
+
+
+@pytest.fixture(scope="module")
+def held() -> toy.Toy:
+    return toy.drive([toy.Box(9, -0.9, 0.8)], count=5, held_out=(3,), fixed_rows=12)
+
+
+def test_held_out_frames_and_fixed_regions_stay_empty(held):
+    dense = densify(held.clip, held.posed)
+    for values in (dense.depth_m, dense.confidence, dense.moving, dense.sky):
+        assert not values[3].any()
+        assert not values[:, -12:].any()
+    assert (dense.depth_m[2] > 0).mean() > 0.5
+    assert dense.confidence.min() >= 0
+    assert dense.confidence.max() <= 1
+    assert not dense.confidence[dense.depth_m == 0].any()
+    assert not dense.depth_m[dense.sky].any()
+
+
+def test_held_out_pixels_have_no_influence(held):
+    frames = held.clip.frames.copy()
+    frames[3] = np.random.default_rng(0).integers(0, 255, frames[3].shape)
+    changed = densify(toy.replace(held.clip, frames=frames), held.posed)
+    for name in ("depth_m", "confidence", "moving", "sky"):
+        np.testing.assert_array_equal(getattr(densify(held.clip, held.posed), name), getattr(changed, name))
+
+
+def test_threads_do_not_change_the_result_and_opencv_keeps_its_setting(held, monkeypatch):
+    before = cv2.getNumThreads()
+    both = densify(held.clip, held.posed)
+    assert cv2.getNumThreads() == before
+    monkeypatch.setattr(viewing, "THREADS", 1)
+    alone = densify(held.clip, held.posed)
+    np.testing.assert_array_equal(both.depth_m, alone.depth_m)
+    np.testing.assert_array_equal(both.moving, alone.moving)
+
+
+def test_invalid_pixels_have_no_depth(held):
+    valid = held.clip.valid.copy()
+    valid[:, :, :20] = False
+    dense = densify(toy.replace(held.clip, valid=valid), held.posed)
+    assert not dense.depth_m[:, :, :20].any()
+    assert not dense.confidence[:, :, :20].any()
+
+
+def test_given_depth_and_sky_are_used():
+    street = toy.drive([], count=3)
+    given = street.depth_m.copy()
+    given[:, 60:70, 60:70] = 0
+    sky = np.zeros(given.shape, bool)
+    sky[:, :10] = True
+    known = toy.replace(street.clip.known, depth_m=given, sky=sky)
+    dense = densify(toy.replace(street.clip, known=known), street.posed)
+    shown = (given > 0) & ~sky
+    np.testing.assert_allclose(dense.depth_m[shown], given[shown], rtol=1e-5)
+    assert (dense.confidence[shown] == 1).all()
+    assert not dense.depth_m[:, 60:70, 60:70].any()
+    np.testing.assert_array_equal(dense.sky, sky)
+
+
+def test_a_standing_clip_gets_plane_and_backdrop_little_trusted():
+    street = toy.drive([], count=4, step_m=0)
+    dense = densify(street.clip, street.posed)
+    assert 0 < dense.confidence.max() <= 0.3
+    road = dense.depth_m[1, -20:, 100:156]
+    np.testing.assert_allclose(road, street.depth_m[1, -20:, 100:156], rtol=1e-3)
+    assert np.isclose(dense.depth_m[1][~dense.sky[1]].max(), 40.0, rtol=1e-4)
+
+
+def test_poses_of_the_fallback_give_no_evidence_of_motion():
+    street = toy.drive([toy.Box(9, -0.9, 0.8)], count=4)
+    posed = toy.replace(street.posed, fallback="structure from motion was refused")
+    dense = densify(street.clip, posed)
+    assert not dense.moving.any()
+    assert 0 < dense.confidence.max() <= 0.3
+
+
+def test_a_single_frame_and_a_missing_ground_are_no_error():
+    street = toy.drive([], count=1)
+    alone = densify(street.clip, street.posed)
+    assert not alone.confidence.any()
+    pair = toy.drive([], count=2)
+    dense = densify(pair.clip, toy.replace(pair.posed, ground=None))
+    assert (dense.depth_m > 0).mean() > 0.3
