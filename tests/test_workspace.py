@@ -8,8 +8,9 @@ import pytest
 from dreamdrive.errors import InputError
 from dreamdrive.workspace import Workspace, open_workspace
 
-REQUEST = {"input": "abc", "quality": "draft", "seed": 0}
-OTHER = {**REQUEST, "quality": "high"}
+OPTIONS = {"quality": "draft", "size": (64, 40)}
+REQUEST = {"digests": {"input": "abc"}, "options": OPTIONS, "seed": 0}
+OTHER = {**REQUEST, "options": {**OPTIONS, "quality": "high"}}
 
 
 def publish(out: Path, request: dict[str, object], files: dict[str, str]) -> None:
@@ -32,7 +33,8 @@ def test_a_new_folder_is_made_only_when_claimed(tmp_path: Path) -> None:
     assert workspace is not None
     assert not out.exists()
     workspace.claim()
-    assert json.loads((out / "stages" / "request.json").read_text())["request"] == REQUEST
+    noted = json.loads((out / "stages" / "request.json").read_text())["request"]
+    assert noted == json.loads(json.dumps(REQUEST))
 
 
 def test_an_empty_folder_is_fine(tmp_path: Path) -> None:

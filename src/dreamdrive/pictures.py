@@ -36,10 +36,12 @@ class Scored:
     Attributes:
         gaussians: N Gaussians.
         scores: Scores (N,) in [0, 1].
+        threshold: Score above which a Gaussian votes for moving (eq. 9).
     """
 
     gaussians: Gaussians
     scores: Float[Tensor, " n"]
+    threshold: float
 
 
 def write_videos(
@@ -155,10 +157,10 @@ def _beside(
 
 
 def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-    for camera, t_s in zip(scene.cameras, scene.times_s.tolist(), strict=True):
+    for frame, (camera, t_s) in enumerate(zip(scene.cameras, scene.times_s.tolist(), strict=True)):
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
-        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera)
+        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, frame)
         yield panels.parts(
             panels.to_bytes(still.numpy()),
             panels.to_bytes(moving.numpy()),
@@ -168,6 +170,12 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
 
 
 @torch.no_grad()
-def _score_image(scored: Scored, camera: Camera) -> Float[Tensor, "h w"]:
-    """Scores composited like colour (eq. 8)."""
-    return render(scored.gaussians, camera, channels=scored.scores[:, None], sh_degree=0).channels[..., 0]
+def _score_image(scored: Scored, camera: Camera, frame: int) -> Float[Tensor, "h w"]:
+    """Scores composited like colour (eq. 8).
+
+    The seeds hold a moving thing once a frame; of those only the ones of neighbouring frames are shown.
+    """
+    near = (scored.gaussians.source_frame - frame).abs() <= 1
+    rows = torch.nonzero(near | (scored.scores <= scored.threshold)).squeeze(1)
+    shown = scored.gaussians.select(rows)
+    return render(shown, camera, channels=scored.scores[rows][:, None], sh_degree=0).channels[..., 0]

@@ -39,7 +39,7 @@ def generate(
     geometry_files: Path | None = None,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
-    camera_height_m: float = 1.5,
+    camera_height_m: float | None = None,
     recompute_from: str | None = None,
     force: bool = False,
     progress: StageProgress = lambda stage, done, total: None,
@@ -58,7 +58,7 @@ def generate(
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
-            better does.
+            better does; None assumes 1.5 m.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of another input or other options.
         progress: Told of every step of every stage.
@@ -70,6 +70,8 @@ def generate(
         InputError: The input, an option or ``out`` cannot be used.
     """
     choose_prior(prior)
+    if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
+        raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
     options = {
         "prior": prior,
         "geometry": geometry_method,
@@ -182,7 +184,7 @@ def _decompose(
     )
     moving = cast(clip, geometry, seeds, grouping, settings.cast)
     parts = Parts(static.gaussians.select(~grouping.dynamic), moving.gaussians, moving.tracks, moving.actors)
-    return Scored(static.gaussians, scores), parts
+    return Scored(static.gaussians, scores, settings.group.threshold), parts
 
 
 def _fitted(

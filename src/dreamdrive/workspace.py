@@ -157,7 +157,16 @@ def _files(report: Path) -> list[str]:
 
 
 def _difference(out: Path, request: dict[str, Any]) -> str:
-    """Which options differ, in words."""
-    before = _read(out / "stages" / "request.json").get("request", {})
-    names = [name for name in request if before.get(name) != request[name]] if before else []
+    """Which parts of the request differ, in words."""
+    before = _flat(_read(out / "stages" / "request.json").get("request", {}))
+    now = _flat(json.loads(json.dumps(request)))
+    names = [name for name in now if before.get(name) != now[name]] if before else []
     return f" ({', '.join(names)} differ{'s' if len(names) == 1 else ''})" if names else ""
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    """Values of dictionaries in a dictionary, under their own names."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        flat |= value if isinstance(value, dict) else {name: value}
+    return flat

@@ -7,9 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.cli.conftest import Run
 
 from dreamdrive import pipeline
-from tests.cli.conftest import Run
 
 
 @pytest.fixture
@@ -156,9 +156,7 @@ def test_a_refusal_by_the_system_is_worded(run: Run, tmp_path: Path, monkeypatch
     )
 
 
-def test_an_interruption_says_how_to_go_on(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interruption_says_how_to_go_on(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> bool:
         raise KeyboardInterrupt
 

@@ -26,7 +26,7 @@ def generate(
     poses: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     geometry_files: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
-    camera_height: Annotated[float, arg(metavar="M")] = 1.5,
+    camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     representation: Literal["static", "deformable", "hybrid"] = "hybrid",
     seed: Annotated[int, arg(metavar="S")] = 0,

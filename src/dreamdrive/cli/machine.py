@@ -21,8 +21,8 @@ def available_memory_mb() -> int | None:
 
 
 def use_all_cores() -> None:
-    """Let torch and the native core use every core of this process; call it before torch is first imported."""
-    # By default threads that wait keep their core busy: beside any other work a fit takes three times as long.
+    """Let torch and the native core use every core of this process; to be called before torch is imported."""
+    # By default threads that wait keep their core busy: beside other work a fit takes three times as long.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     import torch
 

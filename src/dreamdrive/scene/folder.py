@@ -193,12 +193,10 @@ def _deformation(config: dict[str, Any] | None, state: dict[str, Tensor] | None)
     # Any valid values: load_state_dict replaces them all.
     domain = Domain(np.zeros(3), 1.0, 0.0, 1.0, np.array([0.0, -1.0, 0.0]))
     actors, times = shape.actors, shape.track_times
-    tracks = Tracks(
-        np.arange(times, dtype=np.float64),
-        np.zeros((actors, times, 3)),
-        np.zeros((actors, times)),
-        np.zeros((actors, 3)),
-    )
-    field = DeformationField(shape, domain, tracks if actors else None)
+    tracks = None
+    if actors:
+        moves, turns = np.zeros((actors, times, 3)), np.zeros((actors, times))
+        tracks = Tracks(np.arange(times, dtype=np.float64), moves, turns, np.zeros((actors, 3)))
+    field = DeformationField(shape, domain, tracks)
     field.load_state_dict(state)
     return field.requires_grad_(False)
