@@ -40,7 +40,7 @@ def random_scene(
 
 
 def pinhole(width: int = 53, height: int = 37) -> dict[str, float]:
-    """A pinhole whose principal point is off the middle, so that the clamp of the Jacobian is not symmetric."""
+    """A pinhole with its principal point off the middle: the clamp of the Jacobian is not symmetric."""
     return {
         "fx_px": 0.8 * width,
         "fy_px": 0.85 * width,

@@ -1,4 +1,4 @@
-"""What the compiled backend promises beyond its values: instruction sets, threads, exact zeros, clear refusals."""
+"""Promises of the compiled backend beyond its values: instruction sets, threads, exact zeros, refusals."""
 
 import os
 import subprocess
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import native_info, rasterize, render, set_threads, threads
-from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 ROOT = Path(__file__).resolve().parents[2]
 AGREE = """

@@ -1,4 +1,4 @@
-"""The common street scenes: images of the float64 program, and gsplat's own torch code in value and gradient."""
+"""The common street scenes: images of the float64 program, gsplat's torch code in value and gradient."""
 
 import importlib.util
 import subprocess
@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.splat.scenes import relative
 from torch import Tensor
 
 from dreamdrive.scene.gaussians import SH_C0
 from dreamdrive.splat import rasterize
 from dreamdrive.splat.arguments import SplatArguments
 from dreamdrive.splat.reference import project
-from tests.splat.scenes import relative
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_projection_agrees_with_gsplat(street):
 def pairs_in_order(
     means2d: Tensor, conics: Tensor, opacities: Tensor, depths: Tensor, width: int, height: int
 ):
-    """Stand-in for gsplat's CUDA kernel: the (Gaussian, pixel) pairs that are composited, front to back by pixel."""
+    """Stand-in for gsplat's CUDA kernel: the composited (Gaussian, pixel) pairs, front to back by pixel."""
     order = torch.argsort(depths, stable=True)
     order = order[depths[order] >= 0.2]
     gaussians, pixels = [], []
