@@ -10,9 +10,10 @@ from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import render
+from dreamdrive.splat import one_torch_thread, render
 
 
+@one_torch_thread()
 @torch.no_grad()
 def error_maps(
     clip: Clip, geometry: Geometry, gaussians: Gaussians, sky: Sky, exposure: Exposure

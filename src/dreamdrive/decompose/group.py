@@ -31,12 +31,12 @@ class GroupOptions:
         clustering: False keeps each Gaussian's own vote (for ablation).
     """
 
-    threshold: float = 0.5
-    candidate: float = 0.3
-    reach_px: float = 4.5
-    reach_depth: float = 0.12
+    threshold: float = 0.35
+    candidate: float = 0.25
+    reach_px: float = 3.0
+    reach_depth: float = 0.06
     link: float = 0.4
-    majority: float = 0.5
+    majority: float = 0.4
     smallest: int = 24
     clustering: bool = True
 

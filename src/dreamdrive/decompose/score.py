@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from dreamdrive.decompose.errors import smoothed
@@ -15,7 +15,7 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.deformation import encode
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.splat import render
+from dreamdrive.splat import one_torch_thread, render
 
 TargetName = Literal["error", "error_and_evidence"]
 
@@ -35,10 +35,13 @@ class ScoreOptions:
         width: Units of the two hidden layers.
         position_frequencies: Octaves of the encoding of the position.
         shrink: The splat of the scores is compared at this fraction of the size.
+        window: Scores are splatted only into frames within this many training frames of their source; None
+            splats all into all (the paper). A car's copy stands on empty road in all frames but a few: averaged
+            over all, its target is that of the road, and nothing that moves fast ever crosses the threshold.
     """
 
     target: TargetName = "error_and_evidence"
-    error_scale: float = 0.12
+    error_scale: float = 0.2
     error_sigma_px: float = 2.0
     threshold: float = 0.5
     steps: int = 150
@@ -46,6 +49,7 @@ class ScoreOptions:
     width: int = 64
     position_frequencies: int = 4
     shrink: int = 2
+    window: int | None = 1
 
 
 class ScoreNetwork(nn.Module):
@@ -69,6 +73,7 @@ class ScoreNetwork(nn.Module):
         return torch.sigmoid(self.layers(inputs).squeeze(1))
 
 
+@one_torch_thread()
 def score(
     clip: Clip,
     geometry: Geometry,
@@ -96,6 +101,7 @@ def score(
         raise ValueError("score: the Gaussians carry no features")
     inputs = _inputs(gaussians, options.position_frequencies)
     targets = _targets(clip, geometry, errors, options)
+    visible = {frame: _in_window(gaussians, sorted(targets), frame, options.window) for frame in targets}
     network = ScoreNetwork(gaussians.features.shape[1], options, seed)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate)
     generator = torch.Generator().manual_seed(seed)
@@ -107,9 +113,10 @@ def score(
         frame = order.pop()
         camera = geometry.cameras[frame]
         small = camera.resized(camera.width_px // options.shrink, camera.height_px // options.shrink)
-        splatted = _splat(gaussians, network(inputs), small)
+        rows = visible[frame]
+        splatted, alpha = _splat(gaussians.select(rows), network(inputs[rows]), small)
         target, weight = targets[frame]
-        loss = nn.functional.binary_cross_entropy(splatted, target, weight=weight)
+        loss = nn.functional.binary_cross_entropy(splatted, target, weight=weight * alpha)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         optimiser.step()
@@ -118,10 +125,22 @@ def score(
         return network(inputs)
 
 
-def _splat(gaussians: Gaussians, scores: Float[Tensor, " n"], camera: Camera) -> Float[Tensor, "h w"]:
-    """Scores composited like colour, the sky counting as 0."""
+def _splat(
+    gaussians: Gaussians, scores: Float[Tensor, " n"], camera: Camera
+) -> tuple[Float[Tensor, "h w"], Float[Tensor, "h w"]]:
+    """Mean score of what covers each pixel, and how much of the pixel is covered."""
     rendered = render(gaussians, camera, channels=scores[:, None], sh_degree=0)
-    return rendered.channels[..., 0].clamp(1e-4, 1 - 1e-4)
+    alpha = rendered.alpha.detach()
+    mean = rendered.channels[..., 0] / alpha.clamp(min=1e-3)
+    return mean.clamp(1e-4, 1 - 1e-4), alpha
+
+
+def _in_window(gaussians: Gaussians, frames: list[int], frame: int, window: int | None) -> Int[Tensor, " m"]:
+    """Gaussians whose source is within ``window`` training frames of ``frame``."""
+    if window is None:
+        return torch.arange(len(gaussians))
+    rank = torch.searchsorted(torch.tensor(frames), gaussians.source_frame)
+    return torch.nonzero((rank - frames.index(frame)).abs() <= window).squeeze(1)
 
 
 def _inputs(gaussians: Gaussians, frequencies: int) -> Float[Tensor, "n d"]:
@@ -144,7 +163,7 @@ def _targets(
     for i in np.flatnonzero(~clip.held_out).tolist():
         target = np.clip(blurred[i] / options.error_scale, 0, 1)
         if options.target == "error_and_evidence":
-            target = 0.3 * target * (geometry.moving[i] < 0.5) + np.maximum(geometry.moving[i], 0) * 1.0
+            target = np.maximum(target, geometry.moving[i])
         weight = (clip.valid[i] & (geometry.fixed_regions == 0)).astype(np.float32)
         targets[i] = (_shrunk(target, options.shrink), _shrunk(weight, options.shrink))
     return targets

@@ -18,7 +18,6 @@ from dreamdrive.scene.exposure import ExposureNetwork
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.scene.sky import Sky
 
 Representation = Literal["static", "deformable", "hybrid"]
 
@@ -57,7 +56,7 @@ def fit(
         clip: References; held-out frames are not read, their exposure is interpolated.
         geometry: Cameras, depth, masks, up axis.
         parts: Static and dynamic Gaussians; with no dynamic ones the result is a static scene.
-        start: The static fit, whose sky is continued.
+        start: The static fit, whose sky is kept.
         options: Length, rates and weights.
         network: Size of F_deform.
         densify: When and what to grow and prune.
@@ -83,7 +82,7 @@ def fit(
         dynamic=dynamic,
         deformation=None if field is None else field.requires_grad_(False),
         actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
-        sky=Sky(model.sky.texture.detach(), model.sky.azimuth_rad, model.sky.elevation_rad),
+        sky=start.sky,
         exposure=model.exposure.freeze(clip.times_s, ~clip.held_out),
         cameras=geometry.cameras,
         times_s=clip.times_s,

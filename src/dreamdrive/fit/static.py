@@ -22,7 +22,7 @@ class StaticFit:
 
     Attributes:
         gaussians: Optimised Gaussians.
-        sky: Optimised background.
+        sky: The far background.
         exposure: Colour of the training frames.
     """
 
@@ -48,8 +48,7 @@ def fit_static(
     static = Parameters(gaussians, footprints(gaussians), LearningRates())
     model = Model(static, None, None, estimate_sky(clip, geometry), ExposureNetwork(len(clip), seed))
     optimise(model, views, [NoDensifier()], options, seed, progress)
-    sky = Sky(model.sky.texture.detach(), model.sky.azimuth_rad, model.sky.elevation_rad)
-    return StaticFit(static.frozen(), sky, model.exposure.freeze(clip.times_s, ~clip.held_out))
+    return StaticFit(static.frozen(), model.sky, model.exposure.freeze(clip.times_s, ~clip.held_out))
 
 
 def footprints(gaussians: Gaussians) -> torch.Tensor:

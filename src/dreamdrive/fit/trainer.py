@@ -1,7 +1,7 @@
 """The optimisation loop both fits share: render a frame, compare, step, densify."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -18,7 +18,7 @@ from dreamdrive.scene.exposure import ExposureNetwork, transform_colour
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import rasterize
+from dreamdrive.splat import one_torch_thread, rasterize
 
 Progress = Callable[[int, int], None]
 
@@ -39,7 +39,6 @@ class FitOptions:
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
         track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth.
-        sky_rate: Adam's step for the sky panorama.
         exposure_rate: Adam's step for the exposure network.
     """
 
@@ -54,7 +53,6 @@ class FitOptions:
     warm_up: float = 0.1
     deformation_rate: float = 2e-3
     track_rate: float = 5e-3
-    sky_rate: float = 2e-3
     exposure_rate: float = 1e-3
 
 
@@ -66,7 +64,8 @@ class Model:
         static: Gaussians free of time.
         dynamic: Gaussians that go through ``deformation``, or None.
         deformation: Present exactly when ``dynamic`` is.
-        sky: The far background; its texture is learned.
+        sky: The far background. It is an average over all frames already; learning it would cost a tenth of
+            each step and change nothing that can be seen.
         exposure: Colour of each frame of the clip.
     """
 
@@ -112,6 +111,7 @@ def splat(
     )
 
 
+@one_torch_thread()
 def optimise(
     model: Model,
     views: dict[int, list[View]],
@@ -131,7 +131,7 @@ def optimise(
         progress: Called with steps done and steps in all.
     """
     generator = torch.Generator().manual_seed(seed)
-    grids = {shrink: [model.sky.grid(v.camera) for v in shrunk] for shrink, shrunk in views.items()}
+    skies = {shrink: [model.sky.colour(v.camera) for v in shrunk] for shrink, shrunk in views.items()}
     optimiser = _shared_optimiser(model, options)
     order: list[int] = []
     for step in range(options.steps):
@@ -145,7 +145,7 @@ def optimise(
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
         degree = gaussians.sh_degree if done >= options.sh_after else 0
         rendered = splat(gaussians, view.camera, degree, offsets_px)
-        loss = _loss(model, gaussians, rendered, view, grids[shrink][which], options, done)
+        loss = _loss(model, gaussians, rendered, view, skies[shrink][which], options, done)
         loss.backward()
         _decay(model, optimiser, options, done)
         _step(model, optimiser)
@@ -158,11 +158,11 @@ def _loss(
     gaussians: Gaussians,
     rendered: Render,
     view: View,
-    grid: Float[Tensor, "h w 2"],
+    sky: Float[Tensor, "h w 3"],
     options: FitOptions,
     done: float,
 ) -> Float[Tensor, ""]:
-    image = rendered.colour + (1 - rendered.alpha)[..., None] * model.sky.sample(grid)
+    image = rendered.colour + (1 - rendered.alpha)[..., None] * sky
     image = transform_colour(image, model.exposure(view.index))
     loss = render_loss(image, view.image, view.mask, options.loss)
     if options.depth_weight:
@@ -179,12 +179,8 @@ def _loss(
 
 
 def _shared_optimiser(model: Model, options: FitOptions) -> torch.optim.Adam:
-    """Adam for what is not a set of Gaussians: deformation, tracks, sky, exposure."""
-    model.sky = replace(model.sky, texture=model.sky.texture.clone().requires_grad_(True))
-    groups = [
-        {"params": [model.sky.texture], "lr": options.sky_rate, "name": "sky"},
-        {"params": list(model.exposure.parameters()), "lr": options.exposure_rate, "name": "exposure"},
-    ]
+    """Adam for what is not a set of Gaussians: deformation, tracks, exposure."""
+    groups = [{"params": list(model.exposure.parameters()), "lr": options.exposure_rate, "name": "exposure"}]
     if model.deformation is not None:
         named = dict(model.deformation.named_parameters())
         tracks = [named.pop(name) for name in ("track_translation", "track_yaw_rad")]

@@ -10,6 +10,7 @@ from torch import Tensor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.splat.torch_threads import one_torch_thread
 from dreamdrive.splat.view import render
 
 Part = Literal["all", "static", "dynamic"]
@@ -39,6 +40,7 @@ class SceneView:
         return (self.dynamic_share >= 0.5 * self.alpha) & (self.alpha >= 0.5)
 
 
+@one_torch_thread()
 @torch.no_grad()
 def render_scene(
     scene: Scene,
