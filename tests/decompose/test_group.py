@@ -18,7 +18,7 @@ def test_the_majority_of_a_cluster_decides_for_all_of_it():
     generator = torch.Generator().manual_seed(0)
     doubt = torch.rand(len(seeds), generator=generator)
     # One member in four of the moving thing scores below the threshold, but is no certain street either.
-    scores = torch.where(truth, torch.where(doubt < 0.25, 0.4, 0.9), torch.tensor(0.05))
+    scores = torch.where(truth, torch.where(doubt < 0.25, 0.3, 0.9), torch.tensor(0.05))
     grouping = group(clip, geometry, seeds, scores, GroupOptions())
     assert (grouping.dynamic == truth).float().mean() > 0.995
     alone = group(clip, geometry, seeds, scores, GroupOptions(clustering=False))
