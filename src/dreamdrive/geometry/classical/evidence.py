@@ -40,6 +40,7 @@ def look(clip: Clip) -> Evidence:
     """Measure motion and find fixed regions at 320 px width."""
     width, height = clip.size
     size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
+    working = features.working_size(width, height)
     grey = features.to_grey(clip.frames, size)
     valid = _resize(clip.valid, size)
     moves = motion.measure(grey, valid, clip.times_s)
@@ -48,25 +49,29 @@ def look(clip: Clip) -> Evidence:
     in_motion[1:] |= moves.moving
     if moves.standing or len(clip.rig) > 1:
         in_motion[:] = False
-    fixed = masks.find_fixed(grey, valid.all(axis=0), in_motion, clip.size)
+    fixed = masks.find_fixed(grey, np.logical_and.reduce(valid), in_motion, clip.size)
     street = valid & ~_resize(((fixed.regions > 0) | fixed.objects)[None], size)
     detected = masks.describe(fixed)
     if moves.brightness < motion.DARK_LEVEL:
-        detected.append(f"the clip is dark: nine tenths of the pixels lie below grey level {moves.brightness:.0f} of 255")
+        detected.append(
+            f"the clip is dark: nine tenths of the pixels lie below grey level {moves.brightness:.0f} of 255"
+        )
     if moves.tracks < motion.FEW_TRACKS:
         detected.append(f"little texture to follow: {moves.tracks:.0f} corners in a typical frame")
     return Evidence(
         grey,
         street,
-        clip.rig[0].resized(*size),
-        clip.rig[0].resized(*features.working_size(width, height)),
+        clip.rig[0].resized(size[0], size[1]),
+        clip.rig[0].resized(working[0], working[1]),
         moves,
         fixed,
         tuple(detected),
     )
 
 
-def working_frames(clip: Clip, evidence: Evidence) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
+def working_frames(
+    clip: Clip, evidence: Evidence
+) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
     """Grey frames at the working size and the pixels in which features may lie."""
     size = (evidence.working.width_px, evidence.working.height_px)
     free = clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
@@ -74,4 +79,6 @@ def working_frames(clip: Clip, evidence: Evidence) -> tuple[UInt8[np.ndarray, "f
 
 
 def _resize(mask: Bool[np.ndarray, "f _ _"], size: tuple[int, int]) -> Bool[np.ndarray, "f h w"]:
-    return np.stack([cv2.resize(one.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for one in mask])
+    return np.stack(
+        [cv2.resize(one.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for one in mask]
+    )

@@ -39,12 +39,13 @@ class Settled:
 def settle(database: Path, model: Model, camera: Camera, calibrated: bool, seed: int) -> Settled:
     """Settle the focal length of a model that was mapped with ``camera`` (working size, square pixels).
 
-    A calibrated focal length is kept; only a residual radial distortion k is estimated and kept when it lowers
-    the cost by 3 %. On a turning clip with k = 0.02 that takes the path error from 1.4 % to 0.14 %; on straight
-    clips it changes nothing and is not taken. An unknown focal length is tested first: forward motion does not
-    constrain it (costs within 2 % over a factor of three), turning does. It is refined when another rung of the
-    ladder costs less than 0.93 of the prior or a neighbour more than 1.25; when it moved by more than 8 %,
-    matching and mapping are repeated with it, since the pairs were verified with the wrong one.
+    A calibrated focal length is kept; only a residual radial distortion k is estimated and kept when it
+    lowers the cost by 3 %. On a turning clip with k = 0.02 that takes the path error from 1.4 % to 0.14 %; on
+    straight clips it changes nothing and is not taken. An unknown focal length is tested first: forward
+    motion does not constrain it (costs within 2 % over a factor of three), turning does. It is refined when
+    another rung of the ladder costs less than 0.93 of the prior or a neighbour more than 1.25; when it moved
+    by more than 8 %, matching and mapping are repeated with it, since the pairs were verified with the wrong
+    one.
     """
     if calibrated:
         return _with_radial(model)
@@ -65,7 +66,9 @@ def settle(database: Path, model: Model, camera: Camera, calibrated: bool, seed:
             refined = sfm.adjust(again, free_focal=True)
     if not _sane(refined, camera) or refined.registered.sum() < model.registered.sum():
         return Settled(model, False, ladder, "the focal length could not be refined: the prior is kept")
-    return Settled(refined, True, ladder, f"turning shows the focal length: {refined.lens[0] / prior:.2f} of the prior")
+    return Settled(
+        refined, True, ladder, f"turning shows the focal length: {refined.lens[0] / prior:.2f} of the prior"
+    )
 
 
 def _with_radial(model: Model) -> Settled:
@@ -76,7 +79,9 @@ def _with_radial(model: Model) -> Settled:
     return Settled(model, True, {}, None)
 
 
-def _remap(database: Path, camera: Camera, lens: Float[np.ndarray, "5"], count: int, seed: int) -> Model | None:
+def _remap(
+    database: Path, camera: Camera, lens: Float[np.ndarray, "5"], count: int, seed: int
+) -> Model | None:
     focal = float(lens[0])
     changed = Camera(focal, focal, camera.cx_px, camera.cy_px, camera.width_px, camera.height_px)
     sfm.rematch(database, changed, seed)

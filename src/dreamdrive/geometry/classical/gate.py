@@ -34,7 +34,8 @@ class Verdict:
 def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     """Test registration, support, fit and the plausibility of the steps.
 
-    Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a steady
+    Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
+    steady
     length: from a standstill the direction of a step is noise and its length is far below the mean.
     """
     registered = model.registered
@@ -66,7 +67,9 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     if model.reprojection_px > MAX_REPROJECTION_PX:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")
     if least < MIN_FORWARD:
-        reasons.append(f"the path jumps: a step deviates {np.degrees(np.arccos(max(least, -1.0))):.0f} degrees")
+        reasons.append(
+            f"the path jumps: a step deviates {np.degrees(np.arccos(max(least, -1.0))):.0f} degrees"
+        )
     if variation > MAX_VARIATION:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
     return Verdict(tuple(reasons), figures, backwards)

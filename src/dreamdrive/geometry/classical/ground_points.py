@@ -52,8 +52,8 @@ def fit_points(
 ) -> Plane | None:
     """RANSAC for the lowest well supported plane within 8 degrees of level.
 
-    A plane scores its inliers (within 4 % of the camera height) minus the points more than a quarter of the height
-    below it, for nothing lies under a road.
+    A plane scores its inliers (within 4 % of the camera height) minus the points more than a quarter of the
+    height below it, for nothing lies under a road.
     """
     up = up_direction(world_from_camera)
     centres = world_from_camera[:, :3, 3]
@@ -108,4 +108,6 @@ def _refine(
     inlier = np.abs(residual) < INLIER * height
     around = np.linalg.norm(points[:, None] - centres[None], axis=2).min(axis=1) < REACH * height
     spread = float(residual[inlier].std() / height / np.sqrt(max(inlier.sum() / 4, 1)) + 0.005)
-    return Plane(normal, offset, height, float(inlier.sum()), float(inlier.sum() / max(around.sum(), 1)), spread)
+    return Plane(
+        normal, offset, height, float(inlier.sum()), float(inlier.sum() / max(around.sum(), 1)), spread
+    )

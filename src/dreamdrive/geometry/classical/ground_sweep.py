@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.optimize import minimize
 
 from dreamdrive.geometry.classical.ground_points import Plane, up_direction
 from dreamdrive.scene.camera import Camera
@@ -20,6 +21,7 @@ MIN_PEAK = 0.05
 MIN_RADIAL = 0.1
 STILL_NCC = 0.5
 MIN_PIXELS = 50
+EVALUATIONS = 80
 
 
 @dataclass(frozen=True, order=True)
@@ -45,7 +47,8 @@ class Road:
         self.inverse = np.linalg.inv(self.intrinsics)
         height, width = grey.shape[1:]
         rows, columns = np.mgrid[
-            round(ROWS[0] * height) : round(ROWS[1] * height), round(COLUMNS[0] * width) : round(COLUMNS[1] * width)
+            round(ROWS[0] * height) : round(ROWS[1] * height),
+            round(COLUMNS[0] * width) : round(COLUMNS[1] * width),
         ]
         self.pixels = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1)
         road = (slice(None), slice(rows[0, 0], rows[-1, 0] + 1), slice(columns[0, 0], columns[0, -1] + 1))
@@ -67,9 +70,9 @@ class Road:
     def telling(self, pair: Pair) -> np.ndarray:
         """Pixels that can tell one plane from another.
 
-        Texture must vary along the lines through the point the camera heads for: a lane line along them looks the
-        same at any height. And what does not move at all once rotation is undone is no road: a car ahead that
-        keeps its distance, or a reflection.
+        Texture must vary along the lines through the point the camera heads for: a lane line along them looks
+        the same at any height. And what does not move at all once rotation is undone is no road: a car ahead
+        that keeps its distance, or a reflection.
         """
         if pair not in self._telling:
             still, _ = self._warp(pair, np.array([0.0, -1.0, 0.0]), 0.0)
@@ -113,8 +116,8 @@ def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | Non
 
     Args:
         road: Frames, poses and intrinsics.
-        heights: Range of camera heights to try, in the units of the poses; None tries 0.08 to 12 steps. A peak at
-            either end of the range is what a failure looks like and is refused.
+        heights: Range of camera heights to try, in the units of the poses; None tries 0.08 to 12 steps. A
+            peak at either end of the range is what a failure looks like and is refused.
     """
     poses = road.poses
     step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
@@ -182,18 +185,31 @@ def _scorer(road: Road, pairs: Sequence[Pair]) -> Callable[[float, float, float]
 def _refine(
     score: Callable[[float, float, float], float], height: float, ratio: float
 ) -> tuple[float, float, float]:
-    """Coordinate search around the coarse peak, then a parabola over the height."""
-    pitch = roll = 0.0
-    for width in (1.0, 0.4):
-        for _ in range(2):
-            pitch = _best(lambda value: score(height, value, roll), pitch + width * np.linspace(-1.5, 1.5, 5))
-            roll = _best(lambda value: score(height, pitch, value), roll + width * np.linspace(-1.0, 1.0, 5))
-            height = float(
-                np.exp(_best(lambda value: score(float(np.exp(value)), pitch, roll),
-                             np.log(height) + width * np.log(ratio) * np.linspace(-1, 1, 5)))
-            )
-    pitch, roll = float(np.clip(pitch, -3, 3)), float(np.clip(roll, -2, 2))
-    return height, pitch, roll
+    """One search along each coordinate around the coarse peak, then the simplex of Nelder and Mead (1965).
+
+    Height and pitch trade against each other along a ridge on which a search by coordinates alone stops 1.5 %
+    beside the true height.
+    """
+    log = np.log(height)
+    pitch = _best(lambda value: score(height, value, 0.0), np.linspace(-1.5, 1.5, 5))
+    roll = _best(lambda value: score(height, pitch, value), np.linspace(-1.0, 1.0, 5))
+    log = _best(
+        lambda value: score(float(np.exp(value)), pitch, roll), log + np.log(ratio) * np.linspace(-1, 1, 5)
+    )
+    start = np.array([log, pitch, roll])
+    corners = start + np.array([[0, 0, 0], [0.05, 0, 0], [0, 0.5, 0], [0, 0, 0.5]])
+
+    def loss(at: np.ndarray) -> float:
+        return -score(float(np.exp(at[0])), float(at[1]), float(at[2]))
+
+    found = minimize(
+        loss,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": corners, "maxfev": EVALUATIONS, "xatol": 0.005, "fatol": 1e-4},
+    )
+    log, pitch, roll = found.x
+    return float(np.exp(log)), float(np.clip(pitch, -3, 3)), float(np.clip(roll, -2, 2))
 
 
 def _best(score: Callable[[float], float], values: np.ndarray) -> float:

@@ -37,7 +37,7 @@ def depth_ratios(
     points: Float[np.ndarray, "p 3"],
     seen: Bool[np.ndarray, "f p"],
 ) -> Float[np.ndarray, " n"]:
-    """Known depth over the depth of each sparse point in each frame that sees it; empty with fewer than 50."""
+    """Known depth over the depth of each sparse point in each frame that sees it; empty below 50."""
     if clip.known.depth_m is None:
         return np.zeros(0)
     ratios: list[np.ndarray] = []

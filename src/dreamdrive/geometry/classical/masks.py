@@ -16,8 +16,10 @@ RADIAL_COSINE = 0.35
 CENTRE = (0.5, 0.47)
 FAR_RADIUS, FAR_BOTTOM = 0.28, 0.62
 MIN_EDGE_PIXELS = 8
+ACROSS_SHARE = 0.65
 BAR_LEVEL = 16
 BORDER = 0.03
+ROAD_AHEAD = (0.2, 0.8, 0.4, 0.92)
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,12 @@ def find_fixed(
 ) -> Fixed:
     """Find the regions from edges that stay in place while the street moves.
 
-    An edge stays when its temporal median gradient is strong and the frames deviate little from it. Lane lines
-    and kerbs stay too under forward motion, so edges along lines through the centre of the image do not count,
-    nor does the far field above the road. Wide edges at the bottom are the bonnet. Of the rest, what touches
-    the border of the image, or is drawn over it so sharply that only the codec disturbs it, is a mirror or an
-    overlay; anything else that stays is an object (a lead car does not touch the border and its edges shimmer).
+    An edge stays when its temporal median gradient is strong and the frames deviate little from it. Lane
+    lines and kerbs stay too under forward motion, so edges along lines through the centre of the image do not
+    count, nor does the far field above the road. Wide edges at the bottom are the bonnet. Of the rest, what
+    touches the border of the image, or is drawn over it away from the road ahead so sharply that only the
+    codec disturbs it, is a mirror or an overlay. Anything else that stays is an object: a lead car at a
+    constant distance stands on the road ahead, does not touch the border, and its edges shimmer.
 
     Args:
         grey: Frames at 320 px width.
@@ -126,7 +129,7 @@ def _persistent_edges(grey: np.ndarray, usable: np.ndarray) -> _Edges:
 def _bonnet(edges: _Edges) -> np.ndarray:
     """Everything below the upper outline of wide persistent edges at the bottom."""
     height, width = edges.static.shape
-    labels, boxes = _label(edges.static & ~edges.radial)
+    labels, boxes = _label(edges.static & ~edges.radial, reach=3)
     top = np.full(width, height)
     for label, (left, upper, span, tall, _) in enumerate(boxes):
         if label == 0 or upper < 0.55 * height or upper + tall < 0.85 * height or span < 0.25 * width:
@@ -148,21 +151,24 @@ def _components(edges: _Edges, bonnet: np.ndarray) -> tuple[np.ndarray, np.ndarr
     overlay, objects = np.zeros((2, height, width), bool)
     near_bonnet = cv2.dilate(bonnet.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     edge_pixels = edges.static & ~near_bonnet
-    labels, boxes = _label(edge_pixels & ~edges.radial)
+    labels, boxes = _label(edge_pixels & ~edges.radial, reach=9)
     for label, (left, upper, span, tall, _) in enumerate(boxes):
         pixels = edge_pixels & (labels == label)
-        if label == 0 or (pixels & ~edges.radial).sum() < MIN_EDGE_PIXELS:
+        across_rays = int((pixels & ~edges.radial).sum())
+        if label == 0 or across_rays < max(MIN_EDGE_PIXELS, ACROSS_SHARE * pixels.sum()):
             continue
         at_side = left <= BORDER * width or left + span >= (1 - BORDER) * width
         at_border = at_side or upper <= BORDER * height or upper + tall >= (1 - BORDER) * height
+        across, down = (left + span / 2) / width, (upper + tall / 2) / height
+        ahead = ROAD_AHEAD[0] < across < ROAD_AHEAD[1] and ROAD_AHEAD[2] < down < ROAD_AHEAD[3]
+        drawn = not ahead and np.percentile(edges.deviation[pixels], 75) < DRAWN_DEVIATION
         strong = edges.gradient[pixels].mean() >= DRAWN_GRADIENT
-        drawn = strong and np.percentile(edges.deviation[pixels], 75) < DRAWN_DEVIATION
-        (overlay if (at_border and strong) or drawn else objects)[_fill(pixels)] = True
+        (overlay if strong and (at_border or drawn) else objects)[_fill(pixels)] = True
     return overlay & ~bonnet, objects & ~bonnet & ~overlay
 
 
-def _label(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    joined = cv2.dilate(edges.astype(np.uint8), np.ones((3, 3), np.uint8))
+def _label(edges: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    joined = cv2.dilate(edges.astype(np.uint8), np.ones((reach, reach), np.uint8))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
     return labels, boxes
 
@@ -186,7 +192,7 @@ def describe(fixed: Fixed) -> list[str]:
         sentences.append(f"{name}: {100 * share:.1f} % of the image is fixed to the camera and left out")
     if fixed.objects.any():
         sentences.append(
-            "something keeps its place in the image without being fixed to the camera, such as a car ahead at a "
-            "constant distance or a faint reflection: kept out of the poses, kept in the scene"
+            "something keeps its place in the image without being fixed to the camera, such as a car ahead "
+            "at a constant distance or a faint reflection: kept out of the poses, kept in the scene"
         )
     return sentences

@@ -1,6 +1,7 @@
 """Whether the camera moves at all, from sparse optical flow."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,17 +39,23 @@ class Motion:
 def track(
     first: UInt8[np.ndarray, "h w"], second: UInt8[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
-    """Corners of ``first`` followed into ``second`` by pyramidal Lucas-Kanade, checked forwards and backwards."""
+    """Corners of ``first`` followed into ``second`` by pyramidal Lucas-Kanade, checked both ways."""
     none = np.zeros((0, 2), np.float32)
-    corners = cv2.goodFeaturesToTrack(first, CORNERS, 0.01, 6, mask=usable.astype(np.uint8) * 255)
+    corners: Any = cv2.goodFeaturesToTrack(first, CORNERS, 0.01, 6, mask=usable.astype(np.uint8) * 255)
     if corners is None or len(corners) == 0:
         return none, none
-    options = {"winSize": (15, 15), "maxLevel": 3}
-    there, found, _ = cv2.calcOpticalFlowPyrLK(first, second, corners, np.empty_like(corners), **options)
-    back, found_back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, np.empty_like(corners), **options)
+    there, found = _follow(first, second, corners)
+    back, found_back = _follow(second, first, there)
     good = (found[:, 0] > 0) & (found_back[:, 0] > 0)
     good &= np.linalg.norm((corners - back)[:, 0], axis=1) < FORWARD_BACKWARD_PX
     return corners[good, 0], there[good, 0]
+
+
+def _follow(first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    there, found, _ = cv2.calcOpticalFlowPyrLK(
+        first, second, points, np.empty_like(points), winSize=(15, 15), maxLevel=3
+    )
+    return np.asarray(there), np.asarray(found)
 
 
 def measure(
@@ -56,15 +63,17 @@ def measure(
 ) -> Motion:
     """Motion of a clip; ``grey`` is at 320 px width.
 
-    A step counts as moving when over at least two frames and 0.2 s the 70th percentile of the flow reaches one
-    pixel and the 25th a third of one: traffic that passes a standing camera moves only a part of the picture.
-    The clip stands when fewer than three windows, or 15 % of them, move.
+    A step counts as moving when over at least two frames and 0.2 s the 70th percentile of the flow reaches
+    one pixel and the 25th a third of one: traffic that passes a standing camera moves only a part of the
+    picture. The clip stands when fewer than three windows, or 15 % of them, move.
     """
     count = len(grey)
     interval = float(np.median(np.diff(times_s))) if count > 1 else WINDOW_S
     gap = min(max(2, round(WINDOW_S / max(interval, 1e-6))), max(count - 1, 1))
     windows = [_flow(grey, usable, start, start + gap) for start in range(max(count - gap, 0))]
-    window_moves = np.array([upper >= STANDING_PX and lower >= STANDING_LOWER_PX for upper, lower, _ in windows])
+    window_moves = np.array(
+        [upper >= STANDING_PX and lower >= STANDING_LOWER_PX for upper, lower, _ in windows]
+    )
     steps = [_flow(grey, usable, start, start + 1) for start in range(count - 1)]
     moving = np.zeros(max(count - 1, 0), bool)
     for step in range(count - 1):

@@ -1,6 +1,7 @@
 """Frame-to-frame odometry: what remains when structure from motion cannot be believed."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -78,13 +79,14 @@ def _relative(
     flow = float(np.percentile(np.linalg.norm(there - here, axis=1), 70))
     if flow < STILL_PX:
         return np.eye(3), ahead, flow
-    pixels = [points.astype(np.float64) + 0.5 for points in (here, there)]
-    essential, inliers = cv2.findEssentialMat(
-        *pixels, camera.matrix, method=cv2.USAC_MAGSAC, prob=0.999, threshold=ESSENTIAL_PX
+    pixels, moved = here.astype(np.float64) + 0.5, there.astype(np.float64) + 0.5
+    found: Any = cv2.findEssentialMat(
+        pixels, moved, camera.matrix, method=cv2.USAC_MAGSAC, prob=0.999, threshold=ESSENTIAL_PX
     )
+    essential, inliers = found
     if essential is None or essential.shape != (3, 3):
         return np.eye(3), ahead, flow
-    _, rotation, shift, _ = cv2.recoverPose(essential, *pixels, camera.matrix, mask=inliers)
+    _, rotation, shift, _ = cv2.recoverPose(essential, pixels, moved, camera.matrix, mask=inliers)
     turn, direction = rotation.T, (-rotation.T @ shift)[:, 0]
     if direction[2] < np.cos(np.radians(MAX_OFF_AXIS_DEG)):
         direction = ahead
@@ -100,7 +102,7 @@ def _road_scores(
     turns: np.ndarray,
     directions: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How well a level road explains the next frame: score of each step at each speed (F - 1, S), speeds (S,)."""
+    """How well a level road explains each next frame: scores (F - 1, S) and the speeds (S,) tried."""
     interval = np.diff(times_s)
     ladder = np.concatenate([[0.0], np.geomspace(*SPEEDS_M_S, STEPS)])
     scores = np.zeros((len(interval), len(ladder)))

@@ -55,8 +55,8 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
     """Pose every frame of a clip.
 
     Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
-    motion, which would register it on whatever drives through the picture. Else structure from motion is tried
-    and judged, and frame-to-frame odometry takes over when it is refused.
+    motion, which would register it on whatever drives through the picture. Else structure from motion is
+    tried and judged, and frame-to-frame odometry takes over when it is refused.
 
     Args:
         clip: Frames of one camera, or of several whose poses are known.
@@ -64,7 +64,8 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
         seed: Seed of everything random; the same seed gives the same poses.
 
     Raises:
-        InputError: Without frames; for several cameras without poses; for a camera height that is not positive.
+        InputError: Without frames; for several cameras without poses; for a camera height that is not
+            positive.
     """
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
@@ -77,9 +78,7 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
         reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
         return _standing(clip, evidence, camera_height_m, reason)
     grey, usable = looking.working_frames(clip, evidence)
-    outcome = reconstruct(
-        grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed
-    )
+    outcome = reconstruct(grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed)
     if outcome.settled is None:
         return _from_odometry(clip, evidence, outcome, camera_height_m)
     return _from_model(clip, evidence, outcome, camera_height_m, seed)
@@ -97,9 +96,7 @@ def _check(clip: Clip, camera_height_m: float | None) -> None:
         )
 
 
-def _from_model(
-    clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int
-) -> Posed:
+def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int) -> Posed:
     """Cameras of an accepted sparse model, scaled to metres."""
     assert outcome.settled is not None
     model, observed = outcome.settled.model, outcome.settled.observed
@@ -144,7 +141,9 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
     metric = Metric(1.0, ground, Scale("poses", 0.0), ())
     notes = ["the given poses are used"]
     if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > 0.15:
-        notes.append(f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m")
+        notes.append(
+            f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m"
+        )
     posed = _posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, {})
     return replace(posed, standing=evidence.motion.standing and _path_m(poses) < 0.5)
 
@@ -179,7 +178,9 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
     if not path.measured:
         speed = odometry.DEFAULT_SPEED_M_S
         notes.append(f"the road shows no clear motion: a constant speed of {speed:.0f} m/s is assumed")
-        metric = replace(metric, scale=Scale(f"none: a speed of {speed:.0f} m/s is assumed", scale.SPEED_SPREAD))
+        metric = replace(
+            metric, scale=Scale(f"none: a speed of {speed:.0f} m/s is assumed", scale.SPEED_SPREAD)
+        )
     details = {**outcome.figures, "odometry_measured": path.measured}
     observed = clip.known.intrinsics
     posed = _posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)

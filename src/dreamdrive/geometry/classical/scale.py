@@ -56,7 +56,9 @@ class Metric:
     notes: tuple[str, ...]
 
 
-def find_ground(street: Street, seed: int, heights: tuple[float, float] | None = None) -> tuple[Plane | None, str]:
+def find_ground(
+    street: Street, seed: int, heights: tuple[float, float] | None = None
+) -> tuple[Plane | None, str]:
     """The road plane and the name of the estimator that gave it.
 
     Sparse points decide when at least 100 of them, a quarter of those near the path, lie in the plane; smooth
@@ -85,7 +87,9 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
     factor = wanted / plane.height
     speed = _speed(street, factor)
     if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
-        return _from_speed(street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives")
+        return _from_speed(
+            street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
+        )
     terms = (
         plane.spread,
         USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
@@ -98,9 +102,7 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
     )
 
 
-def from_depth(
-    ratios: Float[np.ndarray, " n"], street: Street, seed: int
-) -> Metric:
+def from_depth(ratios: Float[np.ndarray, " n"], street: Street, seed: int) -> Metric:
     """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
     factor = float(np.median(ratios))
     spread = float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
@@ -112,7 +114,9 @@ def from_depth(
 def _from_speed(street: Street, problem: str) -> Metric:
     factor = ASSUMED_SPEED_M_S / max(_speed(street, 1.0), 1e-9)
     words = f"none: {problem}; a speed of {ASSUMED_SPEED_M_S:.0f} m/s is assumed"
-    return Metric(factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on an assumed speed",))
+    return Metric(
+        factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on an assumed speed",)
+    )
 
 
 def _speed(street: Street, factor: float) -> float:

@@ -1,6 +1,6 @@
 """Structure from motion of one camera with pycolmap, one thread, seeded."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,6 @@ MATCH_ERROR_PX_AT_640 = 1.5
 FILTER_ERROR_PX = 2.0
 FILTER_ANGLE_DEG = 0.5
 ROBUST_SCALE_PX = 1.0
-
 
 
 @dataclass(frozen=True)
@@ -151,8 +150,8 @@ def adjust(
         focal_px: Focal length to start from, one for both axes; None keeps the model's.
         free_focal: Whether the focal length is adjusted.
         free_radial: Whether a radial term k (x (1 + k r^2)) is adjusted.
-        drop_outliers: Adjust twice and drop poor observations after each; otherwise once, briefly, and keep all,
-            so that costs can be compared.
+        drop_outliers: Adjust twice and drop poor observations after each; otherwise once, briefly, and keep
+            all, so that costs can be compared.
     """
     native = pycolmap.Reconstruction(model.native)
     lens = model.lens.copy()
@@ -166,9 +165,9 @@ def adjust(
             height=camera.height,
             params=[float(lens[:2].mean()), lens[2], lens[3], lens[4]],
         )
-        camera.model, camera.params = replacement.model, replacement.params
+        camera.model, camera.params = replacement.model, replacement.params.tolist()
     else:
-        camera.params = lens[:4]
+        camera.params = lens[:4].tolist()
     _adjust_in_place(native, free_focal, free_radial, drop_outliers)
     return _read(native, len(model.world_from_camera))
 
@@ -239,7 +238,7 @@ def _adjust_in_place(native: Any, free_focal: bool, free_radial: bool, drop_outl
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet() -> Generator[None, None, None]:
     """Keep COLMAP's own log off the terminal; what matters is returned."""
     level = pycolmap.logging.minloglevel
     pycolmap.logging.minloglevel = 3
