@@ -71,9 +71,11 @@ def _titled(picture: np.ndarray, title: str) -> np.ndarray:
 
 
 def _write(picture: np.ndarray, text: str, x: int, y: int) -> None:
+    """White on a dark box, readable on any picture; letters that do not fit are cut off."""
     y = min(max(y, 10), picture.shape[0] - 4)
-    for colour, thickness in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, colour, thickness, cv2.LINE_AA)
+    (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)
+    cv2.rectangle(picture, (x - 2, y - 10), (x + width + 2, y + 3), (0, 0, 0), -1)
+    cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (255, 255, 255), 1, cv2.LINE_AA)
 
 
 def _path(geometry: Geometry, width: int) -> np.ndarray:

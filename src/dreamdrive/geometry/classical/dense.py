@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.classical.confidence import agreement, combine, temporal_neighbours
 from dreamdrive.geometry.classical.depth import sweep_frames
+from dreamdrive.geometry.classical.flanks import fill_flanks
 from dreamdrive.geometry.classical.moving import FLAGGED, moving_evidence, standing_evidence
 from dreamdrive.geometry.classical.poses import Posed
 from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
@@ -52,20 +53,24 @@ def densify(clip: Clip, posed: Posed) -> Dense:
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = _swept(view, sky)
-        moving = _moving(view, inverse, given, posed) * ~sky
+        moving = _moving(view, inverse, sky, given, posed) * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _finish(view, inverse, confidence, sky, moving)
 
 
 def _moving(
-    view: View, inverse: Float[np.ndarray, "f h w"], given: bool, posed: Posed
+    view: View,
+    inverse: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    given: bool,
+    posed: Posed,
 ) -> Float[np.ndarray, "f h w"]:
     if posed.standing:
         return standing_evidence(view)
     if posed.fallback is not None:
         return np.zeros(inverse.shape, np.float32)
-    return moving_evidence(view, inverse, given)
+    return moving_evidence(view, inverse, sky, given)
 
 
 def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
@@ -97,13 +102,17 @@ def _swept(
     confidence = np.zeros(view.grey.shape, np.float32)
     for frame, swept in found.items():
         inverse[frame] = swept.inverse_depth if swept is not None else view.plane_inverse[frame]
+    filled = inverse.copy()
     for frame, swept in found.items():
         if swept is None:
             continue
         neighbours = temporal_neighbours(view.used, frame)
         agreeing = agreement(frame, neighbours, view.cameras, inverse, view.usable)
         confidence[frame] = combine(agreeing, swept.correlation, swept.on_plane)
-    return inverse, confidence
+        filled[frame], confidence[frame] = fill_flanks(
+            swept, confidence[frame], view.plane_inverse[frame], view.usable[frame] & ~sky[frame]
+        )
+    return filled, confidence
 
 
 def _stand_movers(

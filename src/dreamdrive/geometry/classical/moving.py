@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.classical import contest
 from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.classical.roof import grow_upwards
 from dreamdrive.geometry.classical.sweep import sample
 from dreamdrive.geometry.classical.view import View, parallel
 
@@ -27,17 +28,21 @@ _STANDING_LEVELS = 18.0  # grey levels from the temporal median
 
 
 def moving_evidence(
-    view: View, inverse_depth: Float[np.ndarray, "f h w"], known_depth: bool
+    view: View,
+    inverse_depth: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    known_depth: bool,
 ) -> Float[np.ndarray, "f h w"]:
     """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
-    enough sure pixels are kept and filled. Oncoming vehicles look like nearer static things and are found
-    only where their flow leaves the epipolar line.
+    enough sure pixels are kept, filled and given their roofs. Oncoming vehicles look like nearer static ones
+    and are found only where their flow leaves the epipolar line.
 
     Args:
         view: The posed frames.
         inverse_depth: Static depth in 1/m.
+        sky: Sky masks; nothing grows into them.
         known_depth: Whether that depth was given rather than found.
     """
     flows = neighbour_flows(view)
@@ -51,7 +56,9 @@ def moving_evidence(
 
     def decided(frame: int) -> np.ndarray:
         votes = _vote(likely, frame, flows[frame])
-        return decide(votes, _sure(verdicts[frame]), view.usable[frame])
+        found = decide(votes, _sure(verdicts[frame]), view.usable[frame])
+        grown = grow_upwards(view.rgb[frame], found >= FLAGGED, sky[frame]) & view.usable[frame]
+        return np.where(grown, np.maximum(found, FLAGGED), found)
 
     for frame, result in zip(view.frames, parallel(decided, view.frames), strict=True):
         evidence[frame] = result
