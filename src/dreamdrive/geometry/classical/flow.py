@@ -12,6 +12,7 @@ from dreamdrive.geometry.classical.view import View, parallel
 OFFSETS = (-4, -2, -1, 1, 2, 4)  # neighbours in the order of the used frames
 _WINDOW_PX = 9
 _FAR_CORRELATION = 0.7
+_FAR_REACH = 2  # offsets beyond this are compared with the plane only, for speed
 _FAR_LEAD = 0.2  # by which the flow from infinity must correlate better than that from the plane
 _ROUND_TRIP_PX = 1.0
 _ROUND_TRIP_SHARE = 0.05
@@ -51,7 +52,7 @@ def neighbour_flows(view: View) -> dict[int, list[PairFlow]]:
         for offset in OFFSETS
         if 0 <= k + offset < len(frames)
     ]
-    targets = parallel(lambda pair: _flow(view, pair[0], pair[1]), pairs)
+    targets = parallel(lambda pair: _flow(view, *pair), pairs)
     by_pair = {pair[:2]: target for pair, target in zip(pairs, targets, strict=True)}
     checked = parallel(lambda pair: _checked(view, pair, by_pair), pairs)
     result: dict[int, list[PairFlow]] = {frame: [] for frame in frames}
@@ -60,14 +61,14 @@ def neighbour_flows(view: View) -> dict[int, list[PairFlow]]:
     return result
 
 
-def _flow(view: View, frame: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+def _flow(view: View, frame: int, other: int, offset: int) -> tuple[np.ndarray, np.ndarray]:
     """DIS flow after warping ``other`` by the road plane, and where that matches clearly better, by infinity.
 
     Bare asphalt then defaults to lying still on the plane, and the large flow of the near road need not be
     found. What moves along with the camera is nearer to the motion of infinity.
     """
     x, y = _flow_from(view, frame, other, view.plane_inverse[frame])
-    if not view.plane_inverse[frame].any():
+    if abs(offset) > _FAR_REACH or not view.plane_inverse[frame].any():
         return x, y
     far_x, far_y = _flow_from(view, frame, other, np.zeros_like(view.plane_inverse[frame]))
     correlation, grey = Correlation(view.grey[frame], _WINDOW_PX), view.grey[other]
