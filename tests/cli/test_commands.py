@@ -1,0 +1,108 @@
+"""What the commands do with a scene."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from tests.cli.conftest import Run
+from tests.scene.scenes import make_scene
+
+from dreamdrive.data import write_trajectory
+from dreamdrive.drive import MANOEUVRES
+from dreamdrive.export import read_ply
+from dreamdrive.scene.folder import save_scene
+from dreamdrive.scene.trajectory import Trajectory
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """An output folder with a scene that drives 1 m ahead a frame."""
+    scene = make_scene()
+    poses = np.tile(np.eye(4), (3, 1, 1))
+    poses[:, 2, 3] = np.arange(3) - 6
+    cameras = tuple(c.at(pose) for c, pose in zip(scene.cameras, poses, strict=True))
+    save_scene(replace(scene, cameras=cameras, provenance={}), tmp_path / "out" / "scene")
+    return tmp_path / "out"
+
+
+def frames(path: Path) -> tuple[int, float]:
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.average_rate is not None
+        return sum(1 for _ in container.decode(stream)), float(stream.average_rate)
+
+
+@pytest.mark.parametrize("name", MANOEUVRES)
+def test_each_manoeuvre_becomes_a_video(run: Run, out: Path, name: str) -> None:
+    result = run("render", out, "--trajectory", name)
+    assert result.code == 0, result
+    assert frames(out / "video" / f"{name}.mp4") == (5, pytest.approx(20))
+    assert re.search(r"5 frames in [\d.]+ s, [\d.]+ frames/s", result.out)
+
+
+def test_a_trajectory_file_becomes_a_video(run: Run, out: Path, tmp_path: Path) -> None:
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    poses[:, 2, 3] = -6
+    write_trajectory(Trajectory(poses, np.arange(4) / 4), tmp_path / "mine.json")
+    result = run("render", out, "--trajectory", tmp_path / "mine.json", "-o", tmp_path / "deep" / "mine.mp4")
+    assert result.code == 0, result
+    assert frames(tmp_path / "deep" / "mine.mp4") == (4, pytest.approx(4))
+
+
+def test_a_scene_folder_itself_is_taken_too(run: Run, out: Path, tmp_path: Path) -> None:
+    assert run("render", out / "scene", "--trajectory", "stop", "-o", tmp_path / "s.mp4").code == 0
+
+
+def test_a_wrong_trajectory_or_name_is_refused(run: Run, out: Path, tmp_path: Path) -> None:
+    result = run("render", out, "--trajectory", "backwards")
+    assert result.code == 2
+    assert "no such file; expected a file with a trajectory or one of forward, left" in result.err
+    result = run("render", out, "--trajectory", "stop", "-o", tmp_path / "film.avi")
+    assert result.code == 2
+    assert "expected a name that ends in .mp4" in result.err
+    (tmp_path / "file").write_text("mine")
+    result = run("render", out, "--trajectory", "stop", "-o", tmp_path / "file" / "film.mp4")
+    assert result.code == 2
+    assert "cannot write" in result.err
+
+
+def test_a_damaged_scene_is_refused(run: Run, out: Path) -> None:
+    part = out / "scene" / "main-static.safetensors"
+    part.write_bytes(part.read_bytes()[:-1])
+    result = run("render", out, "--trajectory", "stop")
+    assert result.code == 2
+    assert "is damaged" in result.err
+
+
+def test_export_writes_a_file_or_a_sequence(run: Run, out: Path, tmp_path: Path) -> None:
+    assert run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").code == 0
+    assert len(read_ply(tmp_path / "all.ply")) == 11
+    assert run("export", out, "--to", "ply", "-o", tmp_path / "sequence").code == 0
+    assert len(read_ply(tmp_path / "sequence" / "static.ply")) == 7
+    assert len(list((tmp_path / "sequence" / "frames").iterdir())) == 3
+
+
+def test_the_doctor_says_what_is_there(run: Run) -> None:
+    result = run("doctor")
+    assert result.code == 0, result
+    assert re.search(r"native core isa (baseline|avx2|avx512), threads \d+", result.out)
+    assert "everything that generate needs is there" in result.out
+
+
+def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dreamdrive.report.PACKAGES", ("torch", "not-installed-package"))
+    monkeypatch.setattr("dreamdrive.cli.doctor.available_memory_mb", lambda: 500)
+    result = run("doctor")
+    assert result.code == 2
+    assert "missing: less than 3 GB of memory is free" in result.out
+    assert "2 things are missing" in result.err
+
+
+@pytest.mark.parametrize("command", [(), ("generate",), ("render",), ("export",), ("doctor",)])
+def test_help(run: Run, command: tuple[str, ...]) -> None:
+    result = run(*command, "--help")
+    assert result.code == 0
+    assert "usage: dreamdrive" in result.out
