@@ -5,28 +5,34 @@
 namespace dd::DD_ISA {
 namespace {
 
+// A row of lanes. before: transmittance in front of what was handled so far; behind: sum of weight * (value . upstream)
+// handled so far; red to depth: upstream gradients.
+struct Cell {
+  V before, behind, red, green, blue, depth;
+  I last;
+};
+
 struct State {
-  // before: transmittance in front of what was handled so far; behind: sum of weight * (value . upstream) handled so far.
-  alignas(64) float before[kTilePixels], behind[kTilePixels];
-  alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels], depth[kTilePixels];  // upstream
-  alignas(64) int32_t last[kTilePixels];
-  int32_t last_of_row[kStrips * kTile];
+  Cell cells[kStrips][kTile];
+  int32_t last_of_row[kStrips][kTile];
   float* channels;  // upstream, 256 a channel
   float* sums;      // kLanes a channel
 };
 
-void load_pixel(const TileTask& task, const ImageGradients& in, State& state, int k, int64_t pixel) {
+void load_pixel(const TileTask& task, const ImageGradients& in, State& state, int strip, int row, int lane,
+                int64_t pixel) {
+  Cell& cell = state.cells[strip][row];
   if (in.colour) {
-    state.red[k] = in.colour[3 * pixel];
-    state.green[k] = in.colour[3 * pixel + 1];
-    state.blue[k] = in.colour[3 * pixel + 2];
+    cell.red[lane] = in.colour[3 * pixel];
+    cell.green[lane] = in.colour[3 * pixel + 1];
+    cell.blue[lane] = in.colour[3 * pixel + 2];
   }
-  if (in.depth) state.depth[k] = in.depth[pixel];
+  if (in.depth) cell.depth[lane] = in.depth[pixel];
   // alpha = 1 - T_end and dT_end/dalpha_i = -T_end / (1 - alpha_i): the same form as the light from behind.
-  if (in.alpha) state.behind[k] = -in.alpha[pixel] * state.before[k];
+  if (in.alpha) cell.behind[lane] = -in.alpha[pixel] * cell.before[lane];
   if (in.channels)
     for (int c = 0; c < task.n_channels; c++)
-      state.channels[c * kTilePixels + k] = in.channels[pixel * task.n_channels + c];
+      state.channels[c * kTilePixels + at(strip, row) + lane] = in.channels[pixel * task.n_channels + c];
 }
 
 // Returns one more than the last entry that reached any pixel.
@@ -34,20 +40,22 @@ int start(const TileTask& task, const ImageGradients& in, State& state) {
   __builtin_memset(&state, 0, sizeof(state));
   state.channels = task.scratch;
   state.sums = task.scratch + task.n_channels * kTilePixels;
-  __builtin_memset(task.scratch, 0, sizeof(float) * task.n_channels * kTilePixels);
-  __builtin_memcpy(state.before, task.transmittance, sizeof(state.before));
-  __builtin_memcpy(state.last, task.last, sizeof(state.last));
+  if (task.n_channels) __builtin_memset(task.scratch, 0, sizeof(float) * task.n_channels * kTilePixels);
   const int width = task.view->width, x0 = task.tile_x * kTile, y0 = task.tile_y * kTile;
   int deepest = -1;
-  for (int row = 0; row < kTile; row++)
-    for (int column = 0; column < kTile; column++) {
-      const int k = at(column / kLanes, row) + column % kLanes;
-      int32_t& row_last = state.last_of_row[k / kLanes];
-      if (column % kLanes == 0) row_last = -1;
-      if (x0 + column >= width || y0 + row >= task.view->height) continue;
-      load_pixel(task, in, state, k, int64_t(y0 + row) * width + x0 + column);
-      if (state.last[k] > row_last) row_last = state.last[k];
-      if (state.last[k] > deepest) deepest = state.last[k];
+  for (int strip = 0; strip < kStrips; strip++)
+    for (int row = 0; row < kTile; row++) {
+      Cell& cell = state.cells[strip][row];
+      cell.before = load(task.transmittance + at(strip, row));
+      cell.last = load(task.last + at(strip, row));
+      int32_t& row_last = state.last_of_row[strip][row] = -1;
+      for (int lane = 0; lane < kLanes; lane++) {
+        const int x = x0 + strip * kLanes + lane, y = y0 + row;
+        if (x >= width || y >= task.view->height) continue;
+        load_pixel(task, in, state, strip, row, lane, int64_t(y) * width + x);
+        if (cell.last[lane] > row_last) row_last = cell.last[lane];
+      }
+      if (row_last > deepest) deepest = row_last;
     }
   return deepest + 1;
 }
@@ -61,27 +69,26 @@ struct LaneSums {
 static inline void add(V& sum, V value, V factor) { sum += value * factor; }
 
 template <bool kChannels>
-static inline void row_gradient(const TileTask& task, State& state, const Splat& s, int i, int k, V e, V p,
+static inline void row_gradient(const TileTask& task, State& state, const Splat& s, int i, int strip, int row, V e, V p,
                                 float dy, const float* values, LaneSums& sums) {
-  const I seen = (p >= kMinPower) & (load(state.last + k) >= broadcast(int32_t(i)));
+  Cell& cell = state.cells[strip][row];
+  const I seen = (p >= kMinPower) & (cell.last >= broadcast(int32_t(i)));
   const V raw = masked(seen, exp2_bounded(p)), alpha = vmin(raw, broadcast(kMaxAlpha));
   const V inverse = 1.0f / (1.0f - alpha);
-  const V before = load(state.before + k) * inverse, weight = alpha * before;
-  const V red = load(state.red + k), green = load(state.green + k), blue = load(state.blue + k);
-  const V depth = load(state.depth + k), behind = load(state.behind + k);
-  V value = s.colour[0] * red + s.colour[1] * green + s.colour[2] * blue + s.depth * depth;
-  add(sums.red, weight, red);
-  add(sums.green, weight, green);
-  add(sums.blue, weight, blue);
-  add(sums.depth, weight, depth);
+  const V before = cell.before * inverse, behind = cell.behind, weight = alpha * before;
+  V value = s.colour[0] * cell.red + s.colour[1] * cell.green + s.colour[2] * cell.blue + s.depth * cell.depth;
+  add(sums.red, weight, cell.red);
+  add(sums.green, weight, cell.green);
+  add(sums.blue, weight, cell.blue);
+  add(sums.depth, weight, cell.depth);
   if (kChannels)
     for (int c = 0; c < task.n_channels; c++) {
-      const V upstream = load(state.channels + c * kTilePixels + k);
+      const V upstream = load(state.channels + c * kTilePixels + at(strip, row));
       value += values[c] * upstream;
       store(state.sums + c * kLanes, load(state.sums + c * kLanes) + weight * upstream);
     }
-  store(state.before + k, before);
-  store(state.behind + k, behind + weight * value);
+  cell.before = before;
+  cell.behind = behind + weight * value;
   const V by_alpha = before * value - behind * inverse;
   const V v = masked(raw <= kMaxAlpha, alpha * by_alpha);
   const V v_e = v * e, v_y = v * dy;
@@ -104,10 +111,10 @@ void entry_gradient(const TileTask& task, State& state, int i, float left, float
   for (int strip = reach.first_strip; strip <= reach.last_strip; strip++) {
     const Strip lanes(s, left + float(strip * kLanes));
     for (int row = reach.first_row; row <= reach.last_row; row++) {
-      if (state.last_of_row[strip * kTile + row] < i) continue;
+      if (state.last_of_row[strip][row] < i) continue;
       const float dy = top + 0.5f + float(row) - s.v;
       const V e = lanes.e(dy);
-      row_gradient<kChannels>(task, state, s, i, at(strip, row), e, lanes.power(e, dy), dy, values, sums);
+      row_gradient<kChannels>(task, state, s, i, strip, row, e, lanes.power(e, dy), dy, values, sums);
     }
   }
   float* to = &out.v;
@@ -134,7 +141,7 @@ void composite_backward(const TileTask& task, const ImageGradients& in, EntryGra
              : entry_gradient<false>(task, state, i, left, top, out[i], nullptr);
   }
   __builtin_memset(out + n, 0, sizeof(EntryGradient) * (task.n_entries - n));
-  __builtin_memset(out_channels + int64_t(n) * channels, 0, sizeof(float) * channels * (task.n_entries - n));
+  if (channels) __builtin_memset(out_channels + int64_t(n) * channels, 0, sizeof(float) * channels * (task.n_entries - n));
 }
 
 }  // namespace dd::DD_ISA

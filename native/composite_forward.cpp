@@ -114,11 +114,12 @@ void finish(const TileTask& task, const State& state, const Images& out) {
 void composite(const TileTask& task, const Images& out) {
   State state;
   start(task, state);
-  __builtin_memset(task.scratch, 0, sizeof(float) * kTilePixels * task.n_channels);
-  if (task.n_channels)
+  if (task.n_channels) {
+    __builtin_memset(task.scratch, 0, sizeof(float) * kTilePixels * task.n_channels);
     task.last ? blend_all<true, true>(task, state) : blend_all<false, true>(task, state);
-  else
+  } else {
     task.last ? blend_all<true, false>(task, state) : blend_all<false, false>(task, state);
+  }
   finish(task, state, out);
 }
 
