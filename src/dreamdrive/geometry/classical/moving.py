@@ -24,7 +24,7 @@ _OPEN_SHARE = 5 / 480
 _MIN_AREA = 0.0006  # of the image
 _MIN_SURE_SHARE = 0.05  # of a component
 _MIN_SURE_PX = 12
-_STANDING_LEVELS = 18.0  # grey levels from the temporal median
+_STANDING_LEVELS = 10.0  # grey levels from the temporal median
 
 
 def moving_evidence(
@@ -69,9 +69,13 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
     """Evidence (F, H, W) in [0, 1] for a standing camera: pixels that differ from their temporal median."""
     evidence = np.zeros(view.grey.shape, np.float32)
     rgb = view.rgb[view.used].astype(np.float32)
-    median = np.median(rgb, axis=0)
+    median = np.median(rgb, axis=0).astype(np.float32)
+    # A pixel may look like any of its neighbours: edges must not fire when the standing car shakes.
+    kernel = np.ones((3, 3), np.uint8)
+    low, high = np.asarray(cv2.erode(median, kernel)), np.asarray(cv2.dilate(median, kernel))
     for frame, picture in zip(view.frames, rgb, strict=True):
-        difference = cv2.GaussianBlur(np.abs(picture - median).max(axis=-1), (0, 0), 1.0)
+        outside = np.maximum(np.maximum(picture - high, low - picture), 0).max(axis=-1)
+        difference = np.asarray(cv2.GaussianBlur(outside, (0, 0), 1.0))
         votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
         evidence[frame] = decide(votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame])
     return evidence
