@@ -6,7 +6,7 @@ from dreamdrive.geometry.classical.poses import pose_clip
 
 
 def test_a_turning_clip_shows_its_focal_length() -> None:
-    path = turning(12)
+    path = turning(10)
     posed = pose_clip(make_clip(path, calibrated=False, prior_px=1.3 * FOCAL_PX))
     assert posed.fallback is None
     assert posed.focal.observed
@@ -16,7 +16,7 @@ def test_a_turning_clip_shows_its_focal_length() -> None:
 
 
 def test_a_straight_clip_keeps_the_prior() -> None:
-    posed = pose_clip(make_clip(straight([0.5] * 9), calibrated=False, prior_px=1.15 * FOCAL_PX))
+    posed = pose_clip(make_clip(straight([0.5] * 6), calibrated=False, prior_px=1.15 * FOCAL_PX))
     assert posed.fallback is None
     assert not posed.focal.observed
     assert posed.focal.px == pytest.approx(1.15 * FOCAL_PX)
@@ -24,6 +24,6 @@ def test_a_straight_clip_keeps_the_prior() -> None:
 
 
 def test_a_calibrated_focal_length_is_used_as_given() -> None:
-    posed = pose_clip(make_clip(turning(8)))
+    posed = pose_clip(make_clip(turning(10)))
     assert posed.focal.observed
     assert posed.focal.px == FOCAL_PX

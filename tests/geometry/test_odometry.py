@@ -22,6 +22,10 @@ def test_a_turn_is_followed() -> None:
     assert path_error(found.world_from_camera, path) < 0.01
 
 
+def test_a_fast_turn_counts_as_motion() -> None:
+    assert evidence.look(make_clip(turning(6))).motion.moving.all()
+
+
 def test_a_stop_and_go_drive_stops_and_goes_again() -> None:
     steps = [0.5, 0.5, 0.5, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5]
     found = run(straight(steps))

@@ -26,8 +26,12 @@ def texture(seed: int) -> np.ndarray:
 TEXTURES = [texture(seed) for seed in range(4)]
 
 
+PER_M = (24, 14, 14, 5)
+
+
 def _paint(index: int, u_m: np.ndarray, v_m: np.ndarray) -> np.ndarray:
-    u, v = np.mod(u_m * 24, 1023).astype(np.float32), np.mod(v_m * 24, 1023).astype(np.float32)
+    """Texture at a metric place; far walls are painted coarsely, so that they do not alias."""
+    u, v = (np.mod(place * PER_M[index], 1023).astype(np.float32) for place in (u_m, v_m))
     return cv2.remap(TEXTURES[index], u, v, cv2.INTER_LINEAR)
 
 

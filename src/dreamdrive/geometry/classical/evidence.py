@@ -38,7 +38,7 @@ class Evidence:
 
 def look(clip: Clip) -> Evidence:
     """Measure motion and find fixed regions at 320 px width."""
-    width, height = clip.size
+    camera, (width, height) = clip.rig[0], clip.size
     size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
     working = features.working_size(width, height)
     grey = features.to_grey(clip.frames, size)
@@ -61,8 +61,8 @@ def look(clip: Clip) -> Evidence:
     return Evidence(
         grey,
         street,
-        clip.rig[0].resized(size[0], size[1]),
-        clip.rig[0].resized(working[0], working[1]),
+        camera.resized(size[0], size[1]),
+        camera.resized(working[0], working[1]),
         moves,
         fixed,
         tuple(detected),

@@ -59,7 +59,7 @@ def _extract_one(grey: np.ndarray, usable: np.ndarray) -> Features:
         nfeatures=0, contrastThreshold=CONTRAST, edgeThreshold=10, sigma=1.6, enable_precise_upscale=True
     )
     found, descriptors = sift.detectAndCompute(grey, mask)
-    if len(found) == 0 or descriptors is None:
+    if len(found) == 0:
         return Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.uint8))
     rows = np.array([(*point.pt, point.response, point.size, point.angle) for point in found], np.float64)
     order = np.lexsort((rows[:, 4], rows[:, 3], rows[:, 1], rows[:, 0], -rows[:, 2]))[:MAX_FEATURES]

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.geometry.classical.sfm import Model
 
 MIN_REGISTERED = 0.9
-MIN_POINTS = 600
+MIN_POINTS, MIN_POINTS_A_FRAME = 600, 25
 MIN_SEEN = 60
 MAX_REPROJECTION_PX = 0.5
 MIN_FORWARD = 0.9
@@ -36,7 +36,8 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
 
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
     steady
-    length: from a standstill the direction of a step is noise and its length is far below the mean.
+    length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise and its
+    length is far below the mean.
     """
     registered = model.registered
     share = float(registered.mean())
@@ -48,8 +49,7 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     backwards = bool(judged.any() and np.median(forward[judged]) < 0)
     ahead = -forward if backwards else forward
     least = float(ahead[judged].min()) if judged.any() else 1.0
-    mean = float(length[judged].mean()) if judged.any() else 0.0
-    variation = float(length[judged].std() / mean) if mean > 0 else 0.0
+    variation = _variation(length[judged])
     figures = {
         "registered_share": share,
         "points": len(model.points),
@@ -62,7 +62,8 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     reasons: list[str] = []
     if share < MIN_REGISTERED:
         reasons.append(f"only {registered.sum()} of {len(registered)} frames could be placed")
-    if len(model.points) < MIN_POINTS and seen.min() < MIN_SEEN:
+    enough = min(MIN_POINTS, MIN_POINTS_A_FRAME * len(registered))
+    if len(model.points) < enough and seen.min() < MIN_SEEN:
         reasons.append(f"only {len(model.points)} points, {seen.min()} in the poorest frame")
     if model.reprojection_px > MAX_REPROJECTION_PX:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")
@@ -73,6 +74,15 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     if variation > MAX_VARIATION:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
     return Verdict(tuple(reasons), figures, backwards)
+
+
+def _variation(length: Float[np.ndarray, " s"]) -> float:
+    """Standard deviation of the step lengths about their linear trend, over their mean."""
+    if len(length) < 2 or length.mean() <= 0:
+        return 0.0
+    time = np.arange(len(length)) - (len(length) - 1) / 2
+    trend = (time @ length) / (time @ time)
+    return float((length - trend * time).std() / length.mean())
 
 
 def _steps(poses: Float[np.ndarray, "f 4 4"]) -> tuple[np.ndarray, np.ndarray]:

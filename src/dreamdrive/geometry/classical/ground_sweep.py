@@ -22,6 +22,7 @@ MIN_RADIAL = 0.1
 STILL_NCC = 0.5
 MIN_PIXELS = 50
 EVALUATIONS = 80
+SPREAD = 0.04
 
 
 @dataclass(frozen=True, order=True)
@@ -138,7 +139,7 @@ def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | Non
     height, pitch, roll = _refine(score, float(ladder[peak]), float(ladder[1] / ladder[0]))
     normal = _tilted(poses, pitch, roll)
     offset = height - float(normal @ poses[:, :3, 3].mean(axis=0))
-    return Plane(normal, offset, height, prominence, 1.0, 0.03)
+    return Plane(normal, offset, height, prominence, 1.0, SPREAD)
 
 
 def _box(image: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def measure(
 ) -> Motion:
     """Motion of a clip; ``grey`` is at 320 px width.
 
-    A step counts as moving when over at least two frames and 0.2 s the 70th percentile of the flow reaches
+    A step counts as moving when in it, or over two frames and 0.2 s, the 70th percentile of the flow reaches
     one pixel and the 25th a third of one: traffic that passes a standing camera moves only a part of the
     picture. The clip stands when fewer than three windows, or 15 % of them, move.
     """
@@ -71,10 +71,12 @@ def measure(
     interval = float(np.median(np.diff(times_s))) if count > 1 else WINDOW_S
     gap = min(max(2, round(WINDOW_S / max(interval, 1e-6))), max(count - 1, 1))
     windows = [_flow(grey, usable, start, start + gap) for start in range(max(count - gap, 0))]
-    window_moves = np.array(
-        [upper >= STANDING_PX and lower >= STANDING_LOWER_PX for upper, lower, _ in windows]
-    )
     steps = [_flow(grey, usable, start, start + 1) for start in range(count - 1)]
+    step_moves = np.array([_exceeds(step) for step in steps], dtype=bool)
+    window_moves = np.array(
+        [_exceeds(seen) or step_moves[start : start + gap].any() for start, seen in enumerate(windows)],
+        dtype=bool,
+    )
     moving = np.zeros(max(count - 1, 0), bool)
     for step in range(count - 1):
         around = window_moves[max(0, step - gap + 1) : step + 1]
@@ -86,6 +88,11 @@ def measure(
         brightness=float(np.median([np.percentile(frame, 90) for frame in grey])),
         tracks=float(np.median([found for _, _, found in windows])) if windows else 0.0,
     )
+
+
+def _exceeds(seen: tuple[float, float, int]) -> bool:
+    upper, lower, _ = seen
+    return upper >= STANDING_PX and lower >= STANDING_LOWER_PX
 
 
 def _flow(grey: np.ndarray, usable: np.ndarray, first: int, second: int) -> tuple[float, float, int]:
