@@ -15,7 +15,7 @@ DRAWN_GRADIENT = 8.0
 RADIAL_COSINE = 0.35
 CENTRE = (0.5, 0.47)
 FAR_RADIUS, FAR_BOTTOM = 0.28, 0.62
-MIN_EDGE_PIXELS = 8
+MIN_EDGE_PIXELS, MIN_BORDER_PIXELS = 8, 20
 ACROSS_SHARE = 0.65
 BAR_LEVEL = 16
 BORDER = 0.03
@@ -163,6 +163,7 @@ def _components(edges: _Edges, bonnet: np.ndarray) -> tuple[np.ndarray, np.ndarr
         ahead = ROAD_AHEAD[0] < across < ROAD_AHEAD[1] and ROAD_AHEAD[2] < down < ROAD_AHEAD[3]
         drawn = not ahead and np.percentile(edges.deviation[pixels], 75) < DRAWN_DEVIATION
         strong = edges.gradient[pixels].mean() >= DRAWN_GRADIENT
+        at_border = at_border and across_rays >= MIN_BORDER_PIXELS
         (overlay if strong and (at_border or drawn) else objects)[_fill(pixels)] = True
     return overlay & ~bonnet, objects & ~bonnet & ~overlay
 
