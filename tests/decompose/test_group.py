@@ -1,9 +1,9 @@
 import numpy as np
 import torch
+from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
 from dreamdrive.fit import SeedOptions, initialise
-from tests.streets import small_street, street_clip, true_geometry
 
 
 def scene(**changes):
@@ -46,7 +46,7 @@ def test_one_car_is_one_actor_whose_track_is_the_cars():
 
 def test_copies_of_one_car_lie_on_top_of_each_other():
     """Every frame seeds its own copy; merged, they are as compact as one car, not a trail."""
-    street, clip, geometry, seeds = scene()
+    _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
     whole = cast(clip, geometry, seeds, grouping, ActorOptions())
     centres = [

@@ -1,11 +1,12 @@
 """Dynamic clusters become actors: one track each, and one canonical set of Gaussians in place of copies.
 
 The initial points hold a moving car once per frame. Each cluster's copies are carried to one canonical time
-along the cluster's own track, so that at any time the copies lie on top of each other where the car is; a life
-span lets the copies nearest in time speak loudest, and hides the actor when it was not seen.
+along the cluster's own track, so that at any time the copies lie on top of each other where the car is; a
+life span lets the copies nearest in time speak loudest, and hides the actor when it was not seen.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -118,9 +119,9 @@ def _path(
 ) -> _Path:
     """Where one cluster's anchor is in each frame, and how deep.
 
-    Between two frames a rigid thing's image changes by a similarity; its scale is the inverse ratio of depths,
-    which flow measures far better than any single frame measures depth. The depths of single frames fix the
-    common factor.
+    Between two frames a rigid thing's image changes by a similarity; its scale is the inverse ratio of
+    depths, which flow measures far better than any single frame measures depth. The depths of single frames
+    fix the common factor.
     """
     seen = np.unique(frames[rows])
     centres = np.array([np.median(pixels[rows[frames[rows] == f], :2], axis=0) for f in seen])
@@ -153,10 +154,11 @@ def _similarity(
     column = points[:, 0].astype(int).clip(0, flow.shape[1] - 1)
     moved = points + flow[row, column]
     cv2.setRNGSeed(0)
-    found, inliers = cv2.estimateAffinePartial2D(
+    result: Any = cv2.estimateAffinePartial2D(
         points, moved, method=cv2.RANSAC, ransacReprojThreshold=1.0, maxIters=500, confidence=0.999
     )
-    if found is None or inliers is None or int(inliers.sum()) < options.least_points:
+    found, inliers = result
+    if found is None or int(inliers.sum()) < options.least_points:
         return None
     scale = float(np.hypot(found[0, 0], found[1, 0]))
     return found if 0.5 < scale < 2.0 else None
@@ -168,7 +170,7 @@ def _smooth_logs(
     trust: Float[np.ndarray, " j"],
     weight: float,
 ) -> Float[np.ndarray, " k"]:
-    """Least squares: close to ``seen`` weakly, to the measured differences strongly, at an even pace between."""
+    """Least squares: close to ``seen`` weakly, to the measured differences strongly, at an even pace."""
     count = len(seen)
     rows, right = [np.sqrt(weight) * np.eye(count)], [np.sqrt(weight) * seen]
     for k in range(count - 1):

@@ -1,13 +1,14 @@
 """F_group: spatio-temporal clusters vote on what is dynamic (eq. 10)."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from dreamdrive.decompose.flow import neighbour_flow
@@ -25,7 +26,9 @@ class GroupOptions:
         candidate: Only Gaussians above this score are clustered; the rest is one static mass.
         reach_px: Neighbours of one source frame are at most this far apart in its image.
         reach_depth: ... and differ by at most this in the logarithm of depth.
-        link: Two clusters of neighbouring frames are one if this share of the smaller lands on the other.
+        link: Two clusters of neighbouring frames are one if this share of the smaller lands on the other ...
+        link_depth: ... and their depths differ by at most this in the logarithm: a car that passes behind
+            another stays itself.
         majority: Share of votes that makes a whole cluster dynamic.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
         clustering: False keeps each Gaussian's own vote (for ablation).
@@ -33,9 +36,10 @@ class GroupOptions:
 
     threshold: float = 0.35
     candidate: float = 0.25
-    reach_px: float = 3.0
+    reach_px: float = 4.5
     reach_depth: float = 0.06
     link: float = 0.4
+    link_depth: float = 0.25
     majority: float = 0.4
     smallest: int = 24
     clustering: bool = True
@@ -122,7 +126,7 @@ def _space_time_labels(
 def _components(pixels: Float[np.ndarray, "m 3"], options: GroupOptions) -> Int[np.ndarray, " m"]:
     """Connected components of one frame's points."""
     scale = options.reach_px / options.reach_depth
-    tree = cKDTree(np.column_stack([pixels[:, :2], np.log(pixels[:, 2]) * scale]))
+    tree = KDTree(np.column_stack([pixels[:, :2], np.log(pixels[:, 2]) * scale]))
     pairs = tree.query_pairs(options.reach_px, p=np.inf, output_type="ndarray")
     return connected_components(_graph(pairs, len(pixels)), directed=False)[1]
 
@@ -141,18 +145,20 @@ def _links(
     """Pairs of clusters of neighbouring frames that flow carries onto each other."""
     seen = np.flatnonzero(~clip.held_out).tolist()
     pairs: list[tuple[int, int]] = []
-    for frame, other in zip(seen[:-1], seen[1:], strict=True):
+    size = np.bincount(labels)
+    for frame, other in pairwise(seen):
         here, there = np.flatnonzero(frames == frame), np.flatnonzero(frames == other)
         if not (len(here) and len(there)):
             continue
         flow = neighbour_flow(clip, frame, other)
         column, row = pixels[here, 0].astype(int), pixels[here, 1].astype(int)
         landed = pixels[here, :2] + flow[row.clip(0, flow.shape[0] - 1), column.clip(0, flow.shape[1] - 1)]
-        distance, hit = cKDTree(pixels[there, :2]).query(landed, distance_upper_bound=options.reach_px)
+        distance, hit = KDTree(pixels[there, :2]).query(landed, distance_upper_bound=options.reach_px)
         reached = np.isfinite(distance)
+        near = np.abs(np.log(pixels[there[hit[reached]], 2] / pixels[here[reached], 2])) < options.link_depth
+        reached[reached] = near
         votes: dict[tuple[int, int], int] = {}
         for a, b in zip(labels[here][reached].tolist(), labels[there[hit[reached]]].tolist(), strict=True):
             votes[a, b] = votes.get((a, b), 0) + 1
-        size = np.bincount(labels)
         pairs += [(a, b) for (a, b), n in votes.items() if n > options.link * min(size[a], size[b])]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)

@@ -29,21 +29,19 @@ class ScoreOptions:
             ``"error_and_evidence"`` also asks the recorded clip's moving evidence.
         error_scale: Error that counts as 1: absolute, so that a street where nothing moves scores nothing.
         error_sigma_px: Blur of the error maps.
-        threshold: tau of eq. 9, absolute.
         steps: Training steps, one frame each.
         rate: Adam's step.
         width: Units of the two hidden layers.
         position_frequencies: Octaves of the encoding of the position.
         shrink: The splat of the scores is compared at this fraction of the size.
         window: Scores are splatted only into frames within this many training frames of their source; None
-            splats all into all (the paper). A car's copy stands on empty road in all frames but a few: averaged
-            over all, its target is that of the road, and nothing that moves fast ever crosses the threshold.
+            splats all into all (the paper). A car's copy stands on empty road in all frames but a few:
+            averaged over all, its target is that of the road, and nothing fast ever crosses the threshold.
     """
 
     target: TargetName = "error_and_evidence"
     error_scale: float = 0.2
     error_sigma_px: float = 2.0
-    threshold: float = 0.5
     steps: int = 150
     rate: float = 5e-3
     width: int = 64
@@ -95,7 +93,7 @@ def score(
         progress: Called with steps done and steps in all.
 
     Returns:
-        Scores in (0, 1); those above ``options.threshold`` are dynamic (eq. 9).
+        Scores in (0, 1); eq. 9 compares them with an absolute threshold, ``GroupOptions.threshold``.
     """
     if gaussians.features is None:
         raise ValueError("score: the Gaussians carry no features")
@@ -156,7 +154,7 @@ def _inputs(gaussians: Gaussians, frequencies: int) -> Float[Tensor, "n d"]:
 
 def _targets(
     clip: Clip, geometry: Geometry, errors: Float[np.ndarray, "f h w"], options: ScoreOptions
-) -> dict[int, tuple[Float[Tensor, "h w"], Float[Tensor, "h w"]]]:
+) -> dict[int, tuple[Float[Tensor, "a b"], Float[Tensor, "a b"]]]:
     """What each frame's splatted scores should be, and the weight of each pixel."""
     blurred = smoothed(errors, options.error_sigma_px)
     targets: dict[int, tuple[Tensor, Tensor]] = {}

@@ -37,7 +37,7 @@ class SeedOptions:
     """
 
     stride_px: int = 2
-    moving_stride_px: int = 2
+    moving_stride_px: int = 3
     moving_evidence: float = 0.5
     far_m: float = 250.0
     footprint: float = 0.55
@@ -197,16 +197,19 @@ def _gaussians(kept: list[_Seeds], options: SeedOptions) -> Gaussians:
     sh = np.zeros((len(colour), coefficients, 3))
     sh[:, 0] = (colour - 0.5) / SH_C0
     opacity = 0.25 + 0.5 * np.clip(confidence, 0, 1)
-    tensor = lambda value: torch.tensor(value, dtype=torch.float32)  # noqa: E731
     return Gaussians(
-        means=tensor(np.concatenate([s.points for s in kept])),
-        quaternions=tensor(rotations),
-        log_scales=tensor(np.log(scales)),
-        logit_opacities=tensor(np.log(opacity / (1 - opacity))),
-        sh=tensor(sh),
+        means=_tensor(np.concatenate([s.points for s in kept])),
+        quaternions=_tensor(rotations),
+        log_scales=_tensor(np.log(scales)),
+        logit_opacities=_tensor(np.log(opacity / (1 - opacity))),
+        sh=_tensor(sh),
         source_frame=torch.tensor(np.concatenate([np.full(len(s.points), s.frame) for s in kept])),
-        features=tensor(np.concatenate([s.features for s in kept])),
+        features=_tensor(np.concatenate([s.features for s in kept])),
     )
+
+
+def _tensor(values: np.ndarray) -> Float[torch.Tensor, "..."]:
+    return torch.tensor(values, dtype=torch.float32)
 
 
 def _surfels(

@@ -52,5 +52,5 @@ def fit_static(
 
 
 def footprints(gaussians: Gaussians) -> torch.Tensor:
-    """Size of each seed in metres (N,), the unit of its moves: the geometric mean of its two largest deviations."""
+    """Size of each seed in metres (N,), the unit of its moves: mean of its two largest log-scales."""
     return gaussians.log_scales.detach().topk(2, dim=1).values.mean(dim=1).exp()

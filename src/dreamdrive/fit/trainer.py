@@ -1,6 +1,6 @@
 """The optimisation loop both fits share: render a frame, compare, step, densify."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from dreamdrive.fit.losses import LossName, disparity_loss, render_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationField
+from dreamdrive.scene.deformation import DeformationField, alive_at
 from dreamdrive.scene.exposure import ExposureNetwork, transform_colour
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
@@ -75,14 +75,21 @@ class Model:
     sky: Sky
     exposure: ExposureNetwork
 
-    def at(self, t_s: float) -> Gaussians:
-        """All Gaussians at a time, differentiable: the static ones, then the dynamic ones."""
+    def at(self, t_s: float) -> tuple[Gaussians, list[Tensor]]:
+        """What is there at a time, differentiable: the static Gaussians, then the living dynamic ones.
+
+        The second value tells, for each of ``parts()``, which of its rows they are.
+        """
         parts: list[Gaussians] = []
+        rows: list[Tensor] = []
         if self.static is not None:
             parts.append(self.static.gaussians())
+            rows.append(torch.arange(len(self.static)))
         if self.dynamic is not None and self.deformation is not None:
-            parts.append(self.deformation.apply_at(self.dynamic.gaussians(), t_s))
-        return Gaussians.concatenate(*parts) if len(parts) > 1 else parts[0]
+            whole = self.dynamic.gaussians()
+            rows.append(alive_at(whole, t_s))
+            parts.append(self.deformation.apply_at(whole.select(rows[-1]), t_s))
+        return (Gaussians.concatenate(*parts) if len(parts) > 1 else parts[0]), rows
 
     def parts(self) -> list[Parameters]:
         """The present parameter sets in the order of ``at``."""
@@ -115,7 +122,7 @@ def splat(
 def optimise(
     model: Model,
     views: dict[int, list[View]],
-    densifiers: list[Densifier],
+    densifiers: Sequence[Densifier],
     options: FitOptions,
     seed: int,
     progress: Progress,
@@ -141,7 +148,7 @@ def optimise(
         shrink = 2 if done < options.half_size_share else 1
         which = order.pop()
         view = views[shrink][which]
-        gaussians = model.at(view.time_s)
+        gaussians, rows = model.at(view.time_s)
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
         degree = gaussians.sh_degree if done >= options.sh_after else 0
         rendered = splat(gaussians, view.camera, degree, offsets_px)
@@ -149,7 +156,9 @@ def optimise(
         loss.backward()
         _decay(model, optimiser, options, done)
         _step(model, optimiser)
-        _densify(model, densifiers, offsets_px, rendered, shrink, step, options.steps, generator)
+        _observe(densifiers, rows, [len(p) for p in model.parts()], offsets_px, rendered, shrink)
+        for part, densifier in zip(model.parts(), densifiers, strict=True):
+            densifier.update(part, step, options.steps, generator)
         progress(step + 1, options.steps)
 
 
@@ -207,22 +216,21 @@ def _step(model: Model, optimiser: torch.optim.Adam) -> None:
     optimiser.zero_grad(set_to_none=True)
 
 
-def _densify(
-    model: Model,
-    densifiers: list[Densifier],
+def _observe(
+    densifiers: Sequence[Densifier],
+    rows: list[Tensor],
+    counts: list[int],
     offsets_px: Tensor,
     rendered: Render,
     shrink: int,
-    step: int,
-    steps: int,
-    generator: torch.Generator,
 ) -> None:
-    gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
+    """Hand each part its share of the screen gradients, those of absent rows being zero."""
+    # A pixel of a half-size frame is two pixels wide.
+    gradient = (offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)) / shrink
     start = 0
-    for part, densifier in zip(model.parts(), densifiers, strict=True):
-        rows = slice(start, start + len(part))
-        # A pixel of a half-size frame is two pixels wide.
-        densifier.observe(gradient[rows] / shrink, rendered.visible[rows])
-        start += len(part)
-    for part, densifier in zip(model.parts(), densifiers, strict=True):
-        densifier.update(part, step, steps, generator)
+    for densifier, present, count in zip(densifiers, rows, counts, strict=True):
+        here = slice(start, start + len(present))
+        whole = torch.zeros(count, 2).index_copy_(0, present, gradient[here])
+        seen = torch.zeros(count, dtype=torch.bool).index_copy_(0, present, rendered.visible[here])
+        densifier.observe(whole, seen)
+        start += len(present)

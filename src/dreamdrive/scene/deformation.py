@@ -1,5 +1,6 @@
 """Where the dynamic Gaussians are at a given time: rigid actor tracks plus a learned residual (eq. 11-12)."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -136,6 +137,15 @@ def faded(gaussians: Gaussians, t_s: float) -> Gaussians:
     logit = gaussians.logit_opacities.clamp(max=80.0)
     logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
     return replace(gaussians, logit_opacities=logit, lifespan=None)
+
+
+def alive_at(gaussians: Gaussians, t_s: float) -> Int[Tensor, " m"]:
+    """Rows that a life span leaves at least 1/255 of their opacity at ``t_s``: no other can be seen."""
+    if gaussians.lifespan is None:
+        return torch.arange(len(gaussians))
+    centre_s, deviation_s = gaussians.lifespan.unbind(-1)
+    reach = math.sqrt(2 * math.log(255.0))
+    return torch.nonzero((t_s - centre_s).abs() <= reach * deviation_s).squeeze(1)
 
 
 class DeformationField(nn.Module):

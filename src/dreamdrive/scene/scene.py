@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationField, faded
+from dreamdrive.scene.deformation import DeformationField, alive_at, faded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.sky import Sky
@@ -63,12 +63,13 @@ class Scene:
 
     @torch.no_grad()
     def dynamic_at(self, t_s: float) -> Gaussians:
-        """The dynamic Gaussians where they are at ``t_s``."""
+        """The dynamic Gaussians that live at ``t_s``, where they are then."""
+        living = self.dynamic.select(alive_at(self.dynamic, t_s))
         if self.deformation is None:
-            return faded(self.dynamic, t_s)
-        return self.deformation.apply_at(self.dynamic, t_s)
+            return faded(living, t_s)
+        return self.deformation.apply_at(living, t_s)
 
     def at(self, t_s: float) -> Gaussians:
-        """All Gaussians at ``t_s``: the static ones, then the dynamic ones; no gradients."""
+        """All Gaussians at ``t_s``: the static ones, then the living dynamic ones; no gradients."""
         static = self.static_at(t_s)
         return Gaussians.concatenate(static, self.dynamic_at(t_s)) if len(self.dynamic) else static

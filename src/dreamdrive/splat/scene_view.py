@@ -80,12 +80,11 @@ def render_scene(
 
 def _select(scene: Scene, t_s: float, part: Part) -> tuple[Gaussians, Tensor]:
     """The Gaussians of a part and 1 for each dynamic one, 0 for each static one."""
-    if part == "static":
-        gaussians, dynamic = scene.static_at(t_s), 0
-    elif part == "dynamic":
-        gaussians, dynamic = scene.dynamic_at(t_s), len(scene.dynamic)
+    if part == "dynamic":
+        gaussians, static = scene.dynamic_at(t_s), 0
     else:
-        gaussians, dynamic = scene.at(t_s), len(scene.dynamic)
-    mark = torch.zeros(len(gaussians), dtype=gaussians.means.dtype)
-    mark[len(gaussians) - dynamic :] = 1
+        gaussians = scene.static_at(t_s) if part == "static" else scene.at(t_s)
+        static = len(scene.static)
+    mark = torch.ones(len(gaussians), dtype=gaussians.means.dtype)
+    mark[:static] = 0
     return gaussians, mark

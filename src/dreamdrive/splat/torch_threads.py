@@ -1,13 +1,13 @@
 """One torch thread beside the native pool."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import torch
 
 
 @contextmanager
-def one_torch_thread() -> Iterator[None]:
+def one_torch_thread() -> Generator[None, None, None]:
     """Run torch's own operations on the calling thread; the native core keeps its threads.
 
     After every operation torch's workers spin for a while, on the very cores the native threads want: a
