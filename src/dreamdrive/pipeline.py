@@ -161,7 +161,7 @@ def _decompose(
     if representation == "static":
         return None, Parts(static.gaussians, static.gaussians.select(nothing), None, ())
     if representation == "deformable":
-        return None, Parts(seeds.select(nothing), seeds, None, ())
+        return None, Parts(seeds.select(nothing), static.gaussians, None, ())
     scores = stages.run(
         "score",
         ("static",),
@@ -169,7 +169,7 @@ def _decompose(
         lambda tell: score(
             clip,
             geometry,
-            static.gaussians,
+            seeds,
             error_maps(clip, geometry, static.gaussians, static.sky, static.exposure),
             settings.score,
             seed,
