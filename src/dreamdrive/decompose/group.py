@@ -154,6 +154,7 @@ def _links(
         column, row = pixels[here, 0].astype(int), pixels[here, 1].astype(int)
         landed = pixels[here, :2] + flow[row.clip(0, flow.shape[0] - 1), column.clip(0, flow.shape[1] - 1)]
         distance, hit = KDTree(pixels[there, :2]).query(landed, distance_upper_bound=options.reach_px)
+        hit = np.asarray(hit)
         reached = np.isfinite(distance)
         near = np.abs(np.log(pixels[there[hit[reached]], 2] / pixels[here[reached], 2])) < options.link_depth
         reached[reached] = near

@@ -1,5 +1,6 @@
 """L_render: how far a rendered frame is from its reference (eq. 14), and what keeps geometry sane."""
 
+import math
 from typing import Literal
 
 import torch
@@ -52,3 +53,9 @@ def disparity_loss(
     inverse = alpha.clamp(min=1e-3) / depth_sum.clamp(min=1e-3)
     target = torch.where(weight > 0, 1 / reference_m.clamp(min=1e-3), inverse.detach())
     return (weight * (inverse - target).abs()).sum() / weight.sum().clamp(min=1.0)
+
+
+def shape_loss(log_scales: Float[Tensor, "n 3"], ratio: float) -> Float[Tensor, ""]:
+    """Mean excess of the logarithm of largest over smallest scale beyond that of ``ratio`` (PhysGaussian)."""
+    spread = log_scales.amax(1) - log_scales.amin(1)
+    return torch.relu(spread - math.log(ratio)).mean()

@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from dreamdrive.fit.densify import Densifier
-from dreamdrive.fit.losses import LossName, disparity_loss, render_loss
+from dreamdrive.fit.losses import LossName, disparity_loss, render_loss, shape_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
 from dreamdrive.scene.camera import Camera
@@ -21,6 +20,9 @@ from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import one_torch_thread, rasterize
 
 Progress = Callable[[int, int], None]
+
+# Steps between two looks at the shapes, as in drivestudio: they change slowly and all of them are looked at.
+SHAPE_EVERY = 10
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class FitOptions:
         sh_after: Share of the steps after which view-dependent colour is learned.
         depth_weight: Weight of the inverse-depth term (1/m), decayed to a tenth over the fit.
         sky_weight: Weight of coverage in sky pixels.
-        shape_weight: Weight of the excess of the largest over the smallest scale beyond ``shape_ratio``.
+        shape_weight: Weight of ``shape_loss``, every ``SHAPE_EVERY`` steps.
         shape_ratio: Elongation that is free.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
@@ -48,7 +50,7 @@ class FitOptions:
     sh_after: float = 0.4
     depth_weight: float = 0.5
     sky_weight: float = 0.05
-    shape_weight: float = 0.02
+    shape_weight: float = 0.2
     shape_ratio: float = 10.0
     warm_up: float = 0.1
     deformation_rate: float = 2e-3
@@ -152,7 +154,9 @@ def optimise(
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
         degree = gaussians.sh_degree if done >= options.sh_after else 0
         rendered = splat(gaussians, view.camera, degree, offsets_px)
-        loss = _loss(model, gaussians, rendered, view, skies[shrink][which], options, done)
+        loss = _loss(model, rendered, view, skies[shrink][which], options, done)
+        if step % SHAPE_EVERY == 0:
+            loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
         loss.backward()
         _decay(model, optimiser, options, done)
         _step(model, optimiser)
@@ -164,7 +168,6 @@ def optimise(
 
 def _loss(
     model: Model,
-    gaussians: Gaussians,
     rendered: Render,
     view: View,
     sky: Float[Tensor, "h w 3"],
@@ -181,9 +184,6 @@ def _loss(
         )
     if options.sky_weight:
         loss = loss + options.sky_weight * (rendered.alpha * view.sky).mean()
-    if options.shape_weight:
-        spread = gaussians.log_scales.amax(1) - gaussians.log_scales.amin(1)
-        loss = loss + options.shape_weight * torch.relu(spread - float(np.log(options.shape_ratio))).mean()
     return loss
 
 
