@@ -23,14 +23,18 @@ def pinhole(clip_dir: Path, size: tuple[int, int]) -> np.ndarray:
     scale = size[0] / meta["width"]
     k = meta["intrinsics"]
     return np.array(
-        [[k["fx"] * scale, 0, (k["cx"] + 0.5) * scale], [0, k["fy"] * scale, (k["cy"] + 0.5) * scale], [0, 0, 1]]
+        [
+            [k["fx"] * scale, 0, (k["cx"] + 0.5) * scale],
+            [0, k["fy"] * scale, (k["cy"] + 0.5) * scale],
+            [0, 0, 1],
+        ]
     )
 
 
 def moving_masks(clip_dir: Path, frames: list[int], size: tuple[int, int]) -> np.ndarray:
     """Hulls (F, H, W) of the boxes that move, less the hulls of all nearer boxes.
 
-    Counted are cars, medium-sized trucks and motorcycles with motion ``Moving``, within 50 m, at least 12 px high.
+    Counted are cars, medium-sized trucks and motorcycles that are ``Moving``, within 50 m, at least 12 px high.
     """
     boxes = json.loads((clip_dir / "cuboids.json").read_text())["frames"]
     poses = camera_path(clip_dir, frames)
@@ -38,7 +42,9 @@ def moving_masks(clip_dir: Path, frames: list[int], size: tuple[int, int]) -> np
     return np.stack([_mask(boxes[i], pose, matrix, size) for i, pose in zip(frames, poses, strict=True)])
 
 
-def _mask(boxes: list[dict], world_from_camera: np.ndarray, matrix: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+def _mask(
+    boxes: list[dict], world_from_camera: np.ndarray, matrix: np.ndarray, size: tuple[int, int]
+) -> np.ndarray:
     camera_from_world = np.linalg.inv(world_from_camera)
     seen = []
     for box in boxes:
@@ -92,4 +98,6 @@ def path_error(estimated: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
     rotation = u @ flip @ vt
     scale = (s * np.diag(flip)).sum() / (a0**2).sum()
     residual = b0 - scale * a0 @ rotation.T
-    return float(np.sqrt((residual**2).sum(1).mean())), float(np.linalg.norm(np.diff(b, axis=0), axis=1).sum())
+    return float(np.sqrt((residual**2).sum(1).mean())), float(
+        np.linalg.norm(np.diff(b, axis=0), axis=1).sum()
+    )
