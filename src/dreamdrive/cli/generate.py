@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from rich.console import Console
 from tyro.conf import Positional, arg
 
-from dreamdrive.cli.machine import use_all_cores
+from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.errors import InputError
 
@@ -58,9 +58,11 @@ def generate(
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
     """
+    use_all_cores()
     from dreamdrive.pipeline import generate as run
     from dreamdrive.scene.control import Control
 
+    stop_like_an_interruption()
     control = Control(
         path=input,
         frames=frames,
@@ -73,7 +75,6 @@ def generate(
         seed=seed,
     )
     console = Console()
-    use_all_cores()
     with Bars(console) as bars:
         made = run(
             control,
@@ -90,9 +91,8 @@ def generate(
         )
     if not made:
         console.print(f"{out} is already finished; --from STAGE computes it again from a stage on")
-    console.print(
-        f"scene   {out / 'scene'}\nvideos  {out / 'video'}\nreport  {out / 'report.json'}", soft_wrap=True
-    )
+    for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
+        console.print(f"{what:<7} {out / name}", soft_wrap=True)
 
 
 def parse_size(text: str) -> tuple[int, int]:

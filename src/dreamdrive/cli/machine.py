@@ -1,6 +1,7 @@
 """What this machine offers, and its use."""
 
 import os
+import signal
 
 
 def available_cores() -> int:
@@ -30,3 +31,11 @@ def use_all_cores() -> None:
 
     torch.set_num_threads(available_cores())
     set_threads(available_cores())
+
+
+def stop_like_an_interruption() -> None:
+    """Let a request to terminate end the work as Ctrl-C does.
+
+    To be called after pycolmap is imported: it installs a handler that prints the stack and dies.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -33,10 +33,10 @@ def render(
         shift_m: How far shift goes to the right in metres; negative is to the left.
         output: The video; without it OUT/video/NAME.mp4.
     """
+    use_all_cores()
     from dreamdrive.data.video_writer import write_video
     from dreamdrive.pictures import drive_frames, frame_rate
 
-    use_all_cores()
     scene = open_scene(out)
     name, drive = _drive(scene, trajectory, shift_m)
     target = out / "video" / f"{name}.mp4" if output is None else output
