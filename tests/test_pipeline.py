@@ -11,6 +11,8 @@ import pytest
 
 from dreamdrive import Control, InputError, generate, load_scene, options, pipeline
 from dreamdrive.fit import FitOptions
+from dreamdrive.geometry import reconstruct
+from dreamdrive.scene.geometry import Geometry
 from dreamdrive.stages import STAGES
 
 TINY = Control(frames="0:6", size=(64, 40), hold_out=4, seed=1)
@@ -156,6 +158,16 @@ def test_another_request_is_refused_and_loses_nothing(finished: Path, tmp_path: 
     make(tmp_path, replace(TINY, hold_out=None), force=True)
     assert scene_bytes(tmp_path) != before
     assert not list((tmp_path / "held_out").iterdir())
+
+
+def test_a_clip_of_nothing_but_sky_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(*arguments: object, **named: object) -> Geometry:
+        found = reconstruct(*arguments, **named)  # type: ignore[arg-type]
+        return replace(found, sky=np.ones_like(found.sky))
+
+    monkeypatch.setattr(pipeline, "reconstruct", nothing)
+    with pytest.raises(InputError, match="no frame shows anything solid"):
+        make(tmp_path)
 
 
 @pytest.mark.slow

@@ -126,7 +126,7 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
         "initialise",
         ("prior", "geometry"),
         quality.seeds,
-        lambda _: initialise(clip, geometry, quality.seeds),
+        lambda _: initialise(clip, _seen(clip, geometry), quality.seeds),
     )
     static = stages.run(
         "static",
@@ -144,6 +144,17 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
     )
     return _Made(clip, geometry, scene, scored)
+
+
+def _seen(clip: Clip, geometry: Geometry) -> Geometry:
+    """The geometry itself, if there is anything in it to make Gaussians from."""
+    solid = clip.valid & (geometry.depth_m > 0) & ~geometry.sky & (geometry.fixed_regions == 0)
+    if not solid[~clip.held_out].any():
+        raise InputError(
+            "no frame shows anything solid: all of it is sky, fixed to the camera or without a picture; "
+            "choose other --frames"
+        )
+    return geometry
 
 
 def _decompose(
