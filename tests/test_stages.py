@@ -113,7 +113,7 @@ def test_an_interrupted_stage_leaves_the_earlier_ones(tmp_path: Path) -> None:
 def test_progress_names_the_stage(tmp_path: Path) -> None:
     work = Work(tmp_path)
     work.run("prior")
-    assert work.seen == [("prior", 0, 0), ("prior", 1, 1), ("prior", 1, 1)]
+    assert work.seen == [("prior", 0, 0), ("prior", 1, 1)]
 
 
 def test_nouns_come_back_equal(tmp_path: Path) -> None:

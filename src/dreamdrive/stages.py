@@ -116,18 +116,19 @@ class Stages:
 
     def measure(self, name: str, compute: Callable[[Progress], T]) -> T:
         """Run something that is not kept, and record what it cost."""
-        whole = 1
+        at, whole = 0, 1
 
         def tell(done: int, total: int) -> None:
-            nonlocal whole
-            whole = total or whole
+            nonlocal at, whole
+            at, whole = done, total or 1
             self.progress(name, done, total)
 
         tell(0, 0)
         start = time.perf_counter()
         value = compute(tell)
         self.records[name] = StageRecord(round(time.perf_counter() - start, 2), peak_rss_mb(), cached=False)
-        tell(whole, whole)
+        if at < whole:
+            tell(whole, whole)
         return value
 
     def _compute(
