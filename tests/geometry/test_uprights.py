@@ -7,6 +7,7 @@ from dreamdrive.geometry.classical.flanks import fill_flanks
 from dreamdrive.geometry.classical.roof import grow_upwards
 
 SHAPE = (60, 80)
+UNKNOWN = np.zeros(SHAPE, np.float32)
 PLANE = (np.maximum(np.arange(60) - 20, 0)[:, None] * np.full((1, 80), 0.005)).astype(np.float32)
 CONTACT = 50
 STREET = np.ones(SHAPE, bool)
@@ -50,16 +51,16 @@ def test_a_roof_of_the_same_colour_is_added_and_the_background_is_not():
     frame = np.clip(rgb, 0, 255).astype(np.uint8)
     flagged = np.zeros(SHAPE, bool)
     flagged[32:50, 30:50] = True
-    grown = grow_upwards(frame, flagged, np.zeros(SHAPE, bool))
+    grown = grow_upwards(frame, flagged, np.zeros(SHAPE, bool), UNKNOWN)
     assert grown[flagged].all()
     assert grown[22:32, 31:49].mean() > 0.9
     assert grown[:18].mean() < 0.02
-    np.testing.assert_array_equal(grown, grow_upwards(frame, flagged, np.zeros(SHAPE, bool)))
+    np.testing.assert_array_equal(grown, grow_upwards(frame, flagged, np.zeros(SHAPE, bool), UNKNOWN))
     sky = np.zeros(SHAPE, bool)
     sky[:26] = True
-    assert not grow_upwards(frame, flagged, sky)[:26].any()
+    assert not grow_upwards(frame, flagged, sky, UNKNOWN)[:26].any()
 
 
 def test_nothing_flagged_stays_nothing():
     frame = np.zeros((*SHAPE, 3), np.uint8)
-    assert not grow_upwards(frame, np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)).any()
+    assert not grow_upwards(frame, np.zeros(SHAPE, bool), np.zeros(SHAPE, bool), UNKNOWN).any()

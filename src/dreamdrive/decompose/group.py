@@ -1,7 +1,6 @@
 """F_group: spatio-temporal clusters vote on what is dynamic (eq. 10)."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import torch
@@ -26,9 +25,11 @@ class GroupOptions:
         candidate: Only Gaussians above this score are clustered; the rest is one static mass.
         reach_px: Neighbours of one source frame are at most this far apart in its image.
         reach_depth: ... and differ by at most this in the logarithm of depth.
-        link: Two clusters of neighbouring frames are one if this share of the smaller lands on the other ...
-        link_depth: ... and their depths differ by at most this in the logarithm: a car that passes behind
-            another stays itself.
+        link: A label that flow carries onto a cluster keeps its points if it has this share of the strongest
+            label's; weaker ones are noise.
+        link_depth: Flow carries a label only onto points whose depth differs by at most this in the
+            logarithm: a car that passes behind another stays itself.
+        join: Labels that hang together in this share of their common frames are one thing.
         majority: Share of votes that makes a whole cluster dynamic.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
         clustering: False keeps each Gaussian's own vote (for ablation).
@@ -38,8 +39,9 @@ class GroupOptions:
     candidate: float = 0.25
     reach_px: float = 4.5
     reach_depth: float = 0.06
-    link: float = 0.4
-    link_depth: float = 0.25
+    link: float = 0.2
+    link_depth: float = 0.3
+    join: float = 0.7
     majority: float = 0.4
     smallest: int = 24
     clustering: bool = True
@@ -63,9 +65,8 @@ def group(
 ) -> Grouping:
     """Cluster in space and time, then let the majority of each cluster decide for all of it.
 
-    Within one source frame neighbours in the image at like depth belong together; between neighbouring frames
-    clusters are joined where optical flow carries one onto the other, so that a thing keeps its cluster while
-    it moves.
+    Within one source frame neighbours in the image at like depth belong together; from frame to frame optical
+    flow carries labels on, so that a thing keeps its cluster while it moves.
 
     Args:
         clip: Frames for the flow; held-out frames are not read.
@@ -110,17 +111,84 @@ def source_pixels(
 def _space_time_labels(
     clip: Clip, geometry: Geometry, gaussians: Gaussians, index: Int[np.ndarray, " m"], options: GroupOptions
 ) -> Int[np.ndarray, " m"]:
-    pixels = source_pixels(geometry, gaussians, index)
+    """One label a thing: components of a frame take over the labels that flow carries onto their points.
+
+    Labels are handed on point by point, so that two cars that come to touch in the image keep theirs. Parts
+    of one thing that began with labels of their own are joined when they hang together most of the time.
+    """
+    points = source_pixels(geometry, gaussians, index)
     frames = gaussians.source_frame.numpy()[index]
-    labels = np.zeros(len(index), dtype=np.int64)
-    count = 0
-    for frame in np.unique(frames).tolist():
+    labels = np.full(len(index), -1, dtype=np.int64)
+    component = np.full(len(index), -1, dtype=np.int64)
+    seen = np.flatnonzero(~clip.held_out).tolist()
+    for before, frame in zip([None, *seen[:-1]], seen, strict=True):
         rows = np.flatnonzero(frames == frame)
-        labels[rows] = count + _components(pixels[rows], options)
-        count = int(labels[rows].max()) + 1
-    links = _links(clip, pixels, frames, labels, options)
-    joined = connected_components(_graph(links, count), directed=False)[1]
-    return joined[labels]
+        if not len(rows):
+            continue
+        component[rows] = component.max() + 1 + _components(points[rows], options)
+        earlier = np.flatnonzero(frames == before) if before is not None else rows[:0]
+        if before is not None and len(earlier):
+            flow = neighbour_flow(clip, before, frame)
+            labels[rows] = _handed_on(points[earlier], labels[earlier], flow, points[rows], options)
+        labels[rows] = _completed(labels[rows], component[rows], int(labels.max()) + 1, options)
+    return _joined(labels, component, frames, options) if len(labels) else labels
+
+
+def _handed_on(
+    sources: Float[np.ndarray, "s 3"],
+    labels: Int[np.ndarray, " s"],
+    flow: Float[np.ndarray, "h w 2"],
+    points: Float[np.ndarray, "m 3"],
+    options: GroupOptions,
+) -> Int[np.ndarray, " m"]:
+    """Label of the nearest point of the frame before after flow, at like depth; -1 where there is none."""
+    column = sources[:, 0].astype(int).clip(0, flow.shape[1] - 1)
+    row = sources[:, 1].astype(int).clip(0, flow.shape[0] - 1)
+    found = KDTree(sources[:, :2] + flow[row, column]).query(
+        points[:, :2], distance_upper_bound=options.reach_px
+    )
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
+    reached = np.isfinite(distance)
+    nearest = np.where(reached, nearest, 0)
+    like = np.abs(np.log(sources[nearest, 2] / points[:, 2])) < options.link_depth
+    return np.where(reached & like, labels[nearest], -1)
+
+
+def _completed(
+    labels: Int[np.ndarray, " m"], component: Int[np.ndarray, " m"], fresh: int, options: GroupOptions
+) -> Int[np.ndarray, " m"]:
+    """Give every point of one frame a label: the strongest of its component's, or a fresh one."""
+    labels = labels.copy()
+    for one in np.unique(component).tolist():
+        members = np.flatnonzero(component == one)
+        known, counts = np.unique(labels[members][labels[members] >= 0], return_counts=True)
+        if not len(known):
+            labels[members] = fresh
+            fresh += 1
+            continue
+        strong = known[counts >= max(options.link * counts.max(), 1)]
+        lost = members[~np.isin(labels[members], strong)]
+        labels[lost] = known[counts.argmax()]
+    return labels
+
+
+def _joined(
+    labels: Int[np.ndarray, " m"],
+    component: Int[np.ndarray, " m"],
+    frames: Int[np.ndarray, " m"],
+    options: GroupOptions,
+) -> Int[np.ndarray, " m"]:
+    """Labels of parts that share a component in most of the frames in which both are there, made one."""
+    count = int(labels.max()) + 1
+    present = np.zeros((count, int(frames.max()) + 1), dtype=np.int64)
+    present[labels, frames] = 1
+    within = np.zeros((count, int(component.max()) + 1), dtype=np.int64)
+    within[labels, component] = 1
+    both_there, together = present @ present.T, within @ within.T
+    life = np.minimum.outer(both_there.diagonal(), both_there.diagonal())
+    same = (together >= options.join * np.maximum(both_there, 1)) & (both_there >= 0.5 * life)
+    pairs = np.argwhere(same & (both_there > 0))
+    return connected_components(_graph(pairs, count), directed=False)[1][labels]
 
 
 def _components(pixels: Float[np.ndarray, "m 3"], options: GroupOptions) -> Int[np.ndarray, " m"]:
@@ -133,33 +201,3 @@ def _components(pixels: Float[np.ndarray, "m 3"], options: GroupOptions) -> Int[
 
 def _graph(pairs: Int[np.ndarray, "p 2"], count: int) -> coo_matrix:
     return coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-
-
-def _links(
-    clip: Clip,
-    pixels: Float[np.ndarray, "m 3"],
-    frames: Int[np.ndarray, " m"],
-    labels: Int[np.ndarray, " m"],
-    options: GroupOptions,
-) -> Int[np.ndarray, "p 2"]:
-    """Pairs of clusters of neighbouring frames that flow carries onto each other."""
-    seen = np.flatnonzero(~clip.held_out).tolist()
-    pairs: list[tuple[int, int]] = []
-    size = np.bincount(labels)
-    for frame, other in pairwise(seen):
-        here, there = np.flatnonzero(frames == frame), np.flatnonzero(frames == other)
-        if not (len(here) and len(there)):
-            continue
-        flow = neighbour_flow(clip, frame, other)
-        column, row = pixels[here, 0].astype(int), pixels[here, 1].astype(int)
-        landed = pixels[here, :2] + flow[row.clip(0, flow.shape[0] - 1), column.clip(0, flow.shape[1] - 1)]
-        distance, hit = KDTree(pixels[there, :2]).query(landed, distance_upper_bound=options.reach_px)
-        hit = np.asarray(hit)
-        reached = np.isfinite(distance)
-        near = np.abs(np.log(pixels[there[hit[reached]], 2] / pixels[here[reached], 2])) < options.link_depth
-        reached[reached] = near
-        votes: dict[tuple[int, int], int] = {}
-        for a, b in zip(labels[here][reached].tolist(), labels[there[hit[reached]]].tolist(), strict=True):
-            votes[a, b] = votes.get((a, b), 0) + 1
-        pairs += [(a, b) for (a, b), n in votes.items() if n > options.link * min(size[a], size[b])]
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)

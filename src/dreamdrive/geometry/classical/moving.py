@@ -57,7 +57,8 @@ def moving_evidence(
     def decided(frame: int) -> np.ndarray:
         votes = _vote(likely, frame, flows[frame])
         found = decide(votes, _sure(verdicts[frame]), view.usable[frame])
-        grown = grow_upwards(view.rgb[frame], found >= FLAGGED, sky[frame]) & view.usable[frame]
+        px_per_m = view.plane_inverse[frame] * np.float32(view.cameras[frame].fy_px)
+        grown = grow_upwards(view.rgb[frame], found >= FLAGGED, sky[frame], px_per_m) & view.usable[frame]
         return np.where(grown, np.maximum(found, FLAGGED), found)
 
     for frame, result in zip(view.frames, parallel(decided, view.frames), strict=True):

@@ -2,9 +2,10 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 _UP_OF_HEIGHT = 0.9
+_CAR_HEIGHT_M = 2.0
 _UP_OF_WIDTH = 0.45
 _LIKELY_SHARE = 0.5  # of the way up that is taken for the thing until the colours say otherwise
 _SIDE_SHARE = 6  # a sixth of the width is looked at on both sides, as background
@@ -15,17 +16,22 @@ _ROUNDS = 2
 
 
 def grow_upwards(
-    rgb: UInt8[np.ndarray, "h w 3"], flagged: Bool[np.ndarray, "h w"], sky: Bool[np.ndarray, "h w"]
+    rgb: UInt8[np.ndarray, "h w 3"],
+    flagged: Bool[np.ndarray, "h w"],
+    sky: Bool[np.ndarray, "h w"],
+    px_per_m: Float[np.ndarray, "h w"],
 ) -> Bool[np.ndarray, "h w"]:
     """Flagged regions with their roofs (H, W), by colour: GrabCut (Rother et al., 2004) of a band above each.
 
     The band is 0.9 of a region's height or 0.45 of its width high, whichever is more, over the columns of the
-    region's upper half. Nothing that is flagged is given up, and only what hangs together with it is added.
+    region's upper half, but ends where a car standing at the region's lower edge does. Nothing flagged is
+    given up, and only what hangs together with it is added.
 
     Args:
         rgb: The picture.
         flagged: Pixels known to move.
         sky: Never part of a thing.
+        px_per_m: Size in the picture of a metre that stands on the road at each pixel; 0 where unknown.
     """
     grown = flagged.copy()
     count, found, stats, _ = cv2.connectedComponentsWithStats(flagged.astype(np.uint8))
@@ -33,6 +39,8 @@ def grow_upwards(
     for label in range(1, count):
         left, top, width, height = (int(value) for value in stats[label, :4])
         up = round(max(_UP_OF_HEIGHT * height, _UP_OF_WIDTH * width))
+        scale = float(px_per_m[top + height - 1, left + width // 2])
+        up = min(up, max(0, round(_CAR_HEIGHT_M * scale) - height)) if scale > 0 else up
         side = max(3, width // _SIDE_SHARE)
         rows = slice(max(0, top - up), top + height)
         columns = slice(max(0, left - side), left + width + side)
