@@ -26,15 +26,15 @@ help:
 
 # Third-party packages, pinned; again only when what is wanted changes.
 $(VENV)/.packages: constraints.txt pyproject.toml
-	$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0] + "; choose another with make PYTHON=...")'
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0] + "; choose another with make PYTHON=...")'
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --constraint constraints.txt scikit-build-core nanobind cmake ninja
-	touch $@
+	@touch $@
 
 # The package itself: Python is used in place, the C++ core is compiled.
 $(VENV)/.installed: $(VENV)/.packages CMakeLists.txt $(wildcard native/*)
 	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
-	touch $@
+	@touch $@
 
 install: $(VENV)/.installed
 
@@ -52,7 +52,7 @@ check: install
 
 ci: check
 	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
-	for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)"; done
+	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)"; done
 
 format: install
 	$(BIN)/ruff check --fix .

@@ -72,6 +72,8 @@ def generate(
     choose_prior(prior)
     if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
+    if control.path is not None and out.resolve() == control.path.resolve():
+        raise InputError(f"{out} is the input itself; choose another output folder")
     options = {
         "prior": prior,
         "geometry": geometry_method,

@@ -110,6 +110,11 @@ def test_geometry_files_that_are_not_there(run: Run, clip: Path, tmp_path: Path)
     )
 
 
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_an_output_that_is_the_input(run: Run, clip: Path, force: tuple[str, ...]) -> None:
+    expect(run, clip, clip, *force, message="is the input itself")
+
+
 @pytest.mark.parametrize("place", ["file", "file/below/it"])
 def test_an_output_below_a_file(run: Run, clip: Path, tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("mine")
