@@ -91,10 +91,9 @@ def main() -> None:
 
 def measure(name: str, run: Run, out: Path) -> dict:
     """Generate a scene, unless it is there already, and compare it with what is known of the clip."""
-    command = ["-m", "dreamdrive.cli.main", "generate", str(DATA / "clips" / run.clip / run.source)]
-    subprocess.run(
-        [sys.executable, *command, *run.options, "-o", str(out)], check=True, stdout=subprocess.DEVNULL
-    )
+    program = [str(Path(sys.executable).parent / "dreamdrive"), "generate"]
+    command = [*program, str(DATA / "clips" / run.clip / run.source), *run.options, "-o", str(out)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     report = json.loads((out / "report.json").read_text())
     row = {
         "name": name,

@@ -196,7 +196,7 @@ def _decompose(
         lambda _: group(clip, geometry, seeds, scores, settings.group),
     )
     moving = cast(clip, geometry, seeds, grouping, settings.cast)
-    parts = Parts(static.gaussians.select(~grouping.dynamic), moving.gaussians, moving.tracks, moving.actors)
+    parts = Parts(static.gaussians.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)
     return Scored(static.gaussians, scores, settings.group.threshold), parts
 
 

@@ -41,7 +41,7 @@ def fitted(stages, representation: str, steps: int = 120, seed: int = 0):
         parts = Parts(none, start.gaussians, None, ())
     else:
         whole = cast(clip, geometry, seeds, grouping)
-        static = start.gaussians.select(~grouping.dynamic)
+        static = start.gaussians.select(grouping.static)
         parts = Parts(static, whole.gaussians, whole.tracks, whole.actors)
     network = DeformationConfig(width=32)
     return fit(clip, geometry, parts, start, FitOptions(steps=steps), network, DensifySettings(), seed, quiet)

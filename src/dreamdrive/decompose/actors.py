@@ -5,6 +5,7 @@ along the cluster's own track, so that at any time the copies lie on top of each
 life span lets the copies nearest in time speak loudest, and hides the actor when it was not seen.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,12 +32,15 @@ class ActorOptions:
         contact_weight: Trust in one frame's depth against that in the change of size between two frames.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
         least_points: Flow vectors needed to measure a change of size and place.
+        opacity: Opacity to start from: what moves hides what it passes, and must not leave the static
+            Gaussians behind it to take on its colours.
     """
 
     lifespan_frames: float = 1.25
     contact_weight: float = 0.05
     least_frames: int = 2
     least_points: int = 12
+    opacity: float = 0.8
 
 
 @dataclass(frozen=True)
@@ -200,6 +204,7 @@ def _merge(
     interval = float(np.median(np.diff(times)))
     means = chosen.means.numpy().astype(np.float64)
     log_scales = chosen.log_scales.numpy().copy()
+    opacity = torch.full_like(chosen.logit_opacities, math.log(options.opacity / (1 - options.opacity)))
     actor = np.full(len(means), -1, dtype=np.int64)
     deviation = np.full(len(means), 0.5 * interval)
     translations, pivots, actors = [], [], []
@@ -226,6 +231,7 @@ def _merge(
         chosen,
         means=torch.tensor(means, dtype=torch.float32),
         log_scales=torch.tensor(log_scales, dtype=torch.float32),
+        logit_opacities=opacity,
         actor=torch.from_numpy(actor),
         lifespan=torch.tensor(np.column_stack([clip.times_s[frames], deviation]), dtype=torch.float32),
     )

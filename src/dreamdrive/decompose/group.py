@@ -1,5 +1,6 @@
 """F_group: spatio-temporal clusters vote on what is dynamic (eq. 10)."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from dreamdrive.decompose.covered import covered
 from dreamdrive.decompose.flow import neighbour_flow
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -54,10 +56,17 @@ class Grouping:
     Attributes:
         dynamic: The final label (N,).
         cluster: Index of each Gaussian's space-time cluster (N,), -1 outside all dynamic clusters.
+        covered: Static ones that no frame has seen, see ``covered`` (N,).
     """
 
     dynamic: Bool[Tensor, " n"]
     cluster: Int[Tensor, " n"]
+    covered: Bool[Tensor, " n"]
+
+    @property
+    def static(self) -> Bool[Tensor, " n"]:
+        """What the scene's static part is made of (N,)."""
+        return ~self.dynamic & ~self.covered
 
 
 def group(
@@ -77,8 +86,8 @@ def group(
     """
     value = scores.detach().numpy()
     if not options.clustering:
-        dynamic = value > options.threshold
-        return Grouping(torch.from_numpy(dynamic), torch.from_numpy(np.where(dynamic, 0, -1)))
+        cluster = np.where(value > options.threshold, 0, -1)
+        return _grouping(clip, geometry, gaussians, cluster, options)
     index = np.flatnonzero(value > options.candidate)
     labels = _space_time_labels(clip, geometry, gaussians, index, options)
     size = np.bincount(labels, minlength=1)
@@ -87,7 +96,20 @@ def group(
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     order = np.cumsum(wins) - 1
     cluster[index[wins[labels]]] = order[labels[wins[labels]]]
-    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))
+    return _grouping(clip, geometry, gaussians, cluster, options)
+
+
+def _grouping(
+    clip: Clip,
+    geometry: Geometry,
+    gaussians: Gaussians,
+    cluster: Int[np.ndarray, " n"],
+    options: GroupOptions,
+) -> Grouping:
+    dynamic = torch.from_numpy(cluster >= 0)
+    pixels = source_pixels(geometry, gaussians, np.arange(len(gaussians)))
+    hidden = covered(clip, geometry, gaussians, dynamic, pixels, math.ceil(options.reach_px / 1.5))
+    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
 
 
 def source_pixels(
