@@ -1,7 +1,7 @@
 """Confidence from agreement between frames."""
 
 import numpy as np
-import toy
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical.confidence import (
     GROUND_PRIOR_CONFIDENCE,

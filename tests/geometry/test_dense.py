@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-import toy
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical import view as viewing
 from dreamdrive.geometry.classical.dense import densify

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import toy
 from hypothesis import given, settings
 from hypothesis.extra.numpy import arrays
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical.dense import densify
 from dreamdrive.geometry.classical.moving import FLAGGED, decide, fill

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import toy
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical.dense import densify
 from dreamdrive.geometry.picture import draw_geometry

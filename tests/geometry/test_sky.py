@@ -1,7 +1,7 @@
 """The sky mask on pictures whose sky is known."""
 
 import numpy as np
-import toy
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
 from dreamdrive.scene.camera import Camera

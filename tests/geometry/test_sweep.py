@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-import toy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.geometry import toy
 
 from dreamdrive.geometry.classical import smoothing, sweep
 from dreamdrive.geometry.classical.depth import sweep_frames
