@@ -85,10 +85,10 @@ class Model:
         parts: list[Gaussians] = []
         rows: list[Tensor] = []
         if self.static is not None:
-            parts.append(self.static.gaussians())
+            parts.append(self.static.gaussians().without_features())
             rows.append(torch.arange(len(self.static)))
         if self.dynamic is not None and self.deformation is not None:
-            whole = self.dynamic.gaussians()
+            whole = self.dynamic.gaussians().without_features()
             rows.append(alive_at(whole, t_s))
             parts.append(self.deformation.apply_at(whole.select(rows[-1]), t_s))
         return (Gaussians.concatenate(*parts) if len(parts) > 1 else parts[0]), rows

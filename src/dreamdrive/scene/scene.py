@@ -58,13 +58,13 @@ class Scene:
 
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:
-        """The static Gaussians; the time matters only to those with a life span."""
-        return faded(self.static, t_s)
+        """The static Gaussians without features; the time matters only to those with a life span."""
+        return faded(self.static.without_features(), t_s)
 
     @torch.no_grad()
     def dynamic_at(self, t_s: float) -> Gaussians:
-        """The dynamic Gaussians that live at ``t_s``, where they are then."""
-        living = self.dynamic.select(alive_at(self.dynamic, t_s))
+        """The dynamic Gaussians that live at ``t_s``, where they are then, without features."""
+        living = self.dynamic.without_features().select(alive_at(self.dynamic, t_s))
         if self.deformation is None:
             return faded(living, t_s)
         return self.deformation.apply_at(living, t_s)
