@@ -34,7 +34,7 @@ def pinhole(clip_dir: Path, size: tuple[int, int]) -> np.ndarray:
 def moving_masks(clip_dir: Path, frames: list[int], size: tuple[int, int]) -> np.ndarray:
     """Hulls (F, H, W) of the boxes that move, less the hulls of all nearer boxes.
 
-    Counted are cars, medium-sized trucks and motorcycles that are ``Moving``, within 50 m, at least 12 px high.
+    Counted: cars, medium-sized trucks and motorcycles that are ``Moving``, within 50 m, at least 12 px high.
     """
     boxes = json.loads((clip_dir / "cuboids.json").read_text())["frames"]
     poses = camera_path(clip_dir, frames)

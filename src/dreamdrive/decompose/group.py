@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from torch import Tensor
@@ -202,14 +202,13 @@ def _joined(
 ) -> Int[np.ndarray, " m"]:
     """Labels of parts that share a component in most of the frames in which both are there, made one."""
     count = int(labels.max()) + 1
-    present = np.zeros((count, int(frames.max()) + 1), dtype=np.int64)
-    present[labels, frames] = 1
-    within = np.zeros((count, int(component.max()) + 1), dtype=np.int64)
-    within[labels, component] = 1
-    both_there, together = present @ present.T, within @ within.T
-    life = np.minimum.outer(both_there.diagonal(), both_there.diagonal())
-    same = (together >= options.join * np.maximum(both_there, 1)) & (both_there >= 0.5 * life)
-    pairs = np.argwhere(same & (both_there > 0))
+    present, within = _incidence(labels, frames), _incidence(labels, component)
+    both_there, together = (present @ present.T).tocoo(), (within @ within.T).tocsr()
+    life = present.sum(axis=1)
+    a, b, common = both_there.row, both_there.col, both_there.data
+    shared = np.asarray(together[a, b]).ravel()
+    same = (shared >= options.join * common) & (common >= 0.5 * np.minimum(life[a], life[b]))
+    pairs = np.column_stack([a[same], b[same]])
     return connected_components(_graph(pairs, count), directed=False)[1][labels]
 
 
@@ -223,3 +222,9 @@ def _components(pixels: Float[np.ndarray, "m 3"], options: GroupOptions) -> Int[
 
 def _graph(pairs: Int[np.ndarray, "p 2"], count: int) -> coo_matrix:
     return coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+
+
+def _incidence(labels: Int[np.ndarray, " m"], columns: Int[np.ndarray, " m"]) -> csr_array:
+    """1 where a label occurs together with a column, else 0."""
+    pairs = np.unique(np.column_stack([labels, columns]), axis=0)
+    return csr_array((np.ones(len(pairs), dtype=np.int64), (pairs[:, 0], pairs[:, 1])))

@@ -1,6 +1,7 @@
 """A first estimate of the far background from the sky pixels of all frames."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -14,10 +15,13 @@ from dreamdrive.scene.sky import Sky
 # The panorama reaches this far beyond what the frames saw, so that turned and raised views stay inside it.
 MARGIN_RAD = math.radians(40.0)
 MAX_TEXELS = (512, 1024)
+BACKDROP_BLUR = 6.0  # texels
 
 
 def estimate_sky(clip: Clip, geometry: Geometry) -> Sky:
     """Average what the frames show of the sky, by direction alone, and continue it smoothly elsewhere.
+
+    Below the horizon it is a blurred backdrop of what static things look like in each direction.
 
     Args:
         clip: Frames; held-out frames are not read.
@@ -33,15 +37,52 @@ def estimate_sky(clip: Clip, geometry: Geometry) -> Sky:
     texel_rad = 1.0 / geometry.cameras[0].fx_px
     rows = min(MAX_TEXELS[0], math.ceil((elevation_rad[1] - elevation_rad[0]) / texel_rad))
     columns = min(MAX_TEXELS[1], math.ceil((azimuth_rad[1] - azimuth_rad[0]) / texel_rad))
+    empty = Sky(torch.zeros(rows, columns, 3), azimuth_rad, elevation_rad)
+    colour, weight = _gathered(clip, geometry, empty, _sky_only(clip, geometry))
+    sky = replace(empty, texture=torch.tensor(_filled(colour, weight, 2.0), dtype=torch.float32))
+    return _with_backdrop(sky, clip, geometry)
+
+
+def _with_backdrop(sky: Sky, clip: Clip, geometry: Geometry) -> Sky:
+    """The panorama with what static things look like, blurred, where no sky was seen.
+
+    A view that looks past a car ahead meets directions in which no frame has seen the street. A hole there in
+    the colour of the sky is the first thing one sees.
+    """
+    _, seen = _gathered(clip, geometry, sky, _sky_only(clip, geometry))
+    free = clip.valid & (geometry.fixed_regions == 0)
+    still = [free[i] & ~_near_moving(geometry, i) for i in range(len(clip))]
+    blurred = _filled(*_gathered(clip, geometry, sky, still), BACKDROP_BLUR)
+    reach = cv2.dilate((seen > 0).astype(np.uint8), np.ones((5, 5), np.uint8))[..., None] > 0
+    # Above the horizon the sky itself goes on.
+    rows = np.linspace(sky.elevation_rad[1], sky.elevation_rad[0], len(blurred))[:, None, None]
+    texture = np.where(reach | (rows > 0), sky.texture.numpy(), blurred)
+    return replace(sky, texture=torch.tensor(texture, dtype=torch.float32))
+
+
+def _sky_only(clip: Clip, geometry: Geometry) -> list[Bool[np.ndarray, "h w"]]:
+    free = clip.valid & (geometry.fixed_regions == 0)
+    return [_clear_sky(geometry.sky[i]) & free[i] for i in range(len(clip))]
+
+
+def _near_moving(geometry: Geometry, frame: int) -> Bool[np.ndarray, "h w"]:
+    moving = (geometry.moving[frame] >= 0.5).astype(np.uint8)
+    return cv2.dilate(moving, np.ones((9, 9), np.uint8)) > 0
+
+
+def _gathered(
+    clip: Clip, geometry: Geometry, sky: Sky, masks: list[Bool[np.ndarray, "h w"]]
+) -> tuple[Float[np.ndarray, "r c 3"], Float[np.ndarray, "r c"]]:
+    """Sums of the colours seen in each texel's direction, and how many there were."""
+    rows, columns = sky.texture.shape[:2]
     colour, weight = np.zeros((rows, columns, 3)), np.zeros((rows, columns))
-    for i, (azimuth, elevation) in zip(frames, angles, strict=True):
-        usable = _clear_sky(geometry.sky[i]) & clip.valid[i] & (geometry.fixed_regions == 0)
-        row = _texel(elevation_rad[1] - elevation, elevation_rad, rows)[usable]
-        column = _texel(azimuth - azimuth_rad[0], azimuth_rad, columns)[usable]
-        np.add.at(colour, (row, column), clip.frames[i][usable] / 255.0)
+    for i in np.flatnonzero(~clip.held_out).tolist():
+        azimuth, elevation = _angles(geometry, i)
+        row = _texel(sky.elevation_rad[1] - elevation, sky.elevation_rad, rows)[masks[i]]
+        column = _texel(azimuth - sky.azimuth_rad[0], sky.azimuth_rad, columns)[masks[i]]
+        np.add.at(colour, (row, column), clip.frames[i][masks[i]] / 255.0)
         np.add.at(weight, (row, column), 1.0)
-    texture = torch.tensor(_filled(colour, weight), dtype=torch.float32)
-    return Sky(texture, azimuth_rad, elevation_rad)
+    return colour, weight
 
 
 def _angles(geometry: Geometry, frame: int) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
@@ -64,14 +105,13 @@ def _clear_sky(sky: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
 
 
 def _filled(
-    colour: Float[np.ndarray, "r c 3"], weight: Float[np.ndarray, "r c"]
+    colour: Float[np.ndarray, "r c 3"], weight: Float[np.ndarray, "r c"], sigma: float
 ) -> Float[np.ndarray, "r c 3"]:
     """Colours where seen; elsewhere normalised blurs of growing width, so that every texel has a value."""
     if not weight.any():
         return np.full_like(colour, 0.5)
     filled = colour / np.maximum(weight, 1)[..., None]
     missing = weight == 0
-    sigma = 2.0
     sums, weights = colour, weight
     while missing.any():
         blurred = cv2.GaussianBlur(sums, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
