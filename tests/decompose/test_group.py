@@ -84,3 +84,11 @@ def test_what_is_always_behind_the_car_ahead_is_not_static_street():
     scores = torch.cat([seeds.features[:, 0], torch.zeros(1)])
     assert group(clip, geometry, both, scores, GroupOptions()).covered[-1]
     assert grouping.covered.float().mean() < 0.1
+
+
+def test_a_cluster_without_a_core_is_street():
+    """Foliage that a short fit gets wrong everywhere a little crosses tau, yet nothing in it is certain."""
+    _, clip, geometry, seeds = scene(movers=0)
+    lukewarm = torch.full((len(seeds),), 0.45)
+    assert not group(clip, geometry, seeds, lukewarm, GroupOptions()).dynamic.any()
+    assert group(clip, geometry, seeds, lukewarm, GroupOptions(core=0.0)).dynamic.any()

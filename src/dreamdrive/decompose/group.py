@@ -32,7 +32,10 @@ class GroupOptions:
         link_depth: Flow carries a label only onto points whose depth differs by at most this in the
             logarithm: a car that passes behind another stays itself.
         join: Labels that hang together in this share of their common frames are one thing.
-        majority: Share of votes that makes a whole cluster dynamic.
+        majority: Share of votes that makes a whole cluster dynamic ...
+        certain: ... if there is a core of members above this score ...
+        core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere a
+            little, cross tau but have no core.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
         clustering: False keeps each Gaussian's own vote (for ablation).
     """
@@ -45,6 +48,8 @@ class GroupOptions:
     link_depth: float = 0.3
     join: float = 0.7
     majority: float = 0.4
+    certain: float = 0.6
+    core: float = 0.1
     smallest: int = 24
     clustering: bool = True
 
@@ -92,7 +97,8 @@ def group(
     labels = _space_time_labels(clip, geometry, gaussians, index, options)
     size = np.bincount(labels, minlength=1)
     votes = np.bincount(labels, weights=(value[index] > options.threshold).astype(float), minlength=1)
-    wins = (votes > options.majority * size) & (size >= options.smallest)
+    core = np.bincount(labels, weights=(value[index] > options.certain).astype(float), minlength=1)
+    wins = (votes > options.majority * size) & (core >= options.core * size) & (size >= options.smallest)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     order = np.cumsum(wins) - 1
     cluster[index[wins[labels]]] = order[labels[wins[labels]]]
