@@ -34,8 +34,8 @@ class GroupOptions:
         join: Labels that hang together in this share of their common frames are one thing.
         majority: Share of votes that makes a whole cluster dynamic ...
         certain: ... if there is a core of members above this score ...
-        core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere a
-            little, cross tau but have no core.
+        core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere
+            a little, cross tau but have no core.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
         clustering: False keeps each Gaussian's own vote (for ablation).
     """
