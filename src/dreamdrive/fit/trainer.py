@@ -11,13 +11,12 @@ from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.losses import LossName, disparity_loss, render_loss, shape_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.deformation import DeformationField, alive_at
 from dreamdrive.scene.exposure import ExposureNetwork, transform_colour
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import one_torch_thread, rasterize
+from dreamdrive.splat import one_torch_thread, render
 
 Progress = Callable[[int, int], None]
 
@@ -98,28 +97,6 @@ class Model:
         return [p for p in (self.static, self.dynamic) if p is not None]
 
 
-def splat(
-    gaussians: Gaussians, camera: Camera, sh_degree: int, offsets_px: Float[Tensor, "n 2"] | None = None
-) -> Render:
-    """Rasterise activated Gaussians, differentiable in them and in ``offsets_px``."""
-    return rasterize(
-        gaussians.means,
-        gaussians.quaternions,
-        gaussians.log_scales.exp(),
-        torch.sigmoid(gaussians.logit_opacities),
-        gaussians.sh,
-        torch.tensor(camera.camera_from_world, dtype=torch.float32),
-        fx_px=camera.fx_px,
-        fy_px=camera.fy_px,
-        cx_px=camera.cx_px,
-        cy_px=camera.cy_px,
-        width_px=camera.width_px,
-        height_px=camera.height_px,
-        screen_offsets_px=offsets_px,
-        sh_degree=sh_degree,
-    )
-
-
 @one_torch_thread()
 def optimise(
     model: Model,
@@ -153,7 +130,7 @@ def optimise(
         gaussians, rows = model.at(view.time_s)
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
         degree = gaussians.sh_degree if done >= options.sh_after else 0
-        rendered = splat(gaussians, view.camera, degree, offsets_px)
+        rendered = render(gaussians, view.camera, screen_offsets_px=offsets_px, sh_degree=degree)
         loss = _loss(model, rendered, view, skies[shrink][which], options, done)
         if step % SHAPE_EVERY == 0:
             loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
