@@ -15,7 +15,6 @@ from dreamdrive.scene.sky import Sky
 # The panorama reaches this far beyond what the frames saw, so that turned and raised views stay inside it.
 MARGIN_RAD = math.radians(40.0)
 MAX_TEXELS = (512, 1024)
-BACKDROP_BLUR = 6.0  # texels
 
 
 def estimate_sky(clip: Clip, geometry: Geometry) -> Sky:
@@ -39,7 +38,7 @@ def estimate_sky(clip: Clip, geometry: Geometry) -> Sky:
     columns = min(MAX_TEXELS[1], math.ceil((azimuth_rad[1] - azimuth_rad[0]) / texel_rad))
     empty = Sky(torch.zeros(rows, columns, 3), azimuth_rad, elevation_rad)
     colour, weight = _gathered(clip, geometry, empty, _sky_only(clip, geometry))
-    sky = replace(empty, texture=torch.tensor(_filled(colour, weight, 2.0), dtype=torch.float32))
+    sky = replace(empty, texture=torch.tensor(_filled(colour, weight), dtype=torch.float32))
     return _with_backdrop(sky, clip, geometry)
 
 
@@ -52,7 +51,7 @@ def _with_backdrop(sky: Sky, clip: Clip, geometry: Geometry) -> Sky:
     _, seen = _gathered(clip, geometry, sky, _sky_only(clip, geometry))
     free = clip.valid & (geometry.fixed_regions == 0)
     still = [free[i] & ~_near_moving(geometry, i) for i in range(len(clip))]
-    blurred = _filled(*_gathered(clip, geometry, sky, still), BACKDROP_BLUR)
+    blurred = _filled(*_gathered(clip, geometry, sky, still))
     reach = cv2.dilate((seen > 0).astype(np.uint8), np.ones((5, 5), np.uint8))[..., None] > 0
     # Above the horizon the sky itself goes on.
     rows = np.linspace(sky.elevation_rad[1], sky.elevation_rad[0], len(blurred))[:, None, None]
@@ -75,14 +74,16 @@ def _gathered(
 ) -> tuple[Float[np.ndarray, "r c 3"], Float[np.ndarray, "r c"]]:
     """Sums of the colours seen in each texel's direction, and how many there were."""
     rows, columns = sky.texture.shape[:2]
-    colour, weight = np.zeros((rows, columns, 3)), np.zeros((rows, columns))
+    sums = np.zeros((rows * columns, 4))
     for i in np.flatnonzero(~clip.held_out).tolist():
         azimuth, elevation = _angles(geometry, i)
         row = _texel(sky.elevation_rad[1] - elevation, sky.elevation_rad, rows)[masks[i]]
         column = _texel(azimuth - sky.azimuth_rad[0], sky.azimuth_rad, columns)[masks[i]]
-        np.add.at(colour, (row, column), clip.frames[i][masks[i]] / 255.0)
-        np.add.at(weight, (row, column), 1.0)
-    return colour, weight
+        values = np.column_stack([clip.frames[i][masks[i]] / 255.0, np.ones(len(row))])
+        for k in range(4):
+            sums[:, k] += np.bincount(row * columns + column, values[:, k], minlength=rows * columns)
+    sums = sums.reshape(rows, columns, 4)
+    return sums[..., :3], sums[..., 3]
 
 
 def _angles(geometry: Geometry, frame: int) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
@@ -105,22 +106,19 @@ def _clear_sky(sky: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
 
 
 def _filled(
-    colour: Float[np.ndarray, "r c 3"], weight: Float[np.ndarray, "r c"], sigma: float
+    colour: Float[np.ndarray, "r c 3"], weight: Float[np.ndarray, "r c"]
 ) -> Float[np.ndarray, "r c 3"]:
-    """Colours where seen; elsewhere normalised blurs of growing width, so that every texel has a value."""
+    """Mean colours where seen; elsewhere those of ever coarser neighbourhoods: every texel has one."""
     if not weight.any():
         return np.full_like(colour, 0.5)
-    filled = colour / np.maximum(weight, 1)[..., None]
-    missing = weight == 0
-    sums, weights = colour, weight
-    while missing.any():
-        blurred = cv2.GaussianBlur(sums, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
-        share = cv2.GaussianBlur(weights, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
-        reached = missing & (share > 1e-3 * weight.max())
-        filled[reached] = blurred[reached] / share[reached][:, None]
-        missing &= ~reached
-        sigma *= 2
-        if sigma > 4 * max(weight.shape):
-            filled[missing] = colour.sum((0, 1)) / weight.sum()
-            break
-    return filled
+    mean = colour / np.maximum(weight, 1e-9)[..., None]
+    if weight.all():
+        return mean
+    # Sums at half the size: an average over the texels that were seen, whatever their number.
+    half = max(1, (weight.shape[1] + 1) // 2), max(1, (weight.shape[0] + 1) // 2)
+    coarse = _filled(
+        cv2.resize(colour, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], 3),
+        cv2.resize(weight, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0]),
+    )
+    around = cv2.resize(coarse, weight.shape[::-1], interpolation=cv2.INTER_LINEAR).reshape(colour.shape)
+    return np.where(weight[..., None] > 0, mean, around)
