@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from dreamdrive.decompose.flow import neighbour_flow
+from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
@@ -154,9 +154,7 @@ def _similarity(
 ) -> Float[np.ndarray, "2 3"] | None:
     if len(points) < options.least_points:
         return None
-    row = points[:, 1].astype(int).clip(0, flow.shape[0] - 1)
-    column = points[:, 0].astype(int).clip(0, flow.shape[1] - 1)
-    moved = points + flow[row, column]
+    moved = carried(points, flow)
     cv2.setRNGSeed(0)
     result: Any = cv2.estimateAffinePartial2D(
         points, moved, method=cv2.RANSAC, ransacReprojThreshold=1.0, maxIters=500, confidence=0.999

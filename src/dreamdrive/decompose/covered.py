@@ -41,12 +41,9 @@ def covered(
     for frame in np.flatnonzero(~clip.held_out).tolist():
         own = labels & (gaussians.source_frame.numpy() == frame)
         nearest = _cover(clip.size, pixels[own], spread_px)
-        camera = geometry.cameras[frame]
-        local = means @ camera.camera_from_world[:3, :3].T + camera.camera_from_world[:3, 3]
-        z = np.maximum(local[:, 2], 1e-6)
-        column = np.floor(local[:, 0] / z * camera.fx_px + camera.cx_px)
-        row = np.floor(local[:, 1] / z * camera.fy_px + camera.cy_px)
-        in_view = (local[:, 2] > 0.2) & (column >= 0) & (column < clip.size[0])
+        column, row, z = geometry.cameras[frame].project(means).T
+        column, row = np.floor(column), np.floor(row)
+        in_view = (z > 0.2) & (column >= 0) & (column < clip.size[0])
         in_view &= (row >= 0) & (row < clip.size[1])
         where = row[in_view].astype(int), column[in_view].astype(int)
         seen += in_view

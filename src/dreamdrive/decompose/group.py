@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from dreamdrive.decompose.covered import covered
-from dreamdrive.decompose.flow import neighbour_flow
+from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
@@ -127,12 +127,8 @@ def source_pixels(
     out = np.zeros((len(index), 3))
     for frame in np.unique(frames).tolist():
         rows = frames == frame
-        camera = geometry.cameras[frame]
-        local = points[rows] @ camera.camera_from_world[:3, :3].T + camera.camera_from_world[:3, 3]
-        z = np.maximum(local[:, 2], 1e-6)
-        out[rows, 0] = local[:, 0] / z * camera.fx_px + camera.cx_px
-        out[rows, 1] = local[:, 1] / z * camera.fy_px + camera.cy_px
-        out[rows, 2] = z
+        out[rows] = geometry.cameras[frame].project(points[rows])
+    out[:, 2] = np.maximum(out[:, 2], 1e-6)
     return out
 
 
@@ -170,11 +166,8 @@ def _handed_on(
     options: GroupOptions,
 ) -> Int[np.ndarray, " m"]:
     """Label of the nearest point of the frame before after flow, at like depth; -1 where there is none."""
-    column = sources[:, 0].astype(int).clip(0, flow.shape[1] - 1)
-    row = sources[:, 1].astype(int).clip(0, flow.shape[0] - 1)
-    found = KDTree(sources[:, :2] + flow[row, column]).query(
-        points[:, :2], distance_upper_bound=options.reach_px
-    )
+    tree = KDTree(carried(sources[:, :2], flow))
+    found = tree.query(points[:, :2], distance_upper_bound=options.reach_px)
     distance, nearest = np.asarray(found[0]), np.asarray(found[1])
     reached = np.isfinite(distance)
     nearest = np.where(reached, nearest, 0)

@@ -86,7 +86,7 @@ def score(
     Args:
         clip: Which frames may be seen.
         geometry: Cameras and moving evidence.
-        gaussians: The static fit, with features.
+        gaussians: The seeds G_init, with features.
         errors: Error maps of the static fit (eq. 6).
         options: Constants.
         seed: Initial weights and order of the frames.

@@ -118,15 +118,12 @@ def _explained(
     """Pixels beside which a static seed of comparable size already lies, not behind what is seen there."""
     shape = (camera.height_px, camera.width_px)
     nearest = np.full(shape, np.inf, dtype=np.float32)
-    matrix = camera.camera_from_world
     for seeds in kept:
         static = ~seeds.moving
-        points = seeds.points[static] @ matrix[:3, :3].T + matrix[:3, 3]
-        z = np.maximum(points[:, 2], 1e-6)
-        u = np.floor(points[:, 0] / z * camera.fx_px + camera.cx_px)
-        v = np.floor(points[:, 1] / z * camera.fy_px + camera.cy_px)
+        u, v, depth = camera.project(seeds.points[static]).T
+        u, v, z = np.floor(u), np.floor(v), np.maximum(depth, 1e-6)
         fine = seeds.spacing_m[static] / z * camera.fx_px < 2.0 * options.stride_px
-        inside = (points[:, 2] > 0.2) & (u >= 0) & (u < shape[1]) & (v >= 0) & (v < shape[0]) & fine
+        inside = (depth > 0.2) & (u >= 0) & (u < shape[1]) & (v >= 0) & (v < shape[0]) & fine
         np.minimum.at(nearest, (v[inside].astype(int), u[inside].astype(int)), z[inside].astype(np.float32))
     reach = 2 * options.stride_px - 1
     around = cv2.erode(nearest, np.ones((reach, reach), np.uint8), borderValue=float("inf"))

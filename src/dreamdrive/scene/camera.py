@@ -85,6 +85,17 @@ class Camera:
             height_px=height_px,
         )
 
+    def project(self, points_world: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Column and row in pixels and depth along z in metres (N, 3) of points in the world.
+
+        Columns and rows mean something only where the depth is positive.
+        """
+        local = points_world @ self.camera_from_world[:3, :3].T + self.camera_from_world[:3, 3]
+        z = np.maximum(local[:, 2], 1e-6)
+        column = local[:, 0] / z * self.fx_px + self.cx_px
+        row = local[:, 1] / z * self.fy_px + self.cy_px
+        return np.column_stack([column, row, local[:, 2]])
+
     def rays(self) -> Float[np.ndarray, "h w 3"]:
         """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
         x = (np.arange(self.width_px) + 0.5 - self.cx_px) / self.fx_px
