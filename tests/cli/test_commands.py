@@ -106,3 +106,7 @@ def test_help(run: Run, command: tuple[str, ...]) -> None:
     result = run(*command, "--help")
     assert result.code == 0
     assert "usage: dreamdrive" in result.out
+
+
+def test_version_is_said(run: Run) -> None:
+    assert re.fullmatch(r"dreamdrive \d+\.\d+\.\d+", run("--version").out)

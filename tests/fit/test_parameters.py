@@ -73,15 +73,6 @@ def test_children_inherit_all_but_the_changes_and_start_with_fresh_moments():
     one_step(p)
 
 
-def test_reset_opacity_lowers_and_forgets():
-    p = parameters()
-    p.logit_opacities.sum().backward()
-    p.step()
-    p.reset_opacity(0.01)
-    assert torch.sigmoid(p.logit_opacities).max() <= 0.0101
-    assert (p.optimiser.state[p.logit_opacities]["exp_avg"] == 0).all()
-
-
 def densified(gradient: float, log_scale: float, **changes: float) -> Parameters:
     p = parameters()
     with torch.no_grad():

@@ -35,6 +35,9 @@ def main() -> None:
     Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted.
     """
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    if sys.argv[1:] == ["--version"]:
+        print(f"dreamdrive {dreamdrive.__version__}")
+        return
     logging.basicConfig(level="WARNING", format="%(message)s", handlers=[RichHandler(console=errors)])
     try:
         tyro.extras.subcommand_cli_from_dict(

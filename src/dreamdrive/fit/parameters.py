@@ -135,16 +135,6 @@ class Parameters:
                 setattr(self, name, extend(name, value))
         self._swap_leaves(extend, lambda state: torch.cat([state, torch.zeros_like(state[parents])]))
 
-    @torch.no_grad()
-    def reset_opacity(self, ceiling: float) -> None:
-        """Lower every opacity to at most ``ceiling`` and forget its moments."""
-        limit = torch.logit(torch.tensor(ceiling))
-        self.logit_opacities.clamp_(max=float(limit))
-        state = self.optimiser.state.get(self.logit_opacities, {})
-        for moment in ("exp_avg", "exp_avg_sq"):
-            if moment in state:
-                state[moment].zero_()
-
     def _rebuild(self, pick: Callable[[Tensor], Tensor]) -> None:
         for name in _CARRIED:
             value = getattr(self, name)
