@@ -36,7 +36,7 @@ def main() -> None:
     """
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     if sys.argv[1:] == ["--version"]:
-        print(f"dreamdrive {dreamdrive.__version__}")
+        Console(highlight=False).print(f"dreamdrive {dreamdrive.__version__}")
         return
     logging.basicConfig(level="WARNING", format="%(message)s", handlers=[RichHandler(console=errors)])
     try:
