@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from jaxtyping import Float
@@ -60,7 +61,7 @@ class SplatArguments:
 
 
 def check_shapes(tensors: dict[str, Tensor | None]) -> None:
-    """Raise ``ValueError`` naming the first argument whose shape or device is not what splatting expects."""
+    """Raise ``ValueError`` naming the first argument whose shape is not what splatting expects."""
     means = tensors["means"]
     count = means.shape[0] if isinstance(means, Tensor) and means.ndim == 2 else "N"
     shapes: dict[str, tuple[int | str, ...]] = {
@@ -85,8 +86,6 @@ def check_shapes(tensors: dict[str, Tensor | None]) -> None:
         if not fits:
             expected = str(shape).replace("'", "")
             raise ValueError(f"{name}: expected shape {expected}, got {tuple(value.shape)}")
-        if value.device.type != "cpu":
-            raise ValueError(f"{name}: expected a tensor on the CPU, got one on {value.device}")
     sh = tensors["sh"]
     if sh is not None and sh.shape[1] not in COEFFICIENTS:
         raise ValueError(f"sh: expected 1, 4, 9 or 16 coefficients a channel, got {sh.shape[1]}")
@@ -117,6 +116,19 @@ def active_degree(wanted: int | None, stored: int) -> int:
             f"sh_degree: expected 0 to {degree} ({stored} coefficients are stored), got {wanted}"
         )
     return wanted
+
+
+def check_device(tensors: dict[str, Tensor], kind: Literal["cpu", "cuda"]) -> None:
+    """Raise ``ValueError`` naming the first tensor that is not on a device of ``kind``, the same for all."""
+    first = tensors["means"].device
+    for name, value in tensors.items():
+        if value.device.type != kind:
+            where = "the CPU" if kind == "cpu" else "a CUDA device"
+            raise ValueError(f"{name}: expected a tensor on {where}, got one on {value.device}")
+        if value.device != first:
+            raise ValueError(
+                f"{name}: expected a tensor on {first} like the means, got one on {value.device}"
+            )
 
 
 def check_dtype(tensors: dict[str, Tensor], dtypes: tuple[torch.dtype, ...]) -> None:

@@ -8,7 +8,7 @@ from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
 from dreamdrive.scene.render import Render
-from dreamdrive.splat.arguments import SplatArguments, check_dtype
+from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
 
 # Position of each differentiable argument of _Rasterize.
 _NAMES = (
@@ -84,6 +84,7 @@ def rasterize_native(arguments: SplatArguments) -> Render:
         ValueError: A tensor is not float32 or holds NaN or infinite numbers.
     """
     tensors = arguments.tensors()
+    check_device(tensors, "cpu")
     check_dtype(tensors, (torch.float32,))
     for name, value in tensors.items():
         if not _native.all_finite(value.detach().contiguous()):

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from dreamdrive.scene.render import Render
-from dreamdrive.splat.arguments import SplatArguments, check_dtype
+from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
 
 NEAR_M = 0.2
 FAR_M = 1e10
@@ -116,8 +116,9 @@ def compositing_weights(
 
 
 def rasterize_reference(arguments: SplatArguments) -> Render:
-    """Splat tensors of any one floating type; memory grows with pixels x Gaussians."""
+    """Splat CPU tensors of any one floating type; memory grows with pixels x Gaussians."""
     tensors = arguments.tensors()
+    check_device(tensors, "cpu")
     check_dtype(tensors, (arguments.means.dtype,))
     index, centre, conic, depth = project(arguments)
     width, height = arguments.size_px

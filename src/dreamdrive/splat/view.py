@@ -23,7 +23,9 @@ def render(
 
     Life spans, sky and exposure are not applied here.
     """
-    pose = torch.as_tensor(camera.camera_from_world, dtype=gaussians.means.dtype)
+    pose = torch.as_tensor(
+        camera.camera_from_world, dtype=gaussians.means.dtype, device=gaussians.means.device
+    )
     return rasterize(
         gaussians.means,
         gaussians.quaternions,
