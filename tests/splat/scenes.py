@@ -57,16 +57,21 @@ def render_with_gradients(
     camera: dict[str, float] | None = None,
     sh_degree: int | None = None,
     images: tuple[str, ...] = IMAGES,
+    device: str = "cpu",
 ) -> tuple[Render, dict[str, Tensor]]:
-    """Render and pull a fixed random gradient back through ``images``; float32 if native, else float64."""
-    dtype = torch.float32 if backend == "native" else torch.float64
+    """Render on a device and pull a fixed random gradient back through ``images`` to leaves on the CPU.
+
+    float64 by reference, else float32.
+    """
+    dtype = torch.float64 if backend == "reference" else torch.float32
     inputs = {name: value.to(dtype).clone().requires_grad_() for name, value in scene.items()}
-    out = rasterize(**inputs, **(camera or pinhole()), sh_degree=sh_degree, backend=backend)
+    there = {name: value.to(device) for name, value in inputs.items()}
+    out = rasterize(**there, **(camera or pinhole()), sh_degree=sh_degree, backend=backend)
     g = torch.Generator().manual_seed(7)
-    loss = torch.zeros((), dtype=dtype)
+    loss = torch.zeros((), dtype=dtype, device=device)
     for name in IMAGES:
         image = getattr(out, name)
-        upstream = torch.randn(image.shape, generator=g, dtype=torch.float64).to(dtype)
+        upstream = torch.randn(image.shape, generator=g, dtype=torch.float64).to(device, dtype)
         if name in images:
             loss = loss + (image * upstream).sum()
     loss.backward()
@@ -76,5 +81,5 @@ def render_with_gradients(
 
 def relative(value: Tensor, expected: Tensor) -> float:
     """Norm of the difference over the norm of what is expected."""
-    difference = (value.double() - expected.double()).norm().item()
-    return difference / max(expected.double().norm().item(), 1e-12)
+    value, expected = value.double().cpu(), expected.double().cpu()
+    return (value - expected).norm().item() / max(expected.norm().item(), 1e-12)

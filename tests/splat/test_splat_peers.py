@@ -3,12 +3,12 @@
 import importlib.util
 import subprocess
 import sys
-import types
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from tests.splat.gsplat_on_cpu import nerfacc_stand_in
 from tests.splat.scenes import relative
 from torch import Tensor
 
@@ -143,28 +143,6 @@ def pairs_in_order(
 def determinant_share(conics: Tensor) -> Tensor:
     """Least value of the quadratic form over dx, for dy = 1."""
     return conics[:, 2] - conics[:, 1] ** 2 / conics[:, 0]
-
-
-def nerfacc_stand_in() -> types.ModuleType:
-    """The two functions gsplat's compositing takes from nerfacc, for pairs sorted by ray."""
-
-    def render_weight_from_alpha(alphas: Tensor, ray_indices: Tensor, n_rays: int) -> tuple[Tensor, Tensor]:
-        logs = torch.log1p(-alphas)
-        before = torch.cumsum(logs, 0) - logs
-        first = torch.searchsorted(ray_indices, torch.arange(n_rays)).clamp(max=len(alphas) - 1)
-        through = torch.exp(before - before[first][ray_indices])
-        return through * alphas, through
-
-    def accumulate_along_rays(
-        weights: Tensor, values: Tensor | None, ray_indices: Tensor, n_rays: int
-    ) -> Tensor:
-        source = weights[:, None] if values is None else weights[:, None] * values
-        return source.new_zeros(n_rays, source.shape[1]).index_add(0, ray_indices, source)
-
-    module = types.ModuleType("nerfacc")
-    module.render_weight_from_alpha = render_weight_from_alpha
-    module.accumulate_along_rays = accumulate_along_rays
-    return module
 
 
 def test_whole_render_agrees_with_gsplats_projection_and_compositing(street, monkeypatch):

@@ -7,12 +7,14 @@ from torch import Tensor
 
 from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, active_degree, check_pinhole, check_shapes
+from dreamdrive.splat.cuda import rasterize_gsplat
 from dreamdrive.splat.native import rasterize_native
 from dreamdrive.splat.reference import rasterize_reference
 
 BACKENDS: dict[str, Callable[[SplatArguments], Render]] = {
     "native": rasterize_native,
     "reference": rasterize_reference,
+    "gsplat": rasterize_gsplat,
 }
 
 
@@ -59,7 +61,8 @@ def rasterize(
         channels: Further values per Gaussian (N, C), composited like colour.
         screen_offsets_px: Added to the projected centres (N, 2): zeros whose gradient densification reads.
         sh_degree: Degree to evaluate, at most the stored one (default); higher ones get zero gradients.
-        backend: "native" (compiled, float32) or "reference" (plain torch, tiny scenes).
+        backend: "native" (compiled, float32) or "reference" (plain torch, tiny scenes) on the CPU;
+            "gsplat" (float32) on a CUDA device, see ``splat.cuda`` for where it differs.
 
     Raises:
         ValueError: An argument has the wrong shape, type or device, or holds NaN; the message names it.

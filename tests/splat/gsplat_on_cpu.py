@@ -1,0 +1,122 @@
+"""gsplat's own plain-torch functions in the place of its CUDA kernels, called exactly as the kernels are."""
+
+import inspect
+import sys
+import types
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import gsplat
+import pytest
+import torch
+from gsplat.cuda import _torch_impl
+from torch import Tensor
+
+
+def nerfacc_stand_in() -> types.ModuleType:
+    """The two functions gsplat's compositing takes from nerfacc, for pairs sorted by ray."""
+
+    def render_weight_from_alpha(alphas: Tensor, ray_indices: Tensor, n_rays: int) -> tuple[Tensor, Tensor]:
+        logs = torch.log1p(-alphas.double())
+        before = torch.cumsum(logs, 0) - logs
+        first = torch.searchsorted(ray_indices, torch.arange(n_rays)).clamp(max=len(alphas) - 1)
+        through = torch.exp(before - before[first][ray_indices]).to(alphas.dtype)
+        return through * alphas, through
+
+    def accumulate_along_rays(
+        weights: Tensor, values: Tensor | None, ray_indices: Tensor, n_rays: int
+    ) -> Tensor:
+        source = weights[:, None] if values is None else weights[:, None] * values
+        return source.new_zeros(n_rays, source.shape[1]).index_add(0, ray_indices, source)
+
+    module = types.ModuleType("nerfacc")
+    module.render_weight_from_alpha = render_weight_from_alpha
+    module.accumulate_along_rays = accumulate_along_rays
+    return module
+
+
+def pairs_of_tiles(
+    range_start, range_end, transmittances, means2d, conics, opacities,
+    image_width, image_height, tile_size, isect_offsets, flatten_ids,
+) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    """Stand-in for gsplat's CUDA kernel: the composited (Gaussian, pixel) pairs of one image, by pixel."""
+    assert range_start == 0
+    assert (transmittances == 1).all()
+    starts = [*isect_offsets.flatten().tolist(), len(flatten_ids)]
+    gaussians, pixels = [], []
+    for tile, (start, stop) in enumerate(pairwise(starts)):
+        listed = flatten_ids[start:stop].long()
+        row, column = divmod(tile, isect_offsets.shape[-1])
+        y = torch.arange(row * tile_size, min((row + 1) * tile_size, image_height))
+        x = torch.arange(column * tile_size, min((column + 1) * tile_size, image_width))
+        y, x = (axis.reshape(-1, 1) for axis in torch.meshgrid(y, x, indexing="ij"))
+        dx, dy = x + 0.5 - means2d[0, listed, 0], y + 0.5 - means2d[0, listed, 1]
+        a, b, c = conics[0, listed].unbind(-1)
+        alpha = opacities[0, listed] * torch.exp(-(0.5 * (a * dx**2 + c * dy**2) + b * dx * dy))
+        alpha = torch.where(alpha >= 1 / 255, alpha.clamp(max=0.999), 0.0)
+        pixel, place = torch.nonzero((alpha > 0) & (torch.cumprod(1 - alpha, 1) > 1e-4), as_tuple=True)
+        gaussians.append(listed[place])
+        pixels.append((y * image_width + x)[pixel, 0])
+    gaussians, pixels = torch.cat(gaussians), torch.cat(pixels)
+    order = torch.argsort(pixels, stable=True)
+    return gaussians[order], pixels[order], torch.zeros_like(pixels)
+
+
+def written(inside: Tensor, values: Tensor) -> Tensor:
+    """The values of what is inside; the kernels leave the other rows as the memory was."""
+    return torch.where(inside, values, torch.nan)
+
+
+def project(means, quats, scales, viewmats, Ks, opacities, **others) -> tuple[Tensor | None, ...]:
+    covariances, _ = _torch_impl._quat_scale_to_covar_preci(quats, scales, True, False)
+    radii, *numbers, _ = _torch_impl._fully_fused_projection(means, covariances, viewmats, Ks, **others)
+    radii = torch.where(opacities[:, None] >= 1 / 255, radii, 0)
+    inside = (radii > 0).all(-1)
+    means2d, depths, conics = numbers
+    return (
+        radii,
+        written(inside[..., None], means2d),
+        written(inside, depths),
+        written(inside[..., None], conics),
+        None,
+    )
+
+
+def spherical_harmonics(degrees_to_use, dirs, coeffs, masks) -> Tensor:
+    return written(masks[..., None], _torch_impl._spherical_harmonics(degrees_to_use, dirs, coeffs))
+
+
+def offsets(isect_ids, n_images, tile_width, tile_height) -> Tensor:
+    return _torch_impl._isect_offset_encode(isect_ids, n_images, tile_width, tile_height)
+
+
+STAND_INS = {
+    "fully_fused_projection": project,
+    "spherical_harmonics": spherical_harmonics,
+    "isect_tiles": _torch_impl._isect_tiles,
+    "isect_offset_encode": offsets,
+    "rasterize_to_pixels": _torch_impl._rasterize_to_pixels,
+}
+
+
+def called_like(kernel: Callable[..., Any], stand_in: Callable[..., Any]) -> Callable[..., Any]:
+    """``stand_in`` with the arguments that a call of ``kernel`` binds, without those left at default."""
+    signature = inspect.signature(kernel)
+
+    def call(*args: Any, **kwargs: Any) -> Any:
+        bound = signature.bind(*args, **kwargs).arguments
+        given = {k: v for k, v in bound.items() if v is not signature.parameters[k].default and v is not None}
+        return stand_in(**given)
+
+    return call
+
+
+def gsplat_on_cpu(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
+    """What the backend uses of gsplat, able to run on the CPU."""
+    monkeypatch.setitem(sys.modules, "nerfacc", nerfacc_stand_in())
+    monkeypatch.setattr("gsplat.cuda._wrapper.rasterize_to_indices_in_range", pairs_of_tiles)
+    module = types.ModuleType("gsplat")
+    for name, stand_in in STAND_INS.items():
+        setattr(module, name, called_like(getattr(gsplat, name), stand_in))
+    return module
