@@ -33,7 +33,7 @@ def doctor() -> None:
         missing.append(
             f"less than {_NEEDED_MB / 1000:.0f} GB of memory is free: use fewer frames or a smaller --size"
         )
-    table.add_row("CUDA", _cuda())
+    table.add_row("GPU", _gpu())
     console = Console()
     console.print(table)
     missing += trouble
@@ -54,9 +54,11 @@ def _native() -> tuple[str, list[str]]:
     return ", ".join(f"{name} {value}" for name, value in native_info().items()), []
 
 
-def _cuda() -> str:
+def _gpu() -> str:
+    """Whether Gaussians can be splatted on a GPU, which no command needs."""
     try:
-        import torch
+        from dreamdrive.splat.cuda import why_unusable
     except ImportError:
-        return "unknown without torch"
-    return "there, not needed" if torch.cuda.is_available() else "none, and not needed"
+        return "unknown without torch and the native core; not needed"
+    trouble = why_unusable()
+    return "backend gsplat can be used; not needed" if trouble is None else f"not needed; {trouble}"
