@@ -1,4 +1,4 @@
-"""The splatting scenes t, a, b, c: from the common bench where it is, else from a generator of our own."""
+"""Streets of Gaussians of any size: from the common bench where it is, else from a generator of our own."""
 
 import importlib.util
 import os
@@ -8,6 +8,7 @@ import numpy as np
 
 SIZES = {"t": (160, 96, 6_000), "a": (320, 192, 50_000), "b": (640, 384, 200_000), "c": (960, 576, 500_000)}
 SEED = 20260101
+COMMON = "street_scene.py"
 
 
 def bench_dir() -> Path | None:
@@ -24,17 +25,20 @@ def load(name: str) -> tuple[str, dict[str, np.ndarray], str]:
             return Path(name).stem, dict(file), name
     if name not in SIZES:
         raise SystemExit(f"--scenes: expected t, a, b, c or a file ending in .npz, got {name!r}")
+    return name, *street(*SIZES[name])
+
+
+def street(width: int, height: int, count: int) -> tuple[dict[str, np.ndarray], str]:
+    """A street of ``count`` Gaussians seen at ``width`` x ``height``: its arrays and who made it."""
     folder = bench_dir()
     if folder is None:
-        return (
-            name,
-            stand_in(name),
-            "stand-in generator (street_scene.py was not found; set DREAMDRIVE_BENCH)",
-        )
+        where = "stand-in generator (street_scene.py was not found; set DREAMDRIVE_BENCH)"
+        return stand_in(width, height, count), where
     spec = importlib.util.spec_from_file_location("street_scene", folder / "street_scene.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return name, module.make(name, SEED), "street_scene.py"
+    module.SIZES["street"] = (width, height, count)
+    return module.make("street", SEED), COMMON
 
 
 def surfaces(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -66,9 +70,8 @@ def quaternions_to(normals: np.ndarray, roll: np.ndarray) -> np.ndarray:
     return out / np.linalg.norm(out, axis=1, keepdims=True)
 
 
-def stand_in(name: str) -> dict[str, np.ndarray]:
-    """A street with the statistics of the common scenes: projected sizes, opacities, depth range, counts."""
-    width, height, count = SIZES[name]
+def stand_in(width: int, height: int, count: int) -> dict[str, np.ndarray]:
+    """A street with the statistics of the common scenes: projected sizes, opacities, depth range."""
     rng = np.random.default_rng([SEED, count])
     points, normals = surfaces(rng, count)
     normals = normals + rng.normal(0, 0.12, normals.shape)
