@@ -1,0 +1,199 @@
+"""Frames and training steps a second on a GPU: our backend and step beside gsplat's own.
+
+    python benchmarks/gpu.py [--gaussians N ...] [--sizes 960x576 ...] [--seconds S] [--json FILE]
+
+Both render colour, alpha and depth of the street scene with spherical harmonics of degree 3 from eight places
+along the road, and take the training steps that ``_gpu_training.py`` describes. They run in turn, in blocks
+of ten with the GPU idle before and after. Figures are medians over blocks; the ratio says how many times
+faster ours is. That the first image and the first and last losses of both agree is shown with them.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from types import ModuleType
+
+import torch
+from _gpu_training import gsplat_step, intrinsics, our_step, ssim_of_the_peer
+from _street_scenes import street
+from torch import Tensor
+
+from dreamdrive.scene.gaussians import SH_C0
+from dreamdrive.splat import rasterize
+from dreamdrive.splat.cuda import load_gsplat, why_unusable
+from dreamdrive.splat.reference import NEAR_M
+
+BLOCK = 10
+VIEWS = 8
+STRIDE_M = 0.25
+COEFFICIENTS = 16
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """Width and height of e.g. 960x576."""
+    width, _, height = text.partition("x")
+    return int(width), int(height)
+
+
+def scene(
+    width: int, height: int, count: int, device: str
+) -> tuple[dict[str, Tensor], dict[str, float], Tensor]:
+    """Arguments of ``rasterize``: Gaussians of the street, pinhole, poses (V, 4, 4) along the road."""
+    arrays, _ = street(width, height, count)
+    values = {name: torch.from_numpy(array).to(device) for name, array in arrays.items() if array.ndim}
+    generator = torch.Generator().manual_seed(1)
+    sh = 0.05 * torch.randn(count, COEFFICIENTS, 3, generator=generator).to(device)
+    sh[:, 0] = (values["colors"] - 0.5) / SH_C0
+    gaussians = {
+        "means": values["means"],
+        "quaternions": values["quats"],
+        "scales": values["scales"],
+        "opacities": values["opacities"],
+        "sh": sh,
+    }
+    names = {"fx_px": "fx", "fy_px": "fy", "cx_px": "cx", "cy_px": "cy", "width_px": "W", "height_px": "H"}
+    poses = values["viewmat"].repeat(VIEWS, 1, 1)
+    poses[:, 2, 3] -= STRIDE_M * torch.arange(VIEWS, device=device)
+    return gaussians, {ours: arrays[theirs].item() for ours, theirs in names.items()}, poses
+
+
+def renderings(
+    gsplat: ModuleType, gaussians: dict[str, Tensor], camera: dict[str, float], poses: Tensor
+) -> tuple[Callable[[int], Tensor], Callable[[int], Tensor]]:
+    """Our image of view i (modulo their number) and gsplat's, both with alpha and depth."""
+    matrix = intrinsics(camera, poses.device)[None]
+
+    @torch.no_grad()
+    def ours(i: int) -> Tensor:
+        pose = poses[i % len(poses)]
+        return rasterize(**gaussians, camera_from_world=pose, **camera, backend="gsplat").colour
+
+    @torch.no_grad()
+    def theirs(i: int) -> Tensor:
+        image, _, _ = gsplat.rasterization(
+            gaussians["means"],
+            gaussians["quaternions"],
+            gaussians["scales"],
+            gaussians["opacities"],
+            gaussians["sh"],
+            poses[i % len(poses)][None],
+            matrix,
+            camera["width_px"],
+            camera["height_px"],
+            near_plane=NEAR_M,
+            sh_degree=3,
+            packed=False,
+            render_mode="RGB+D",
+        )
+        return image[0, ..., :3]
+
+    return ours, theirs
+
+
+def seconds_of_a_block(run: Callable[[int], Tensor], first: int) -> float:
+    """Wall-clock of ``BLOCK`` runs, from an idle GPU to an idle GPU."""
+    torch.cuda.synchronize()
+    start = time.perf_counter()
+    for i in range(first, first + BLOCK):
+        run(i)
+    torch.cuda.synchronize()
+    return time.perf_counter() - start
+
+
+def in_turn(
+    ours: Callable[[int], Tensor], theirs: Callable[[int], Tensor], seconds: float
+) -> dict[str, float]:
+    """Both in alternating blocks until ``seconds`` are over, after two blocks each that do not count."""
+    blocks: tuple[list[float], list[float]] = ([], [])
+    begin, first = time.perf_counter(), 0
+    while len(blocks[0]) < 5 or time.perf_counter() - begin < seconds:
+        for run, taken in zip((ours, theirs), blocks, strict=True):
+            taken.append(seconds_of_a_block(run, first))
+        first += BLOCK
+    return figures(blocks[0][2:], blocks[1][2:])
+
+
+def figures(ours_s: list[float], theirs_s: list[float]) -> dict[str, float]:
+    """Rates a second from the seconds of blocks, and how many times faster ours is."""
+    return {
+        "ours_per_s": BLOCK / median(ours_s),
+        "best_ours_per_s": BLOCK / min(ours_s),
+        "gsplat_per_s": BLOCK / median(theirs_s),
+        "best_gsplat_per_s": BLOCK / min(theirs_s),
+        "ratio": median(theirs_s) / median(ours_s),
+    }
+
+
+def measure(gsplat: ModuleType, size: tuple[int, int], count: int, seconds: float) -> dict[str, object]:
+    """One row of the result."""
+    gaussians, camera, poses = scene(*size, count, "cuda")
+    ours, theirs = renderings(gsplat, gaussians, camera, poses)
+    targets = torch.stack([ours(i) for i in range(VIEWS)]).contiguous()
+    difference = (ours(0) - theirs(0)).abs().mean().item()
+    rendering = in_turn(ours, theirs, seconds)
+    step = our_step(gaussians, camera, poses, targets)
+    peer_step = gsplat_step(gsplat, gaussians, camera, poses, targets)
+    losses = {"ours": [step(0).item()], "gsplat": [peer_step(0).item()]}
+    training = in_turn(step, peer_step, seconds)
+    losses["ours"].append(step(0).item())
+    losses["gsplat"].append(peer_step(0).item())
+    return {
+        "width": size[0],
+        "height": size[1],
+        "gaussians": count,
+        "rendering": rendering,
+        "training": training,
+        "mean_abs_difference": difference,
+        "loss_first_and_last": losses,
+    }
+
+
+def print_row(row: dict[str, object]) -> None:
+    """What was measured, for people."""
+    for work, unit in (("rendering", "frames/s"), ("training", "steps/s")):
+        f = row[work]
+        print(
+            f"{work:<10}{row['width']:>6}x{row['height']:<6}{row['gaussians']:>10,}"
+            f"   ours {f['ours_per_s']:>8.1f}   gsplat {f['gsplat_per_s']:>8.1f} {unit:<9} x{f['ratio']:.2f}"
+        )
+
+
+def main() -> None:
+    """Measure all sizes with all numbers of Gaussians."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--gaussians", nargs="+", type=int, default=[500_000, 2_000_000], metavar="N")
+    parser.add_argument(
+        "--sizes", nargs="+", type=size_of, default=[(960, 576), (1920, 1080)], metavar="WIDTHxHEIGHT"
+    )
+    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each figure")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
+    options = parser.parse_args()
+    trouble = why_unusable()
+    if trouble is not None:
+        sys.exit(f"gpu.py measures a GPU, and none can be used: {trouble}")
+    gsplat = load_gsplat()
+    torch.backends.cudnn.allow_tf32 = False  # SSIM takes differences of squares
+    rows = []
+    for size in options.sizes:
+        for count in options.gaussians:
+            rows.append(measure(gsplat, size, count, options.seconds))
+            print_row(rows[-1])
+    if options.json:
+        machine = {
+            "gpu": torch.cuda.get_device_name(),
+            "torch": torch.__version__,
+            "cuda": torch.version.cuda,
+            "gsplat": gsplat.__version__,
+            "ssim_of_the_peer": ssim_of_the_peer()[0],
+        }
+        options.json.write_text(json.dumps({"machine": machine, "rows": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
