@@ -29,10 +29,7 @@ def why_unusable() -> str | None:
     Nothing is compiled: that the kernels cannot be built shows at first use.
     """
     if torch.version.cuda is None:
-        return (
-            f"torch {torch.__version__} is built without CUDA: install a build with it, "
-            "see https://pytorch.org/get-started/locally"
-        )
+        return f"torch {torch.__version__} is built without CUDA: install a build with it"
     if importlib.util.find_spec("gsplat") is None:
         return "gsplat is not installed: pip install 'dreamdrive[gpu]'"
     if not torch.cuda.is_available():
