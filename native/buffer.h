@@ -3,7 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <new>
+#include <utility>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace dd {
 
@@ -21,10 +27,19 @@ class Buffer {
       const size_t wanted = count + count / 4 + 64;
       std::free(data_);
       capacity_ = 0;
-      data_ = static_cast<T*>(std::aligned_alloc(64, (wanted * sizeof(T) + 63) / 64 * 64));
-      if (!data_) throw std::bad_alloc();
+      data_ = static_cast<T*>(allocate(wanted * sizeof(T)));
       capacity_ = wanted;
     }
+    return data_;
+  }
+  // Room for `count`, the first `kept` values staying.
+  T* grow(size_t kept, size_t count) {
+    if (count <= capacity_) return data_;
+    Buffer larger;
+    larger.resize(count);
+    std::memcpy(larger.data_, data_, kept * sizeof(T));
+    std::swap(data_, larger.data_);
+    std::swap(capacity_, larger.capacity_);
     return data_;
   }
   T* data() { return data_; }
@@ -33,6 +48,18 @@ class Buffer {
   const T& operator[](size_t i) const { return data_[i]; }
 
  private:
+  // Large memory is wanted in large pages: most of it is read in no order, and every small page would be looked up.
+  static void* allocate(size_t bytes) {
+    constexpr size_t kPage = size_t(1) << 21;
+    const size_t align = bytes < kPage ? 64 : kPage;
+    void* data = std::aligned_alloc(align, (bytes + align - 1) / align * align);
+    if (!data) throw std::bad_alloc();
+#if defined(__linux__)
+    if (align == kPage) madvise(data, bytes, MADV_HUGEPAGE);
+#endif
+    return data;
+  }
+
   T* data_ = nullptr;
   size_t capacity_ = 0;
 };

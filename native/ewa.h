@@ -9,6 +9,9 @@ struct V3 {
   V x = V{}, y = V{}, z = V{};
 };
 static inline V dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static inline V3 cross(V3 a, V3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 static inline V3 scaled(V3 a, V s) { return {a.x * s, a.y * s, a.z * s}; }
 
 // Everything between a Gaussian's parameters and its conic that the backward pass needs again.
@@ -21,6 +24,7 @@ struct Projection {
   V3 t0, t1;                  // Jacobian times camera rotation, 2 x 3
   V3 m0, m1;                  // the above times rotation times scale; covariance = M M^T + blur
   V cov_xx, cov_xy, cov_yy, inverse_det;
+  V3 cross;                   // m0 x m1: its square is the determinant without the blur
 };
 
 static inline void unit_quaternion(V w, V x, V y, V z, Projection& p) {
@@ -66,9 +70,8 @@ static inline void project_lanes(const View& view, V3 mean, V3 scale, Projection
   p.cov_yy = n1 + kBlur;
   p.cov_xy = dot(p.m0, p.m1);
   // det(M M^T + blur) from |m0 x m1|^2: cov_xx cov_yy - cov_xy^2 would cancel for long thin Gaussians.
-  const V3 cross = {p.m0.y * p.m1.z - p.m0.z * p.m1.y, p.m0.z * p.m1.x - p.m0.x * p.m1.z,
-                    p.m0.x * p.m1.y - p.m0.y * p.m1.x};
-  p.inverse_det = 1.0f / (dot(cross, cross) + kBlur * (n0 + n1) + kBlur * kBlur);
+  p.cross = cross(p.m0, p.m1);
+  p.inverse_det = 1.0f / (dot(p.cross, p.cross) + kBlur * (n0 + n1) + kBlur * kBlur);
 }
 
 // Row `k` of L Gaussians from an array of rows of `stride` floats.

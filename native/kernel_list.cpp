@@ -6,6 +6,6 @@
 
 namespace dd::DD_ISA {
 
-const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, composite, composite_backward, ssim, ssim_backward};
+const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, cover, composite, composite_backward, inspect, ssim, ssim_backward};
 
 }  // namespace dd::DD_ISA

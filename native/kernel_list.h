@@ -6,8 +6,11 @@ namespace dd::DD_ISA {
 
 int project(const Inputs&, const View&, int64_t first, int64_t last, Splat* projected, uint64_t* keys);
 void project_backward(const Inputs&, const View&, const BackwardTask&, int64_t first, int64_t last, float* pose);
+int64_t cover(const View&, const Splat*, int64_t first, int64_t last, uint32_t* begin, Slot* out, int64_t room,
+              int64_t* size);
 void composite(const TileTask&, const Images&);
-void composite_backward(const TileTask&, const ImageGradients&, EntryGradient*, float* entry_channels);
+void composite_backward(const TileTask&, const ImageGradients&, bool absolute, EntryGradient*, float* entry_channels);
+void inspect(const TileTask&, float* median, Contribution*);
 void ssim(const SsimTask&);
 void ssim_backward(const SsimTask&);
 

@@ -56,10 +56,14 @@ static inline V vlog2(V v) {
 }
 
 static inline bool any(I mask) {
+#if DD_LANES == 8
+  return __builtin_ia32_movmskps256((V)mask) != 0;
+#else
   uint64_t parts[sizeof(I) / 8], bits = 0;
   __builtin_memcpy(parts, &mask, sizeof(mask));
   for (uint64_t part : parts) bits |= part;
   return bits != 0;
+#endif
 }
 
 // 2^p for -126 < p < 127, relative error below 2e-7; lanes outside hold garbage that the caller masks.

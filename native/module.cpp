@@ -81,7 +81,7 @@ Gaussians make_gaussians(InAny means, InAny quaternions, InAny scales, InAny opa
 }
 
 std::unique_ptr<PyFrame> forward(const Gaussians& gaussians, In<nb::shape<4, 4>> camera_from_world, float fx, float fy,
-                                 float cx, float cy, int width, int height, OutAny colour, OutAny alpha, OutAny depth,
+                                 float cx, float cy, int width, int height, bool antialiased, OutAny colour, OutAny alpha, OutAny depth,
                                  OutAny channels, Visible visible, bool keep) {
   const dd::Inputs in = gaussians.inputs();
   if (width < 1 || height < 1) throw nb::value_error("width_px, height_px: expected at least 1");
@@ -93,7 +93,7 @@ std::unique_ptr<PyFrame> forward(const Gaussians& gaussians, In<nb::shape<4, 4>>
   expect_size("visible", visible.size(), in.n);
   auto out = std::make_unique<PyFrame>();
   out->frame = dd::take_frame();
-  out->frame->view = dd::make_view(camera_from_world.data(), fx, fy, cx, cy, width, height);
+  out->frame->view = dd::make_view(camera_from_world.data(), fx, fy, cx, cy, width, height, antialiased);
   const dd::Images images = {colour.data(), alpha.data(), depth.data(), channels.data()};
   auto* seen = reinterpret_cast<uint8_t*>(visible.data());
   {
@@ -110,7 +110,7 @@ void backward(const Gaussians& gaussians, PyFrame& frame, std::optional<InAny> c
               std::optional<InAny> depth, std::optional<InAny> channels, std::optional<OutAny> d_means,
               std::optional<OutAny> d_quaternions, std::optional<OutAny> d_scales, std::optional<OutAny> d_opacities,
               std::optional<OutAny> d_sh, std::optional<OutAny> d_channels, std::optional<OutAny> d_screen,
-              Out<nb::shape<4, 4>> d_pose) {
+              std::optional<OutAny> d_screen_absolute, Out<nb::shape<4, 4>> d_pose) {
   const dd::Inputs in = gaussians.inputs();
   const size_t pixels = size_t(frame.frame->view.width) * size_t(frame.frame->view.height), n = size_t(in.n);
   if (in.n != frame.frame->n) throw nb::value_error("the frame was made from another number of Gaussians");
@@ -125,12 +125,25 @@ void backward(const Gaussians& gaussians, PyFrame& frame, std::optional<InAny> c
   if (d_sh) expect_size("d_sh", d_sh->size(), 3 * n * in.sh_stored);
   if (d_channels) expect_size("d_channels", d_channels->size(), n * in.n_channels);
   if (d_screen) expect_size("d_screen", d_screen->size(), 2 * n);
+  if (d_screen_absolute) expect_size("d_screen_absolute", d_screen_absolute->size(), 2 * n);
   const dd::ImageGradients upstream = {pointer(colour), pointer(alpha), pointer(depth), pointer(channels)};
   const dd::Gradients out = {pointer(d_means), pointer(d_quaternions), pointer(d_scales), pointer(d_opacities),
-                             pointer(d_sh),    pointer(d_channels),    pointer(d_screen)};
+                             pointer(d_sh),    pointer(d_channels),    pointer(d_screen),
+                             pointer(d_screen_absolute)};
   float* pose = d_pose.data();
   nb::gil_scoped_release release;
   dd::render_backward(in, *frame.frame, upstream, out, pose);
+}
+
+void inspect(const Gaussians& gaussians, PyFrame& frame, OutAny median_depth, OutAny weight_sum, OutAny weight_most) {
+  const dd::Inputs in = gaussians.inputs();
+  if (in.n != frame.frame->n) throw nb::value_error("the frame was made from another number of Gaussians");
+  expect_size("median_depth", median_depth.size(), size_t(frame.frame->view.width) * size_t(frame.frame->view.height));
+  expect_size("weight_sum", weight_sum.size(), in.n);
+  expect_size("weight_most", weight_most.size(), in.n);
+  float *median = median_depth.data(), *sum = weight_sum.data(), *most = weight_most.data();
+  nb::gil_scoped_release release;
+  dd::render_inspect(in, *frame.frame, median, sum, most);
 }
 
 // Runs one SSIM kernel over bands of rows.
@@ -206,6 +219,18 @@ bool all_finite(InAny array) {
   return finite;
 }
 
+nb::dict stage_seconds() {
+  const dd::StageSeconds seconds = dd::stage_seconds();
+  nb::dict out;
+  out["project"] = seconds.project;
+  out["sort"] = seconds.sort;
+  out["tiles"] = seconds.tiles;
+  out["composite"] = seconds.composite;
+  out["composite_backward"] = seconds.composite_backward;
+  out["project_backward"] = seconds.project_backward;
+  return out;
+}
+
 void set_threads(int count) {
   if (count < 1 || count > 1024) throw nb::value_error("threads: expected 1 to 1024");
   nb::gil_scoped_release release;
@@ -221,13 +246,16 @@ NB_MODULE(_native, m) {
   m.def("gaussians", &make_gaussians, "means"_a, "quaternions"_a, "scales"_a, "opacities"_a, "sh"_a,
         "channels"_a.none(), "offsets"_a.none(), "sh_degree"_a);
   m.def("forward", &forward, "gaussians"_a, "camera_from_world"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a,
-        "height"_a, "colour"_a, "alpha"_a, "depth"_a, "channels"_a, "visible"_a, "keep"_a);
+        "height"_a, "antialiased"_a, "colour"_a, "alpha"_a, "depth"_a, "channels"_a, "visible"_a, "keep"_a);
   m.def("backward", &backward, "gaussians"_a, "frame"_a, "colour"_a.none(), "alpha"_a.none(), "depth"_a.none(),
         "channels"_a.none(), "d_means"_a.none(), "d_quaternions"_a.none(), "d_scales"_a.none(),
-        "d_opacities"_a.none(), "d_sh"_a.none(), "d_channels"_a.none(), "d_screen"_a.none(), "d_pose"_a);
+        "d_opacities"_a.none(), "d_sh"_a.none(), "d_channels"_a.none(), "d_screen"_a.none(), "d_screen_absolute"_a.none(),
+        "d_pose"_a);
+  m.def("inspect", &inspect, "gaussians"_a, "frame"_a, "median_depth"_a, "weight_sum"_a, "weight_most"_a);
   m.def("ssim_forward", &ssim_forward, "image"_a, "target"_a, "map"_a, "partials"_a.none());
   m.def("ssim_backward", &ssim_backward, "image"_a, "target"_a, "partials"_a, "d_map"_a, "d_image"_a);
   m.def("all_finite", &all_finite, "array"_a);
+  m.def("stage_seconds", &stage_seconds);
   m.def("set_threads", &set_threads, "count"_a);
   m.def("threads", &dd::thread_count);
   m.def("isa", [] { return std::string(dd::kernels().isa); });

@@ -9,19 +9,29 @@ namespace {
 // Gradient by the splat of kLanes Gaussians, gathered from their tiles.
 struct SplatGradient {
   alignas(64) float v[kLanes], v_e[kLanes], v_ee[kLanes], v_y[kLanes], v_ey[kLanes], v_yy[kLanes];
-  alignas(64) float colour[3][kLanes], depth[kLanes];
+  alignas(64) float colour[3][kLanes], depth[kLanes], absolute_u[kLanes], absolute_v[kLanes];
 };
 
 struct PoseSums {
   V3 rotation[3], translation, direction;
 };
 
+// Calls act(number of the entry) for the entries of a splat that its tiles reached, in the order of the tiles.
+template <class Act>
+static inline void each_entry(const BackwardTask& task, uint32_t rank, Act&& act) {
+  for (uint32_t k = task.slot_begin[rank]; k < task.slot_begin[rank + 1]; k++) {
+    const Slot slot = task.slots[k];
+    const uint32_t at = task.reached_begin[slot.tile] + slot.place;
+    if (at < task.reached_begin[slot.tile + 1]) act(at);
+  }
+}
+
 void gather_entries(const BackwardTask& task, uint32_t rank, int lane, SplatGradient& g) {
   float sum[12] = {};
-  for (uint32_t k = task.slot_begin[rank]; k < task.slot_begin[rank + 1]; k++) {
-    const float* from = &task.entry_gradients[task.slots[k]].v;
+  each_entry(task, rank, [&](uint32_t at) {
+    const float* from = &task.entry_gradients[at].v;
     for (int j = 0; j < 12; j++) sum[j] += from[j];
-  }
+  });
   g.v[lane] = sum[0];
   g.v_e[lane] = sum[1];
   g.v_ee[lane] = sum[2];
@@ -30,12 +40,24 @@ void gather_entries(const BackwardTask& task, uint32_t rank, int lane, SplatGrad
   g.v_yy[lane] = sum[5];
   for (int ch = 0; ch < 3; ch++) g.colour[ch][lane] = task.splats[rank].colour[ch] > 0 ? sum[6 + ch] : 0.0f;
   g.depth[lane] = sum[9];
+  g.absolute_u[lane] = sum[10];
+  g.absolute_v[lane] = sum[11];
+}
+
+// The entries of one splat lie in many tiles: their memory is called for ahead of time, first that of their places.
+void prefetch_places(const BackwardTask& task, uint32_t rank) {
+  __builtin_prefetch(&task.splats[rank]);
+  __builtin_prefetch(&task.slots[task.slot_begin[rank]]);
+}
+void prefetch_entries(const BackwardTask& task, uint32_t rank) {
+  each_entry(task, rank, [&](uint32_t at) { __builtin_prefetch(&task.entry_gradients[at]); });
 }
 
 void gather_channels(const BackwardTask& task, int n_channels, uint32_t rank, float* out) {
   for (int c = 0; c < n_channels; c++) out[c] = 0;
-  for (uint32_t k = task.slot_begin[rank]; k < task.slot_begin[rank + 1]; k++)
-    for (int c = 0; c < n_channels; c++) out[c] += task.entry_channels[int64_t(task.slots[k]) * n_channels + c];
+  each_entry(task, rank, [&](uint32_t at) {
+    for (int c = 0; c < n_channels; c++) out[c] += task.entry_channels[int64_t(at) * n_channels + c];
+  });
 }
 
 static inline void scatter(float* rows, int stride, const uint32_t* index, int count, int k, V v) {
@@ -101,16 +123,29 @@ struct FootprintGradient {
   V by_u, by_v;
 };
 
+// Adds the gradient through the factor of the opacity, sqrt(det / (det + added)) with det = |m0 x m1|^2 and
+// added = blur (|m0|^2 + |m1|^2 + blur). v is the gradient by its logarithm.
+void dilution_gradient(const Projection& p, V v, V3& by_m0, V3& by_m1) {
+  const V det = vmax(dot(p.cross, p.cross), broadcast(1e-30f));
+  const V added = kBlur * (dot(p.m0, p.m0) + dot(p.m1, p.m1) + kBlur);
+  const V by_det = v * p.inverse_det * added / det, by_added = -kBlur * v * p.inverse_det;
+  add(by_m0, cross(p.m1, p.cross), by_det);
+  add(by_m1, cross(p.cross, p.m0), by_det);
+  add(by_m0, p.m0, by_added);
+  add(by_m1, p.m1, by_added);
+}
+
 // Splat to the projected covariance, its factor M, and from there to scale and rotation.
-FootprintGradient footprint_gradient(const Projection& p, V3 scale, const SplatGradient& g, const uint32_t* index,
+FootprintGradient footprint_gradient(const View& view, const Projection& p, V3 scale, const SplatGradient& g, const uint32_t* index,
                                      int count, const Gradients& out) {
   // With (e, f) = inverse covariance times (dx, dy): by the centre v (e, f), by the covariance v (e, f)(e, f)^T / 2.
   // The tiles summed powers of e and dy; f = (dy - cov_xy e) / cov_yy.
   const V inverse = 1.0f / p.cov_yy, share = p.cov_xy * inverse;
   const V v_ee = load(g.v_ee), v_ey = load(g.v_ey) * inverse, v_yy = load(g.v_yy) * inverse * inverse;
   const V k00 = v_ee, k01 = v_ey - share * v_ee, k11 = v_yy - share * (2.0f * v_ey - share * v_ee);
-  const V3 by_m0 = {k00 * p.m0.x + k01 * p.m1.x, k00 * p.m0.y + k01 * p.m1.y, k00 * p.m0.z + k01 * p.m1.z};
-  const V3 by_m1 = {k01 * p.m0.x + k11 * p.m1.x, k01 * p.m0.y + k11 * p.m1.y, k01 * p.m0.z + k11 * p.m1.z};
+  V3 by_m0 = {k00 * p.m0.x + k01 * p.m1.x, k00 * p.m0.y + k01 * p.m1.y, k00 * p.m0.z + k01 * p.m1.z};
+  V3 by_m1 = {k01 * p.m0.x + k11 * p.m1.x, k01 * p.m0.y + k11 * p.m1.y, k01 * p.m0.z + k11 * p.m1.z};
+  if (view.antialiased) dilution_gradient(p, load(g.v), by_m0, by_m1);
   const V3 n0 = {by_m0.x * scale.x, by_m0.y * scale.y, by_m0.z * scale.z};
   const V3 n1 = {by_m1.x * scale.x, by_m1.y * scale.y, by_m1.z * scale.z};
   FootprintGradient f;
@@ -167,7 +202,7 @@ void lanes_gradient(const Inputs& in, const View& view, const BackwardTask& task
   unit_quaternion(gather(in.quaternions, 4, index, 0), gather(in.quaternions, 4, index, 1),
                   gather(in.quaternions, 4, index, 2), gather(in.quaternions, 4, index, 3), p);
   project_lanes(view, mean, scale, p);
-  const FootprintGradient f = footprint_gradient(p, scale, g, index, count, task.out);
+  const FootprintGradient f = footprint_gradient(view, p, scale, g, index, count, task.out);
   const V3 by_camera = camera_gradient(view, p, f, load(g.depth), pose);
   const V3 by_direction = colour_gradient(in, view, index, count, mean, g, task.out.sh);
   const float* r = view.rotation;
@@ -178,6 +213,8 @@ void lanes_gradient(const Inputs& in, const View& view, const BackwardTask& task
   scatter(task.out.opacities, 1, index, count, 0, load(g.v) / gather(in.opacities, 1, index, 0));
   scatter(task.out.screen, 2, index, count, 0, f.by_u);
   scatter(task.out.screen, 2, index, count, 1, f.by_v);
+  scatter(task.out.screen_absolute, 2, index, count, 0, load(g.absolute_u));
+  scatter(task.out.screen_absolute, 2, index, count, 1, load(g.absolute_v));
   // Lanes beyond count repeat a Gaussian with zero upstream gradient, so they add nothing here.
   add(pose.rotation[0], mean, by_camera.x);
   add(pose.rotation[1], mean, by_camera.y);
@@ -197,6 +234,7 @@ void clear_all(const Inputs& in, const Gradients& out, int64_t i) {
   clear(out.sh, 3 * in.sh_stored, i);
   clear(out.channels, in.n_channels, i);
   clear(out.screen, 2, i);
+  clear(out.screen_absolute, 2, i);
 }
 
 // The camera centre is -R^T t: its share of the gradient goes to all of R and t.
@@ -218,19 +256,24 @@ void pose_rows(const View& view, const PoseSums& sums, float* pose) {
 
 void project_backward(const Inputs& in, const View& view, const BackwardTask& task, int64_t first, int64_t last,
                       float* pose) {
+  constexpr int kAhead = 16;
   uint32_t list[kChunk + kLanes];
   int n = 0;
   for (int64_t i = first; i < last; i++) {
     const uint32_t rank = task.rank[i];
-    if (rank != kHidden && task.slot_begin[rank] < task.slot_begin[rank + 1])
+    if (rank != kHidden)
       list[n++] = uint32_t(i);
     else
       clear_all(in, task.out, i);
   }
   for (int l = 0; l < kLanes && n; l++) list[n + l] = list[n - 1];
   PoseSums sums;
-  for (int i = 0; i < n; i += kLanes)
+  for (int i = 0; i < n; i += kLanes) {
+    const int next = i ? i + kAhead : 0, end = i + kAhead + kLanes;
+    for (int k = next + kAhead; k < end + kAhead && k < n; k++) prefetch_places(task, task.rank[list[k]]);
+    for (int k = next; k < end && k < n; k++) prefetch_entries(task, task.rank[list[k]]);
     lanes_gradient(in, view, task, list + i, n - i < kLanes ? n - i : kLanes, sums);
+  }
   pose_rows(view, sums, pose);
 }
 

@@ -17,7 +17,8 @@ I geometry(const Inputs& in, const View& view, const uint32_t* index, Splat* out
     u += gather(in.offsets, 2, index, 0);
     v += gather(in.offsets, 2, index, 1);
   }
-  const V opacity = gather(in.opacities, 1, index, 0);
+  V opacity = gather(in.opacities, 1, index, 0);
+  if (view.antialiased) opacity *= vsqrt(dot(p.cross, p.cross) * p.inverse_det);
   I seen = (p.camera.z >= kNear) & (p.camera.z <= kFar) & (opacity >= kMinAlpha) & (p.inverse_det > 0.0f);
   if (!any(seen)) return seen;
   const V log2_opacity = vlog2(opacity);

@@ -1,6 +1,7 @@
 #include "rasterize.h"
 
 #include <algorithm>
+#include <chrono>
 #include <mutex>
 #include <vector>
 
@@ -20,43 +21,57 @@ Store& store() {
   return *s;
 }
 
+std::mutex seconds_mutex;
+StageSeconds seconds;
+
+// Notes how long it lived.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double StageSeconds::* stage) : stage_(stage), start_(std::chrono::steady_clock::now()) {}
+  ~Stopwatch() {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
+    std::lock_guard<std::mutex> lock(seconds_mutex);
+    seconds.*stage_ = taken.count();
+  }
+
+ private:
+  double StageSeconds::* stage_;
+  std::chrono::steady_clock::time_point start_;
+};
+
 int64_t chunks_of(int64_t n) { return (n + kChunk - 1) / kChunk; }
 
-// Projects all Gaussians and leaves those that can be seen in frame.splats, in depth order; equal depths keep index order.
-void project_and_sort(const Inputs& in, Frame& frame) {
+// Projects all Gaussians to frame.projected and leaves the keys of those that can be seen in frame.keys; none is visible yet.
+void project(const Inputs& in, Frame& frame, uint8_t* visible) {
+  const Stopwatch watch(&StageSeconds::project);
   const int64_t chunks = chunks_of(in.n);
   Splat* projected = frame.projected.resize(in.n);
   uint64_t *sparse = frame.spare_keys.resize(in.n), *keys = frame.keys.resize(in.n);
+  uint32_t* rank = frame.rank.resize(in.n);
   std::vector<int64_t> begin(chunks + 1, 0);
   parallel_for(chunks, [&](int64_t chunk, int) {
-    const int64_t first = chunk * kChunk;
-    begin[chunk + 1] =
-        kernels().project(in, frame.view, first, std::min(in.n, first + kChunk), projected, sparse + first);
+    const int64_t first = chunk * kChunk, last = std::min(in.n, first + kChunk);
+    std::fill(rank + first, rank + last, kHidden);
+    std::fill(visible + first, visible + last, uint8_t(0));
+    begin[chunk + 1] = kernels().project(in, frame.view, first, last, projected, sparse + first);
   });
   for (int64_t chunk = 0; chunk < chunks; chunk++) {
     std::copy_n(sparse + chunk * kChunk, begin[chunk + 1], keys + begin[chunk]);
     begin[chunk + 1] += begin[chunk];
   }
   frame.n_splats = begin[chunks];
-  sort_by_depth(keys, sparse, frame.n_splats);
+}
+
+// Leaves the splats in frame.splats in depth order; equal depths keep index order.
+void sort(Frame& frame) {
+  const Stopwatch watch(&StageSeconds::sort);
+  uint64_t* keys = frame.keys.data();
+  sort_by_depth(keys, frame.spare_keys.data(), frame.n_splats);
   Splat* splats = frame.splats.resize(frame.n_splats);
   parallel_for(chunks_of(frame.n_splats), [&](int64_t chunk, int) {
     const int64_t last = std::min(frame.n_splats, (chunk + 1) * kChunk);
-    for (int64_t i = chunk * kChunk; i < last; i++) splats[i] = projected[uint32_t(keys[i])];
+    for (int64_t i = chunk * kChunk; i < last; i++) splats[i] = frame.projected[uint32_t(keys[i])];
   });
-}
-
-// rank of each Gaussian among the splats, and whether it reaches a tile.
-void mark_visible(Frame& frame, uint8_t* visible) {
-  uint32_t* rank = frame.rank.resize(frame.n);
-  std::fill_n(rank, frame.n, kHidden);
-  std::fill_n(visible, frame.n, uint8_t(0));
-  for (int64_t i = 0; i < frame.n_splats; i++) {
-    if (frame.lists.slot_begin[i] == frame.lists.slot_begin[i + 1]) continue;
-    const uint32_t index = frame.splats[i].index;
-    rank[index] = uint32_t(i);
-    visible[index] = 1;
-  }
 }
 
 TileTask tile_task(const Inputs& in, Frame& frame, int64_t tile, bool keep) {
@@ -70,16 +85,28 @@ TileTask tile_task(const Inputs& in, Frame& frame, int64_t tile, bool keep) {
   task.tile_y = int(tile / frame.view.tiles_x);
   task.channels = in.channels;
   task.n_channels = in.n_channels;
-  task.transmittance = keep ? frame.transmittance.data() + tile * kTilePixels : nullptr;
-  task.last = keep ? frame.last.data() + tile * kTilePixels : nullptr;
+  task.record = keep ? frame.records.data() + tile : nullptr;
   task.scratch = nullptr;
   return task;
 }
 
 int64_t tile_count(const Frame& frame) { return int64_t(frame.view.tiles_x) * frame.view.tiles_y; }
+// Per tile + 1: the range of the entries it reached, when only those are stored one after another.
+std::vector<uint32_t> begin_of_reached(const Frame& frame) {
+  std::vector<uint32_t> begin(tile_count(frame) + 1, 0);
+  for (int64_t tile = 0; tile < tile_count(frame); tile++)
+    begin[tile + 1] = begin[tile] + uint32_t(frame.records[tile].n_reached);
+  return begin;
+}
+
 int64_t scratch_floats(const Inputs& in) { return int64_t(kTilePixels + kTile) * in.n_channels; }
 
 }  // namespace
+
+StageSeconds stage_seconds() {
+  std::lock_guard<std::mutex> lock(seconds_mutex);
+  return seconds;
+}
 
 void FrameReturner::operator()(Frame* frame) const {
   std::unique_ptr<Frame> owned(frame);
@@ -95,7 +122,8 @@ FrameHandle take_frame() {
   return frame;
 }
 
-View make_view(const float m[16], float fx, float fy, float cx, float cy, int width, int height) {
+View make_view(const float m[16], float fx, float fy, float cx, float cy, int width, int height,
+               bool antialiased) {
   View v;
   for (int row = 0; row < 3; row++) {
     for (int k = 0; k < 3; k++) v.rotation[3 * row + k] = m[4 * row + k];
@@ -116,24 +144,49 @@ View make_view(const float m[16], float fx, float fy, float cx, float cy, int wi
   v.height = height;
   v.tiles_x = (width + kTile - 1) / kTile;
   v.tiles_y = (height + kTile - 1) / kTile;
+  v.antialiased = antialiased;
   return v;
 }
 
 void render_forward(const Inputs& in, Frame& frame, bool keep, const Images& out, uint8_t* visible) {
   frame.n = in.n;
-  project_and_sort(in, frame);
-  frame.binner.bin(frame.view, frame.splats.data(), frame.n_splats, frame.lists);
-  mark_visible(frame, visible);
-  const int64_t tiles = tile_count(frame), scratch = scratch_floats(in);
-  if (keep) {
-    frame.transmittance.resize(tiles * kTilePixels);
-    frame.last.resize(tiles * kTilePixels);
+  project(in, frame, visible);
+  sort(frame);
+  {
+    const Stopwatch watch(&StageSeconds::tiles);
+    frame.binner.bin(frame.view, frame.splats.data(), frame.n_splats, keep, frame.lists, frame.rank.data(), visible);
   }
+  const int64_t tiles = tile_count(frame), scratch = scratch_floats(in);
+  if (keep) frame.records.resize(tiles);
   frame.scratch.resize(thread_count() * scratch);
+  const Stopwatch watch(&StageSeconds::composite);
   parallel_for(tiles, [&](int64_t tile, int worker) {
     TileTask task = tile_task(in, frame, tile, keep);
     task.scratch = frame.scratch.data() + worker * scratch;
     kernels().composite(task, out);
+  });
+}
+
+void render_inspect(const Inputs& in, Frame& frame, float* median, float* weight_sum, float* weight_most) {
+  const std::vector<uint32_t> begin = begin_of_reached(frame);
+  Buffer<Contribution> contributions;
+  contributions.resize(begin.back());
+  parallel_for(tile_count(frame), [&](int64_t tile, int) {
+    kernels().inspect(tile_task(in, frame, tile, true), median, contributions.data() + begin[tile]);
+  });
+  parallel_for(chunks_of(in.n), [&](int64_t chunk, int) {
+    for (int64_t i = chunk * kChunk, last = std::min(in.n, i + kChunk); i < last; i++) {
+      weight_sum[i] = weight_most[i] = 0;
+      const uint32_t rank = frame.rank[i];
+      if (rank == kHidden) continue;
+      for (uint32_t k = frame.lists.slot_begin[rank]; k < frame.lists.slot_begin[rank + 1]; k++) {
+        const Slot slot = frame.lists.slots[k];
+        if (begin[slot.tile] + slot.place >= begin[slot.tile + 1]) continue;
+        const Contribution& part = contributions[begin[slot.tile] + slot.place];
+        weight_sum[i] += part.sum;
+        weight_most[i] = std::max(weight_most[i], part.most);
+      }
+    }
   });
 }
 
@@ -143,19 +196,24 @@ void render_backward(const Inputs& in, Frame& frame, const ImageGradients& upstr
   static Buffer<EntryGradient>& entry_gradients = *new Buffer<EntryGradient>();
   static Buffer<float>& entry_channels = *new Buffer<float>();
   std::lock_guard<std::mutex> lock(mutex);
-  entry_gradients.resize(frame.lists.n_entries);
-  entry_channels.resize(frame.lists.n_entries * in.n_channels);
-  const int64_t scratch = scratch_floats(in), chunks = chunks_of(in.n);
+  const int64_t tiles = tile_count(frame), scratch = scratch_floats(in), chunks = chunks_of(in.n);
+  const std::vector<uint32_t> reached_begin = begin_of_reached(frame);
+  entry_gradients.resize(reached_begin[tiles]);
+  entry_channels.resize(size_t(reached_begin[tiles]) * in.n_channels);
   frame.scratch.resize(thread_count() * scratch);
-  parallel_for(tile_count(frame), [&](int64_t tile, int worker) {
-    TileTask task = tile_task(in, frame, tile, true);
-    task.scratch = frame.scratch.data() + worker * scratch;
-    const int64_t begin = frame.lists.tile_begin[tile];
-    kernels().composite_backward(task, upstream, entry_gradients.data() + begin,
-                                 entry_channels.data() + begin * in.n_channels);
-  });
-  const BackwardTask task = {frame.splats.data(),      frame.rank.data(),      frame.lists.slot_begin.data(),
-                             frame.lists.slots.data(), entry_gradients.data(), entry_channels.data(), out};
+  {
+    const Stopwatch watch(&StageSeconds::composite_backward);
+    parallel_for(tiles, [&](int64_t tile, int worker) {
+      TileTask task = tile_task(in, frame, tile, true);
+      task.scratch = frame.scratch.data() + worker * scratch;
+      kernels().composite_backward(task, upstream, out.screen_absolute, entry_gradients.data() + reached_begin[tile],
+                                   entry_channels.data() + size_t(reached_begin[tile]) * in.n_channels);
+    });
+  }
+  const Stopwatch watch(&StageSeconds::project_backward);
+  const BackwardTask task = {frame.splats.data(),      frame.rank.data(),    frame.lists.slot_begin.data(),
+                             frame.lists.slots.data(), reached_begin.data(), entry_gradients.data(),
+                             entry_channels.data(),    out};
   std::vector<float> pose_of_chunk(12 * chunks);
   parallel_for(chunks, [&](int64_t chunk, int) {
     const int64_t first = chunk * kChunk;

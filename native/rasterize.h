@@ -17,8 +17,8 @@ struct Frame {
   Buffer<uint32_t> rank;
   TileBinner binner;
   TileLists lists;
-  Buffer<float> transmittance, scratch;
-  Buffer<int32_t> last;
+  Buffer<TileRecord> records;
+  Buffer<float> scratch;
 };
 
 // Frames are returned to a small store when dropped, so that their memory is used again.
@@ -28,10 +28,21 @@ struct FrameReturner {
 using FrameHandle = std::unique_ptr<Frame, FrameReturner>;
 FrameHandle take_frame();
 
-View make_view(const float camera_from_world[16], float fx, float fy, float cx, float cy, int width, int height);
+View make_view(const float camera_from_world[16], float fx, float fy, float cx, float cy, int width, int height,
+               bool antialiased);
 
 // Writes the images and visible (n); keeps what the backward pass needs if `keep`.
 void render_forward(const Inputs& in, Frame& frame, bool keep, const Images& out, uint8_t* visible);
+
+// After render_forward with `keep`: median depth (h, w), 0 where a pixel is never half covered, and per Gaussian (n) the
+// sum and the largest of its weights in the image.
+void render_inspect(const Inputs& in, Frame& frame, float* median, float* weight_sum, float* weight_most);
+
+// Seconds that the parts of the most recent forward and backward passes took.
+struct StageSeconds {
+  double project = 0, sort = 0, tiles = 0, composite = 0, composite_backward = 0, project_backward = 0;
+};
+StageSeconds stage_seconds();
 
 // Writes every gradient that is not null, and the pose's (4 x 4, last row zero).
 void render_backward(const Inputs& in, Frame& frame, const ImageGradients& upstream, const Gradients& out,

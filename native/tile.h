@@ -1,40 +1,67 @@
-// The pixels of one tile as strips of kLanes columns: strip-major, then rows, then lanes.
+// The pixels of one tile, row by row, in cells of kLanes columns.
 #pragma once
 #include "lanes.h"
 #include "types.h"
 
 namespace dd::DD_ISA {
 
-constexpr int kStrips = kTile / kLanes;
-static inline int at(int strip, int row) { return (strip * kTile + row) * kLanes; }
+constexpr int kStrips = kTile / kLanes, kCells = kStrips * kTile;
+// A set of cells, one bit for each: cell = row * kStrips + strip.
+using Cells = uint64_t;
+constexpr Cells kEachRow = kStrips == 1 ? 0xffff : kStrips == 2 ? 0x55555555 : 0x1111111111111111;
+static inline Cells first_cells(int count) { return count < 64 ? (Cells(1) << count) - 1 : ~Cells(0); }
 
-// Rows and strips of the tile that a splat can reach; empty if first > last.
-struct Span {
-  int first_row, last_row, first_strip, last_strip;
+// The cells of the tile that a splat can reach.
+static inline Cells reached_cells(const Splat& s, float left, float top) {
+  using I4 = int32_t __attribute__((vector_size(16)));
+  // Pixel centres lie at +0.5: the first column at or right of u - reach_x is ceil(u - reach_x - left - 0.5).
+  const V4 bounds = {s.u - left - s.reach_x + 0.4999f, s.u - left + s.reach_x + 0.5f,
+                     s.v - top - s.reach_y + 0.4999f, s.v - top + s.reach_y + 0.5f};
+  const V4 low = bounds > 0.0f ? bounds : V4{}, side = V4{} + float(kTile);
+  const I4 within = __builtin_convertvector(low < side ? low : side, I4);
+  const Cells rows = first_cells(within[3] * kStrips) & ~first_cells(within[2] * kStrips);
+  const Cells strips = first_cells((within[1] + kLanes - 1) / kLanes) & ~first_cells(within[0] / kLanes);
+  return rows & strips * kEachRow;
+}
+
+// Some entries of a tile, looked at ahead of time: what follows does not wait for memory, and knows its cells at once.
+struct Batch {
+  static constexpr int kSize = 32;
+  const Splat* splats[kSize];
+  Cells cells[kSize];
+
+  // Entries [first, last), and calls for the memory of those in [next, next_end).
+  void look(const TileTask& task, int first, int last, int next, int next_end) {
+    const float left = float(task.tile_x * kTile), top = float(task.tile_y * kTile);
+    for (int i = next; i < next_end; i++) __builtin_prefetch(&task.splats[task.entries[i]]);
+    for (int i = first; i < last; i++) {
+      const Splat& s = task.splats[task.entries[i]];
+      splats[i - first] = &s;
+      cells[i - first] = reached_cells(s, left, top);
+    }
+  }
 };
-static inline int clamped(float x, int low, int high) {
-  return int(x < float(low) ? float(low) : x > float(high) ? float(high) : x);
-}
-static inline Span span(const Splat& s, float left, float top) {
-  // Pixel centres lie at +0.5: the first row at or above v - reach_y is ceil(v - reach_y - top - 0.5).
-  const float v = s.v - top - 0.5f, u = s.u - left - 0.5f;
-  Span out;
-  out.first_row = clamped(v - s.reach_y + 0.9999f, 0, kTile);
-  out.last_row = clamped(v + s.reach_y + 1.0f, 0, kTile) - 1;
-  out.first_strip = clamped(u - s.reach_x + 0.9999f, 0, kTile) / kLanes;
-  out.last_strip = (clamped(u + s.reach_x + 1.0f, 0, kTile) - 1 + kLanes) / kLanes - 1;
-  return out;
-}
 
-// e (see Splat) and the logarithm (base 2) of alpha along a row of lanes.
-struct Strip {
-  V part;  // of e that all rows share
-  float conic_xy, along, across, log2_opacity;
-  Strip(const Splat& s, float left)
-      : part(s.conic_xx * (iota() + (left + 0.5f - s.u))), conic_xy(s.conic_xy), along(s.along), across(s.across),
-        log2_opacity(s.log2_opacity) {}
-  V e(float dy) const { return part + conic_xy * dy; }
-  V power(V e, float dy) const { return (along * e) * e + (log2_opacity + across * dy * dy); }
+// e (see Splat) and the logarithm (base 2) of alpha in the cells of a tile, with all that rows or columns share.
+class Form {
+ public:
+  Form(const Splat& s, float left, float top) : along_(broadcast(s.along)) {
+    for (int strip = 0; strip < kStrips; strip++) {
+      const V centre = iota() + (0.5f + float(strip * kLanes));
+      const V dy = centre + (top - s.v);
+      part_[strip] = s.conic_xx * (centre + (left - s.u));
+      store(dy_ + strip * kLanes, dy);
+      store(slant_ + strip * kLanes, s.conic_xy * dy);
+      store(rest_ + strip * kLanes, (s.across * dy) * dy + s.log2_opacity);
+    }
+  }
+  V dy(int cell) const { return broadcast(dy_[cell / kStrips]); }
+  V e(int cell) const { return part_[cell % kStrips] + broadcast(slant_[cell / kStrips]); }
+  V power(int cell, V e) const { return (along_ * e) * e + broadcast(rest_[cell / kStrips]); }
+
+ private:
+  V part_[kStrips], along_;
+  alignas(64) float dy_[kTile], slant_[kTile], rest_[kTile];
 };
 
 }  // namespace dd::DD_ISA

@@ -13,6 +13,8 @@ constexpr float kBlur = 0.3f;                   // added to the projected covari
 constexpr float kMaxAlpha = 0.999f;
 constexpr float kMinAlpha = 1.0f / 255.0f;
 constexpr float kMinPower = -7.99435343685886f; // log2(kMinAlpha)
+constexpr float kMaxPower = -0.00144341685f;    // log2(kMaxAlpha)
+constexpr float kNever = 1e30f;                 // a power that no Gaussian has
 constexpr float kMinTransmittance = 1e-4f;
 constexpr float kLog2e = 1.44269504088896f;
 constexpr float kLn2 = 0.693147180559945f;
@@ -24,6 +26,7 @@ struct View {
   float fx, fy, cx, cy;
   float min_tx, max_tx, min_ty, max_ty;         // limits of x/z and y/z in the Jacobian
   int width, height, tiles_x, tiles_y;
+  bool antialiased;                             // opacity shrinks by what the blur adds to the area
 };
 
 struct Inputs {
@@ -47,11 +50,16 @@ struct alignas(64) Splat {
 };
 
 // Sums of one Gaussian over the pixels of one tile of v = alpha dL/dalpha times powers of e and y (dy above).
-struct EntryGradient {
+struct alignas(64) EntryGradient {
   float v, v_e, v_ee, v_y, v_ey, v_yy;
   float colour[3];
   float depth;
-  float padding[2];
+  float absolute_u, absolute_v;                 // sums of |dL/du| and |dL/dv| over the pixels, if wanted
+};
+
+// What a Gaussian gives to the pixels of one tile: the sum and the largest of its compositing weights.
+struct Contribution {
+  float sum, most;
 };
 
 struct Images {
@@ -61,7 +69,16 @@ struct ImageGradients {
   const float *colour, *alpha, *depth, *channels;
 };
 
-// One tile's work; transmittance and last (index of the last contributor, -1 if none) are in tile order (256).
+// What a tile's forward pass leaves for its backward pass; pixels of the tile row by row.
+struct TileRecord {
+  float transmittance[kTilePixels];             // what light is left behind all that a pixel took
+  int32_t stop_entry[kTilePixels];              // the entries at which pixels stopped, ascending: they took no part of it,
+  uint8_t stop_pixel[kTilePixels];              // the pixels that did,
+  int32_t n_stops;                              // and how many
+  int32_t n_reached;                            // entries that any pixel may have taken
+};
+
+// One tile's work.
 struct TileTask {
   const View* view;
   const Splat* splats;                          // in depth order
@@ -69,21 +86,28 @@ struct TileTask {
   int n_entries, tile_x, tile_y;
   const float* channels;                        // (n, n_channels) of the Gaussians
   int n_channels;
-  float* transmittance;
-  int32_t* last;                                // null if no gradient is wanted
+  TileRecord* record;                           // null if no gradient is wanted
   float* scratch;                               // forward: 256 c floats, backward: 256 c + 16 c
 };
 
+// One place of a splat in the tile lists.
+struct Slot {
+  uint32_t tile, place;                         // the tile, and the index within its list
+};
+constexpr int kTilesAtOnce = 4;                 // places that may be written beyond what is listed
+
 struct Gradients {
-  float *means, *quaternions, *scales, *opacities, *sh, *channels, *screen;
+  float *means, *quaternions, *scales, *opacities, *sh, *channels, *screen, *screen_absolute;
 };
 
 struct BackwardTask {
   const Splat* splats;
-  const uint32_t* rank;                         // of each Gaussian in splats, kHidden where culled
-  const uint32_t *slot_begin, *slots;           // per splat: its places in the entry lists
+  const uint32_t* rank;                         // of each Gaussian in splats, kHidden where it reaches no tile
+  const uint32_t* slot_begin;                   // per splat: its range of slots
+  const Slot* slots;
+  const uint32_t* reached_begin;                // per tile + 1: its range of gradients, of the entries it reached
   const EntryGradient* entry_gradients;
-  const float* entry_channels;                  // (entries, n_channels)
+  const float* entry_channels;                  // (reached entries, n_channels)
   Gradients out;
 };
 
@@ -109,8 +133,16 @@ struct Kernels {
   // Writes every gradient row of Gaussians [first, last) and 12 sums for the pose (3 x 4, row by row).
   void (*project_backward)(const Inputs&, const View&, const BackwardTask&, int64_t first, int64_t last,
                            float* pose);
+  // Lists the tiles that splats [first, last) meet, with the splat as place, from out[*size] on, and where each splat's
+  // begin. Stops early when `room` may not suffice for the next one; returns the first splat that was not handled.
+  int64_t (*cover)(const View&, const Splat*, int64_t first, int64_t last, uint32_t* begin, Slot* out, int64_t room,
+                   int64_t* size);
   void (*composite)(const TileTask&, const Images&);
-  void (*composite_backward)(const TileTask&, const ImageGradients&, EntryGradient*, float* entry_channels);
+  // Writes the gradients of the entries that were reached; `absolute`: |dL/du| and |dL/dv| too.
+  void (*composite_backward)(const TileTask&, const ImageGradients&, bool absolute, EntryGradient*,
+                             float* entry_channels);
+  // Writes the depth where a pixel is half covered (0 if never) and the contributions of the entries that were reached.
+  void (*inspect)(const TileTask&, float* median, Contribution*);
   void (*ssim)(const SsimTask&);
   void (*ssim_backward)(const SsimTask&);
 };

@@ -70,7 +70,9 @@ def written(inside: Tensor, values: Tensor) -> Tensor:
 
 def project(means, quats, scales, viewmats, Ks, opacities, **others) -> tuple[Tensor | None, ...]:
     covariances, _ = _torch_impl._quat_scale_to_covar_preci(quats, scales, True, False)
-    radii, *numbers, _ = _torch_impl._fully_fused_projection(means, covariances, viewmats, Ks, **others)
+    radii, *numbers, dilutions = _torch_impl._fully_fused_projection(
+        means, covariances, viewmats, Ks, **others
+    )
     radii = torch.where(opacities[:, None] >= 1 / 255, radii, 0)
     inside = (radii > 0).all(-1)
     means2d, depths, conics = numbers
@@ -79,7 +81,7 @@ def project(means, quats, scales, viewmats, Ks, opacities, **others) -> tuple[Te
         written(inside[..., None], means2d),
         written(inside, depths),
         written(inside[..., None], conics),
-        None,
+        None if dilutions is None else written(inside, dilutions),
     )
 
 

@@ -58,6 +58,7 @@ def render_with_gradients(
     sh_degree: int | None = None,
     images: tuple[str, ...] = IMAGES,
     device: str = "cpu",
+    **options: bool,
 ) -> tuple[Render, dict[str, Tensor]]:
     """Render on a device and pull a fixed random gradient back through ``images`` to leaves on the CPU.
 
@@ -66,7 +67,7 @@ def render_with_gradients(
     dtype = torch.float64 if backend == "reference" else torch.float32
     inputs = {name: value.to(dtype).clone().requires_grad_() for name, value in scene.items()}
     there = {name: value.to(device) for name, value in inputs.items()}
-    out = rasterize(**there, **(camera or pinhole()), sh_degree=sh_degree, backend=backend)
+    out = rasterize(**there, **(camera or pinhole()), sh_degree=sh_degree, backend=backend, **options)
     g = torch.Generator().manual_seed(7)
     loss = torch.zeros((), dtype=dtype, device=device)
     for name in IMAGES:

@@ -88,6 +88,12 @@ def test_any_number_of_extra_channels(device, channels):
     assert value.channels.shape == (37, 53, channels or 0)
 
 
+def test_antialiased(device):
+    scene = unmoved(random_scene(80, seed=4))
+    scene["scales"] = scene["scales"] * 0.3
+    assert_agrees(scene, device, antialiased=True)
+
+
 @pytest.mark.parametrize("image", IMAGES)
 def test_gradient_of_one_output_alone(device, image):
     assert_agrees(unmoved(random_scene(60, seed=6)), device, images=(image,))
@@ -202,6 +208,14 @@ def pretend(
     monkeypatch.setattr("torch.cuda.is_available", lambda: device)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if found[name] else None)
     monkeypatch.setattr(cuda, "_has_compiler", lambda: compiler)
+
+
+def test_what_it_has_not_is_refused():
+    scene = {k: v.float() for k, v in random_scene(5).items()}
+    with pytest.raises(ValueError, match="inspect"):
+        rasterize(**scene, **pinhole(), inspect=True, backend="gsplat")
+    with pytest.raises(ValueError, match="screen_absolute_px"):
+        rasterize(**scene, **pinhole(), screen_absolute_px=torch.zeros(5, 2), backend="gsplat")
 
 
 @pytest.mark.parametrize(

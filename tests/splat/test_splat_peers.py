@@ -108,7 +108,7 @@ def test_projection_agrees_with_gsplat(street):
         size_px=(camera["width_px"], camera["height_px"]),
         sh_degree=0,
     )
-    index, centre, conic, depth = project(arguments)
+    index, centre, conic, _, depth = project(arguments)
     value, expected = [centre, conic, depth], [means2d[0, index], conics[0, index], depths[0, index]]
     for a, b in zip(value, expected, strict=True):
         assert relative(a, b) < 1e-9

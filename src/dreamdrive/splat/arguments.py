@@ -29,6 +29,10 @@ class SplatArguments:
         sh_degree: Degree evaluated, at most the stored one.
         channels: Further values per Gaussian (N, C), composited like colour, or None.
         screen_offsets_px: Added to the projected centres (N, 2), or None.
+        screen_absolute_px: Changes nothing (N, 2); its gradient is the sum over the pixels of the absolute
+            gradients by the projected centres. Or None.
+        antialiased: Whether opacities shrink by what the blur adds to the footprints.
+        inspect: Whether median depth and the weights of the Gaussians are wanted.
     """
 
     means: Float[Tensor, "n 3"]
@@ -43,6 +47,9 @@ class SplatArguments:
     sh_degree: int
     channels: Float[Tensor, "n c"] | None = None
     screen_offsets_px: Float[Tensor, "n 2"] | None = None
+    screen_absolute_px: Float[Tensor, "n 2"] | None = None
+    antialiased: bool = False
+    inspect: bool = False
 
     def tensors(self) -> dict[str, Tensor]:
         """The present tensors by the name of their argument."""
@@ -55,6 +62,7 @@ class SplatArguments:
             "camera_from_world",
             "channels",
             "screen_offsets_px",
+            "screen_absolute_px",
         )
         named = ((name, getattr(self, name)) for name in names)
         return {name: value for name, value in named if value is not None}
@@ -73,6 +81,7 @@ def check_shapes(tensors: dict[str, Tensor | None]) -> None:
         "camera_from_world": (4, 4),
         "channels": (count, "C"),
         "screen_offsets_px": (count, 2),
+        "screen_absolute_px": (count, 2),
     }
     for name, value in tensors.items():
         if value is None:
@@ -80,6 +89,8 @@ def check_shapes(tensors: dict[str, Tensor | None]) -> None:
         if not isinstance(value, Tensor):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ValueError(f"{name}: expected a torch tensor, got {type(value).__name__}")
         shape = shapes[name]
+        if name == "camera_from_world" and value.ndim == 3 and len(value):
+            shape = (len(value), *shape)
         fits = value.ndim == len(shape) and all(
             isinstance(e, str) or e == s for e, s in zip(shape, value.shape, strict=True)
         )

@@ -95,23 +95,27 @@ def _splat(gsplat: ModuleType, arguments: SplatArguments) -> Render:
     """Project, list by tile, composite. Rows of culled Gaussians have radius 0 and are not written."""
     width, height = arguments.size_px
     intrinsics = _intrinsics(arguments.focal_px, arguments.centre_px, arguments.means.device)
-    radii, centres, depths, conics, _ = gsplat.fully_fused_projection(
+    radii, centres, depths, conics, dilutions = gsplat.fully_fused_projection(
         arguments.means, None, arguments.quaternions, arguments.scales, arguments.camera_from_world[None],
         intrinsics, width, height, eps2d=BLUR_PX2, near_plane=NEAR_M, far_plane=FAR_M,
-        opacities=arguments.opacities,
+        opacities=arguments.opacities, calc_compensations=arguments.antialiased,
     )  # fmt: skip
+    opacities = arguments.opacities[None]
+    inside = (radii > 0).all(-1)
+    if arguments.antialiased:
+        opacities = opacities * torch.where(inside, dilutions, 0.0)
     if arguments.screen_offsets_px is not None:
         centres = centres + arguments.screen_offsets_px
     columns, rows = -(-width // TILE_PX), -(-height // TILE_PX)
     tiles, keys, order = gsplat.isect_tiles(centres, radii, depths, TILE_PX, columns, rows)
     starts = gsplat.isect_offset_encode(keys, 1, columns, rows)
 
-    values = [_colours(gsplat, arguments, (radii[0] > 0).all(-1)), depths[0, :, None]]
+    values = [_colours(gsplat, arguments, inside[0]), depths[0, :, None]]
     if arguments.channels is not None:
         values.append(arguments.channels)
     composited = [
         gsplat.rasterize_to_pixels(
-            centres, conics, some[None], arguments.opacities[None], width, height, TILE_PX, starts, order
+            centres, conics, some[None], opacities, width, height, TILE_PX, starts, order
         )
         for some in torch.cat(values, dim=-1).split(CHANNELS_AT_ONCE, dim=-1)
     ]
@@ -160,6 +164,8 @@ def rasterize_gsplat(arguments: SplatArguments) -> Render:
         InputError: The backend cannot be used here; the message says what to do.
         ValueError: A tensor is not float32 or not on a CUDA device.
     """
+    if arguments.inspect or arguments.screen_absolute_px is not None:
+        raise ValueError("inspect, screen_absolute_px: the backend 'gsplat' has neither, 'native' has both")
     gsplat = load_gsplat()
     tensors = arguments.tensors()
     check_device(tensors, "cuda")

@@ -19,6 +19,7 @@ _NAMES = (
     "sh",
     "channels",
     "screen_offsets_px",
+    "screen_absolute_px",
     "camera_from_world",
 )
 
@@ -28,12 +29,17 @@ def _buffer(tensor: Any) -> Any:
 
 
 class _Rasterize(torch.autograd.Function):
-    """From the tensors of ``_NAMES`` and the arguments to colour, alpha, depth, channels and visible."""
+    """From the tensors of ``_NAMES`` and the arguments to colour, alpha, depth, channels and visible.
+
+    If wanted, then also median depth and the sum and largest of the weights.
+    """
 
     @staticmethod
-    def forward(ctx: Any, *inputs: Any) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+    def forward(ctx: Any, *inputs: Any) -> tuple[Tensor, ...]:
         *tensors, arguments = inputs
-        means, quaternions, scales, opacities, sh, extra, offsets, camera_from_world = map(_buffer, tensors)
+        means, quaternions, scales, opacities, sh, extra, offsets, _, camera_from_world = map(
+            _buffer, tensors
+        )
         gaussians = _native.gaussians(
             means, quaternions, scales, opacities, sh, extra, offsets, arguments.sh_degree
         )
@@ -41,18 +47,22 @@ class _Rasterize(torch.autograd.Function):
         colour, alpha, depth = (torch.empty(height, width, *tail) for tail in ((3,), (), ()))
         channels = torch.empty(height, width, 0 if extra is None else extra.shape[1])
         visible = torch.empty(len(means), dtype=torch.bool)
-        keep = any(ctx.needs_input_grad)
+        learning = any(ctx.needs_input_grad)
         (fx, fy), (cx, cy) = arguments.focal_px, arguments.centre_px
         frame = _native.forward(
-            gaussians, camera_from_world, fx, fy, cx, cy, width, height,
-            colour, alpha, depth, channels, visible, keep,
+            gaussians, camera_from_world, fx, fy, cx, cy, width, height, arguments.antialiased,
+            colour, alpha, depth, channels, visible, learning or arguments.inspect,
         )  # fmt: skip
-        if keep:
+        fixed = [visible]
+        if arguments.inspect and frame is not None:
+            fixed += [torch.empty(height, width), torch.empty(len(means)), torch.empty(len(means))]
+            _native.inspect(gaussians, frame, *fixed[1:])
+        if learning:
             ctx.gaussians, ctx.frame = gaussians, frame
             ctx.save_for_backward(*tensors)  # so that torch notices what was changed in place before backward
-        ctx.mark_non_differentiable(visible)
+        ctx.mark_non_differentiable(*fixed)
         ctx.set_materialize_grads(False)
-        return colour, alpha, depth, channels, visible
+        return colour, alpha, depth, channels, *fixed
 
     @staticmethod
     @once_differentiable
@@ -65,13 +75,13 @@ class _Rasterize(torch.autograd.Function):
             torch.empty(t.shape) if t is not None and needs else None
             for t, needs in zip(tensors, ctx.needs_input_grad[:-1], strict=True)
         ]
-        means, quaternions, scales, opacities, sh, extra, offsets, _ = gradients
+        means, quaternions, scales, opacities, sh, extra, offsets, absolute, _ = gradients
         pose = torch.empty(4, 4)
         _native.backward(
             ctx.gaussians, ctx.frame, colour, alpha, depth, channels,
-            means, quaternions, scales, opacities, sh, extra, offsets, pose,
+            means, quaternions, scales, opacities, sh, extra, offsets, absolute, pose,
         )  # fmt: skip
-        return (*gradients[:-1], pose if ctx.needs_input_grad[7] else None, None)
+        return (*gradients[:-1], pose if ctx.needs_input_grad[8] else None, None)
 
 
 def rasterize_native(arguments: SplatArguments) -> Render:
@@ -90,5 +100,4 @@ def rasterize_native(arguments: SplatArguments) -> Render:
         if not _native.all_finite(value.detach().contiguous()):
             raise ValueError(f"{name}: expected finite numbers, got NaN or infinite ones")
     ordered = [getattr(arguments, name) for name in _NAMES]
-    colour, alpha, depth, channels, visible = _Rasterize.apply(*ordered, arguments)  # pyright: ignore[reportGeneralTypeIssues]
-    return Render(colour=colour, alpha=alpha, depth_m=depth, channels=channels, visible=visible)
+    return Render(*_Rasterize.apply(*ordered, arguments))  # pyright: ignore[reportGeneralTypeIssues]

@@ -1,7 +1,10 @@
 """Differentiable splatting of Gaussians with activated parameters."""
 
 from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
 
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -34,7 +37,10 @@ def rasterize(
     height_px: int,
     channels: Float[Tensor, "..."] | None = None,
     screen_offsets_px: Float[Tensor, "..."] | None = None,
+    screen_absolute_px: Float[Tensor, "..."] | None = None,
     sh_degree: int | None = None,
+    antialiased: bool = False,
+    inspect: bool = False,
     backend: str = "native",
 ) -> Render:
     """Splat Gaussians as a pinhole sees them; differentiable in every tensor given.
@@ -50,8 +56,9 @@ def rasterize(
         scales: Standard deviations (N, 3) in metres.
         opacities: In [0, 1] (N,).
         sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16; colour = SH(direction) + 0.5, at least 0.
-        camera_from_world: Rigid transform (4, 4). Its gradient covers all 12 entries of the upper 3x4, taken
-            as free; the camera centre is -R^T t.
+        camera_from_world: Rigid transform (4, 4), or several (B, 4, 4): then every image has B views of one
+            pinhole, and gradients are summed over them. Its gradient covers all 12 entries of the upper 3x4,
+            taken as free; the camera centre is -R^T t.
         fx_px: Focal length along x in pixels.
         fy_px: Focal length along y in pixels.
         cx_px: Principal point from the left edge in pixels.
@@ -60,7 +67,12 @@ def rasterize(
         height_px: Image height.
         channels: Further values per Gaussian (N, C), composited like colour.
         screen_offsets_px: Added to the projected centres (N, 2): zeros whose gradient densification reads.
+        screen_absolute_px: Any numbers (N, 2), which change nothing: their gradient is the sum over the
+            pixels of |dL/du| and |dL/dv|, which do not cancel where a Gaussian is too large (AbsGS).
         sh_degree: Degree to evaluate, at most the stored one (default); higher ones get zero gradients.
+        antialiased: Multiply each opacity by sqrt(det / det') of the projected covariance before and after
+            the 0.3 px^2 are added, so that small Gaussians do not gain weight from afar (Mip-Splatting).
+        inspect: Fill ``median_depth_m``, ``weight_sum_px`` and ``weight_most`` of the result.
         backend: "native" (compiled, float32) or "reference" (plain torch, tiny scenes) on the CPU;
             "gsplat" (float32) on a CUDA device, see ``splat.cuda`` for where it differs.
 
@@ -79,6 +91,7 @@ def rasterize(
             "camera_from_world": camera_from_world,
             "channels": channels,
             "screen_offsets_px": screen_offsets_px,
+            "screen_absolute_px": screen_absolute_px,
         }
     )
     focal, centre, size = (
@@ -87,18 +100,36 @@ def rasterize(
         (int(width_px), int(height_px)),
     )
     check_pinhole(focal, centre, size)
-    arguments = SplatArguments(
-        means=means,
-        quaternions=quaternions,
-        scales=scales,
-        opacities=opacities,
-        sh=sh,
-        camera_from_world=camera_from_world,
-        focal_px=focal,
-        centre_px=centre,
-        size_px=size,
-        sh_degree=active_degree(sh_degree, sh.shape[1]),
-        channels=channels,
-        screen_offsets_px=screen_offsets_px,
-    )
-    return BACKENDS[backend](arguments)
+    poses = camera_from_world[None] if camera_from_world.ndim == 2 else camera_from_world
+    views = [
+        BACKENDS[backend](
+            SplatArguments(
+                means=means,
+                quaternions=quaternions,
+                scales=scales,
+                opacities=opacities,
+                sh=sh,
+                camera_from_world=pose,
+                focal_px=focal,
+                centre_px=centre,
+                size_px=size,
+                sh_degree=active_degree(sh_degree, sh.shape[1]),
+                channels=channels,
+                screen_offsets_px=screen_offsets_px,
+                screen_absolute_px=screen_absolute_px,
+                antialiased=antialiased,
+                inspect=inspect,
+            )
+        )
+        for pose in poses
+    ]
+    return views[0] if camera_from_world.ndim == 2 else _stacked(views)
+
+
+def _stacked(views: list[Render]) -> Render:
+    """Views of the same Gaussians as one, batch first."""
+    stacked: dict[str, Any] = {}
+    for field in fields(Render):
+        parts = [getattr(view, field.name) for view in views]
+        stacked[field.name] = None if parts[0] is None else torch.stack(parts)
+    return Render(**stacked)

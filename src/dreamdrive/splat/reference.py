@@ -4,6 +4,8 @@ It says what the other backends mean; for tests on tiny scenes.
 Sources: EWA projection as in 3DGS (Kerbl et al. 2023), with the limits of gsplat 1.5.3.
 """
 
+from typing import Any, cast
+
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
@@ -59,16 +61,20 @@ def sh_basis(directions: Float[Tensor, "n 3"], degree: int) -> Float[Tensor, "n 
 
 def project(
     arguments: SplatArguments,
-) -> tuple[Int[Tensor, " m"], Float[Tensor, "m 2"], Float[Tensor, "m 3"], Float[Tensor, " m"]]:
+) -> tuple[
+    Int[Tensor, " m"], Float[Tensor, "m 2"], Float[Tensor, "m 3"], Float[Tensor, " m"], Float[Tensor, " m"]
+]:
     """Project the Gaussians beyond the near plane, nearest first; equal depths keep their order.
 
     Returns:
-        Their index, centre in pixels, conic (xx, xy, yy of the inverse covariance in 1/px^2) and depth in m.
+        Their index, centre in pixels, conic (xx, xy, yy of the inverse covariance in 1/px^2), opacity and
+        depth in m.
     """
     rotation, translation = arguments.camera_from_world[:3, :3], arguments.camera_from_world[:3, 3]
     camera = arguments.means @ rotation.T + translation
     index = torch.nonzero((camera[:, 2] >= NEAR_M) & (camera[:, 2] <= FAR_M)).squeeze(-1)
     index = index[torch.argsort(camera[index, 2].detach(), stable=True)]
+    opacity = arguments.opacities[index]
     x, y, z = camera[index].unbind(-1)
     (fx, fy), (cx, cy), (width, height) = arguments.focal_px, arguments.centre_px, arguments.size_px
     tx = (x / z).clamp(-(cx + 0.15 * width) / fx, (width - cx + 0.15 * width) / fx)
@@ -78,12 +84,15 @@ def project(
     axes = rotation_matrices(arguments.quaternions[index]) * arguments.scales[index, None, :]
     factor = jacobian @ rotation @ axes
     covariance = factor @ factor.transpose(-1, -2) + BLUR_PX2 * torch.eye(2, dtype=factor.dtype)
+    if arguments.antialiased:
+        bare = torch.linalg.det(factor @ factor.transpose(-1, -2)).clamp(min=1e-30)
+        opacity = opacity * torch.sqrt(bare / torch.linalg.det(covariance))
     inverse = torch.linalg.inv(covariance)
     conic = torch.stack([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]], -1)
     centre = torch.stack([fx * x / z + cx, fy * y / z + cy], -1)
     if arguments.screen_offsets_px is not None:
         centre = centre + arguments.screen_offsets_px[index]
-    return index, centre, conic, z
+    return index, centre, conic, opacity, z
 
 
 def colours(arguments: SplatArguments, index: Int[Tensor, " m"]) -> Float[Tensor, "m 3"]:
@@ -94,17 +103,39 @@ def colours(arguments: SplatArguments, index: Int[Tensor, " m"]) -> Float[Tensor
     return (torch.einsum("nk,nkc->nc", basis, arguments.sh[index, : basis.shape[1]]) + 0.5).clamp(min=0)
 
 
-def compositing_weights(
-    centre: Float[Tensor, "m 2"],
-    conic: Float[Tensor, "m 3"],
-    opacities: Float[Tensor, " m"],
-    size_px: tuple[int, int],
-) -> tuple[Float[Tensor, "p m"], Bool[Tensor, " m"]]:
-    """Share of each Gaussian, given front to back, in each pixel (rows first), and which reach any pixel."""
+class _Absolute(torch.autograd.Function):
+    """Zeros (P, M) for numbers (M,) whose gradient is the sum over P of the absolute gradients."""
+
+    @staticmethod
+    def forward(ctx: Any, numbers: Tensor, count: int) -> Tensor:
+        return numbers.new_zeros(count, len(numbers))
+
+    @staticmethod
+    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor, None]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return upstream[0].abs().sum(0), None
+
+
+def offsets_from(
+    centre: Float[Tensor, "m 2"], absolute: Float[Tensor, "m 2"] | None, size_px: tuple[int, int]
+) -> tuple[Float[Tensor, "p m"], Float[Tensor, "p m"]]:
+    """From each centre to each pixel centre (rows first), along x and along y."""
     width, height = size_px
     grid_y, grid_x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
     dx = grid_x.reshape(-1, 1).to(centre.dtype) - centre[:, 0]
     dy = grid_y.reshape(-1, 1).to(centre.dtype) - centre[:, 1]
+    if absolute is None:
+        return dx, dy
+    zeros = (cast(Tensor, _Absolute.apply(absolute[:, k], len(dx))) for k in (0, 1))
+    return dx - next(zeros), dy - next(zeros)
+
+
+def compositing_weights(
+    dx: Float[Tensor, "p m"],
+    dy: Float[Tensor, "p m"],
+    conic: Float[Tensor, "m 3"],
+    opacities: Float[Tensor, " m"],
+) -> tuple[Float[Tensor, "p m"], Bool[Tensor, " m"]]:
+    """Share of each Gaussian, given front to back, in each pixel, and which reach any pixel."""
     sigma = 0.5 * (conic[:, 0] * dx * dx + conic[:, 2] * dy * dy) + conic[:, 1] * dx * dy
     alpha = (opacities * torch.exp(-sigma)).clamp(max=MAX_ALPHA)
     alpha = torch.where(alpha >= MIN_ALPHA, alpha, 0.0)
@@ -120,19 +151,39 @@ def rasterize_reference(arguments: SplatArguments) -> Render:
     tensors = arguments.tensors()
     check_device(tensors, "cpu")
     check_dtype(tensors, (arguments.means.dtype,))
-    index, centre, conic, depth = project(arguments)
+    index, centre, conic, opacity, depth = project(arguments)
     width, height = arguments.size_px
-    weights, reaching = compositing_weights(centre, conic, arguments.opacities[index], arguments.size_px)
+    absolute = None if arguments.screen_absolute_px is None else arguments.screen_absolute_px[index]
+    dx, dy = offsets_from(centre, absolute, arguments.size_px)
+    weights, reaching = compositing_weights(dx, dy, conic, opacity)
     colour = (weights @ colours(arguments, index)).reshape(height, width, 3)
     channels = arguments.channels
     if channels is None:
         channels = arguments.means.new_zeros(len(arguments.means), 0)
     visible = torch.zeros(len(arguments.means), dtype=torch.bool)
     visible[index[reaching]] = True
+    inspected: dict[str, Tensor] = {}
+    if arguments.inspect:
+        inspected = _inspected(weights.detach(), depth.detach(), index, len(arguments.means))
+        inspected["median_depth_m"] = inspected["median_depth_m"].reshape(height, width)
     return Render(
         colour=colour,
         alpha=weights.sum(1).reshape(height, width),
         depth_m=(weights @ depth).reshape(height, width),
         channels=(weights @ channels[index]).reshape(height, width, -1),
         visible=visible,
+        **inspected,
     )
+
+
+def _inspected(
+    weights: Float[Tensor, "p m"], depth: Float[Tensor, " m"], index: Int[Tensor, " m"], count: int
+) -> dict[str, Tensor]:
+    """Median depth (P,), and the sum and largest of the weights of all ``count`` Gaussians."""
+    half = weights.cumsum(1) >= 0.5
+    first = torch.where(half & (half.cumsum(1) == 1), depth, 0.0).sum(1)
+    total, most = weights.new_zeros(count), weights.new_zeros(count)
+    total[index] = weights.sum(0)
+    if len(weights):
+        most[index] = weights.amax(0)
+    return {"median_depth_m": first, "weight_sum_px": total, "weight_most": most}

@@ -72,7 +72,7 @@ def render_scene(
     return SceneView(
         colour=colour.clamp(0, 1),
         alpha=drawn.alpha,
-        depth_m=torch.where(drawn.alpha > 1e-3, drawn.depth_m / drawn.alpha.clamp(min=1e-3), 0.0),
+        depth_m=drawn.expected_depth_m(),
         dynamic_share=drawn.channels[..., 0],
         channels=drawn.channels[..., 1:],
     )
