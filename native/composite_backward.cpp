@@ -30,18 +30,18 @@ void load_pixel(const TileTask& task, const ImageGradients& in, State& state, in
   if (in.alpha) c.behind[lane] = -in.alpha[pixel] * c.before[lane];
   if (in.channels)
     for (int k = 0; k < task.n_channels; k++)
-      state.channels[k * kTilePixels + cell * kLanes + lane] = in.channels[pixel * task.n_channels + k];
+      state.channels[k * kTilePixels + pixel_of(cell) + lane] = in.channels[pixel * task.n_channels + k];
 }
 
 // Whether a pixel takes light from the entries that follow.
 void wake(State& state, int pixel) {
-  state.cells[pixel / kLanes].floor[pixel % kLanes] = kMinPower;
-  state.alive |= Cells(1) << pixel / kLanes;
+  state.cells[cell_of(pixel)].floor[pixel % kLanes] = kMinPower;
+  state.alive |= Cells(1) << cell_of(pixel);
 }
 void put_to_sleep(State& state, int pixel) {
-  V& floor = state.cells[pixel / kLanes].floor;
+  V& floor = state.cells[cell_of(pixel)].floor;
   floor[pixel % kLanes] = kNever;
-  if (!any(floor < kNever)) state.alive &= ~(Cells(1) << pixel / kLanes);
+  if (!any(floor < kNever)) state.alive &= ~(Cells(1) << cell_of(pixel));
 }
 
 void start(const TileTask& task, const ImageGradients& in, State& state) {
@@ -51,12 +51,12 @@ void start(const TileTask& task, const ImageGradients& in, State& state) {
   if (task.n_channels) __builtin_memset(task.scratch, 0, sizeof(float) * task.n_channels * kTilePixels);
   const int width = task.view->width, x0 = task.tile_x * kTile, y0 = task.tile_y * kTile;
   for (int cell = 0; cell < kCells; cell++) {
-    state.cells[cell].before = load(task.record->transmittance + cell * kLanes);
+    state.cells[cell].before = load(task.record->transmittance + pixel_of(cell));
     state.cells[cell].floor = broadcast(kNever);
-    const int first = x0 + cell % kStrips * kLanes, y = y0 + cell / kStrips;
+    const int first = x0 + first_column(cell), y = y0 + cell % kTile;
     for (int lane = 0; lane < kLanes && y < task.view->height && first + lane < width; lane++) {
       load_pixel(task, in, state, cell, lane, int64_t(y) * width + first + lane);
-      wake(state, cell * kLanes + lane);
+      wake(state, pixel_of(cell) + lane);
     }
   }
   for (int k = 0; k < task.record->n_stops; k++) put_to_sleep(state, task.record->stop_pixel[k]);
@@ -90,7 +90,7 @@ static inline void cell_gradient(const TileTask& task, State& state, const Splat
   sums.depth += weight * cell.depth;
   if (Extra::kChannels)
     for (int c = 0; c < task.n_channels; c++) {
-      const V upstream = load(state.channels + c * kTilePixels + number * kLanes);
+      const V upstream = load(state.channels + c * kTilePixels + pixel_of(number));
       value += values[c] * upstream;
       store(state.sums + c * kLanes, load(state.sums + c * kLanes) + weight * upstream);
     }

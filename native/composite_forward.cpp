@@ -20,8 +20,8 @@ void start(const TileTask& task, State& state) {
   const int rows = task.view->height - task.tile_y * kTile;
   for (int cell = 0; cell < kCells; cell++) {
     Cell& c = state.cells[cell];
-    const I inside = iota() + float(task.tile_x * kTile + cell % kStrips * kLanes) < float(task.view->width);
-    c.floor = cell / kStrips < rows ? (inside ? broadcast(kMinPower) : broadcast(kNever)) : broadcast(kNever);
+    const I inside = iota() + float(task.tile_x * kTile + first_column(cell)) < float(task.view->width);
+    c.floor = cell % kTile < rows ? (inside ? broadcast(kMinPower) : broadcast(kNever)) : broadcast(kNever);
     c.transmittance = broadcast(1.0f);
     c.red = c.green = c.blue = c.depth = V{};
     state.alive |= Cells(any(c.floor < kNever)) << cell;
@@ -41,7 +41,7 @@ __attribute__((noinline)) V stop(const TileTask& task, State& state, int cell, i
     for (int lane = 0; lane < kLanes; lane++)
       if (!going[lane]) {
         record->stop_entry[record->n_stops] = i;
-        record->stop_pixel[record->n_stops++] = uint8_t(cell * kLanes + lane);
+        record->stop_pixel[record->n_stops++] = uint8_t(pixel_of(cell) + lane);
       }
   return masked(going, part);
 }
@@ -69,7 +69,7 @@ void blend(const TileTask& task, State& state, int i, const Splat& s, Cells cell
     c.depth += weight * depth;
     if (kChannels)
       for (int k = 0; k < task.n_channels; k++) {
-        float* sum = task.scratch + k * kTilePixels + cell * kLanes;
+        float* sum = task.scratch + k * kTilePixels + pixel_of(cell);
         store(sum, load(sum) + weight * task.channels[int64_t(s.index) * task.n_channels + k]);
       }
   }
@@ -100,7 +100,7 @@ void finish(const TileTask& task, const State& state, const Images& out) {
   const int columns = width - x0 < kTile ? width - x0 : kTile;
   for (int row = 0; row < rows; row++)
     for (int column = 0; column < columns; column++) {
-      const int number = row * kStrips + column / kLanes, lane = column % kLanes;
+      const int number = cell_of(row * kTile + column), lane = column % kLanes;
       const Cell& cell = state.cells[number];
       const int64_t pixel = int64_t(y0 + row) * width + x0 + column;
       out.colour[3 * pixel] = cell.red[lane];
@@ -113,7 +113,7 @@ void finish(const TileTask& task, const State& state, const Images& out) {
     }
   if (!task.record) return;
   for (int cell = 0; cell < kCells; cell++)
-    store(task.record->transmittance + cell * kLanes, state.cells[cell].transmittance);
+    store(task.record->transmittance + pixel_of(cell), state.cells[cell].transmittance);
 }
 
 }  // namespace

@@ -22,11 +22,9 @@ struct Rows {
     // rounded once, after the centre: the two are the same where the row holds one pixel.
     const V bottom = vmin(top + float(kTile), broadcast(float(view.height)));
     const V low = vmax((top + 0.5f) - s.v, broadcast(-s.reach_y)), high = vmin((bottom - 0.5f) - s.v, broadcast(s.reach_y));
-    // At dy = 0 the form is along (conic_xx dx)^2.
-    const float half = 1.0001f * __builtin_sqrtf((s.log2_opacity - kMinPower) / -s.along) / s.conic_xx + 1e-3f;
-    const float extreme = s.slope_y * s.reach_x;  // where the right-most point lies; the left-most opposite
-    const V right = side(s, half, vmin(vmax(broadcast(extreme), low), high), extreme);
-    const V left = -side(s, half, -vmin(vmax(broadcast(-extreme), low), high), extreme);
+    const float extreme = s.slope_x * s.reach_y * s.reach_y / s.reach_x;  // the right-most point; the left-most opposite
+    const V right = side(s, vmin(vmax(broadcast(extreme), low), high), extreme);
+    const V left = -side(s, -vmin(vmax(broadcast(-extreme), low), high), extreme);
     // The centres of tile t are 16 t + 0.5 ... 16 t + 15.5.
     const float end = float(view.tiles_x - 1), scale = 1.0f / kTile;
     const V from = -rounded_down(-within((left + (s.u - (kTile - 0.5f))) * scale, -1.0f, end));
@@ -37,9 +35,9 @@ struct Rows {
   }
 
   // The right end of the ellipse at heights y; by symmetry also minus the left end at -y.
-  static V side(const Splat& s, float half, V y, float extreme) {
+  static V side(const Splat& s, V y, float extreme) {
     const V share = y * (1.0f / s.reach_y);
-    const V x = s.slope_x * y + half * vsqrt(vmax(1.0f - share * share, V{})) + 1e-3f;
+    const V x = s.slope_x * y + s.half_width * vsqrt(vmax(1.0f - share * share, V{})) + 1e-3f;
     return y == broadcast(extreme) ? broadcast(s.reach_x) : x;
   }
 };

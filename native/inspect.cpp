@@ -12,8 +12,8 @@ struct State {
 
 void start(const TileTask& task, State& state) {
   for (int cell = 0; cell < kCells; cell++) {
-    const I inside = iota() + float(task.tile_x * kTile + cell % kStrips * kLanes) < float(task.view->width);
-    const bool row_inside = task.tile_y * kTile + cell / kStrips < task.view->height;
+    const I inside = iota() + float(task.tile_x * kTile + first_column(cell)) < float(task.view->width);
+    const bool row_inside = task.tile_y * kTile + cell % kTile < task.view->height;
     state.floor[cell] = row_inside ? (inside ? broadcast(kMinPower) : broadcast(kNever)) : broadcast(kNever);
     state.transmittance[cell] = broadcast(1.0f);
     state.median[cell] = V{};
@@ -55,7 +55,7 @@ void inspect(const TileTask& task, float* median, Contribution* out) {
   for (int pixel = 0; pixel < kTilePixels; pixel++) {
     const int x = task.tile_x * kTile + pixel % kTile, y = task.tile_y * kTile + pixel / kTile;
     if (x < width && y < task.view->height)
-      median[int64_t(y) * width + x] = state.median[pixel / kLanes][pixel % kLanes];
+      median[int64_t(y) * width + x] = state.median[cell_of(pixel)][pixel % kLanes];
   }
 }
 

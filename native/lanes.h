@@ -1,4 +1,4 @@
-// A row of float lanes as wide as the instruction set this file is compiled for, without intrinsics.
+// A row of float lanes as wide as the instruction set this file is compiled for.
 #pragma once
 #include <cstdint>
 
@@ -55,16 +55,21 @@ static inline V vlog2(V v) {
   return r;
 }
 
-static inline bool any(I mask) {
-#if DD_LANES == 8
-  return __builtin_ia32_movmskps256((V)mask) != 0;
+// One bit for each lane of a mask.
+static inline uint32_t bits(I mask) {
+#if DD_LANES == 16
+  return uint16_t(__builtin_ia32_cvtd2mask512(mask));
+#elif DD_LANES == 8
+  return uint32_t(__builtin_ia32_movmskps256((V)mask));
+#elif defined(__SSE__)
+  return uint32_t(__builtin_ia32_movmskps((V)mask));
 #else
-  uint64_t parts[sizeof(I) / 8], bits = 0;
-  __builtin_memcpy(parts, &mask, sizeof(mask));
-  for (uint64_t part : parts) bits |= part;
-  return bits != 0;
+  uint32_t out = 0;
+  for (int l = 0; l < kLanes; l++) out |= (uint32_t(mask[l]) & 1u) << l;
+  return out;
 #endif
 }
+static inline bool any(I mask) { return bits(mask) != 0; }
 
 // 2^p for -126 < p < 127, relative error below 2e-7; lanes outside hold garbage that the caller masks.
 // The constants are the minimax polynomial of degree 5 on [-1/2, 1/2].
@@ -72,11 +77,11 @@ static inline V exp2_bounded(V p) {
   const V shifter = broadcast(12582912.0f);  // 1.5 * 2^23: adding it leaves the rounded integer in the low bits
   const V t = p + shifter;
   const V f = p - (t - shifter);
-  V r = 0.0013276471738f * f + 0.0096755415399f;
-  r = r * f + 0.0555071327609f;
-  r = r * f + 0.2402211972008f;
-  r = r * f + 0.6931469670621f;
-  r = r * f + 1.0000000716554f;
+  const V ff = f * f;
+  V high = 0.0013276471738f * f + 0.0096755415399f;
+  const V middle = 0.0555071327609f * f + 0.2402211972008f, low = 0.6931469670621f * f + 1.0000000716554f;
+  high = high * ff + middle;
+  const V r = high * ff + low;
   return (V)((U)r + ((U)t << 23));
 }
 

@@ -29,12 +29,12 @@ I geometry(const Inputs& in, const View& view, const uint32_t* index, Splat* out
           (v - reach_y <= float(view.height) - 0.5f);
   const V conic_xx = p.cov_yy * p.inverse_det, conic_xy = -p.cov_xy * p.inverse_det;
   const V along = (-0.5f * kLog2e) / conic_xx, across = (-0.5f * kLog2e) / p.cov_yy;
-  const V slope_x = p.cov_xy / p.cov_yy, slope_y = p.cov_xy / p.cov_xx;
+  const V slope_x = p.cov_xy / p.cov_yy, half_width = range * vsqrt(1.0f / conic_xx);
   seen &= (conic_xx > 0.0f) & (reach_x < 1e9f) & (reach_y < 1e9f);  // false for what overflowed
   for (int l = 0; l < kLanes; l++)
     if (seen[l])
       out[index[l]] = {u[l],       v[l],       conic_xx[l], conic_xy[l], along[l],  across[l],     log2_opacity[l],
-                       reach_x[l], reach_y[l], slope_x[l],  slope_y[l],  {0, 0, 0}, p.camera.z[l], index[l]};
+                       reach_x[l], reach_y[l], slope_x[l],  half_width[l], {0, 0, 0}, p.camera.z[l], index[l]};
   return seen;
 }
 

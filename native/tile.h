@@ -1,4 +1,4 @@
-// The pixels of one tile, row by row, in cells of kLanes columns.
+// The pixels of one tile in cells: kLanes columns of one row.
 #pragma once
 #include "lanes.h"
 #include "types.h"
@@ -6,22 +6,27 @@
 namespace dd::DD_ISA {
 
 constexpr int kStrips = kTile / kLanes, kCells = kStrips * kTile;
-// A set of cells, one bit for each: cell = row * kStrips + strip.
+// A set of cells, one bit for each: cell = strip * kTile + row.
 using Cells = uint64_t;
-constexpr Cells kEachRow = kStrips == 1 ? 0xffff : kStrips == 2 ? 0x55555555 : 0x1111111111111111;
-static inline Cells first_cells(int count) { return count < 64 ? (Cells(1) << count) - 1 : ~Cells(0); }
+static inline int first_column(int cell) { return cell / kTile * kLanes; }
+static inline int pixel_of(int cell) { return cell % kTile * kTile + first_column(cell); }
+static inline int cell_of(int pixel) { return pixel % kTile / kLanes * kTile + pixel / kTile; }
 
-// The cells of the tile that a splat can reach.
+// The cells of the tile that the ellipse alpha >= 1/255 of a splat meets.
 static inline Cells reached_cells(const Splat& s, float left, float top) {
-  using I4 = int32_t __attribute__((vector_size(16)));
-  // Pixel centres lie at +0.5: the first column at or right of u - reach_x is ceil(u - reach_x - left - 0.5).
-  const V4 bounds = {s.u - left - s.reach_x + 0.4999f, s.u - left + s.reach_x + 0.5f,
-                     s.v - top - s.reach_y + 0.4999f, s.v - top + s.reach_y + 0.5f};
-  const V4 low = bounds > 0.0f ? bounds : V4{}, side = V4{} + float(kTile);
-  const I4 within = __builtin_convertvector(low < side ? low : side, I4);
-  const Cells rows = first_cells(within[3] * kStrips) & ~first_cells(within[2] * kStrips);
-  const Cells strips = first_cells((within[1] + kLanes - 1) / kLanes) & ~first_cells(within[0] / kLanes);
-  return rows & strips * kEachRow;
+  const float inverse = 1.0f / s.reach_y, square = s.half_width * s.half_width;
+  Cells cells = 0;
+  for (int row = 0; row < kTile; row += kLanes) {
+    // Of a row, the pixels within sqrt(room) of the middle.
+    const V dy = iota() + (float(row) + 0.5f + top - s.v), share = dy * inverse;
+    const V room = square * (1.0004f - share * share), middle = s.slope_x * dy + (s.u - left);
+    for (int strip = 0; strip < kStrips; strip++) {
+      const float first = float(strip * kLanes) + 0.499f, last = float(strip * kLanes + kLanes) - 0.499f;
+      const V away = vmax(vmax(first - middle, middle - last), V{});
+      cells |= Cells(bits(away * away <= room)) << (strip * kTile + row);
+    }
+  }
+  return cells;
 }
 
 // Some entries of a tile, looked at ahead of time: what follows does not wait for memory, and knows its cells at once.
@@ -55,9 +60,9 @@ class Form {
       store(rest_ + strip * kLanes, (s.across * dy) * dy + s.log2_opacity);
     }
   }
-  V dy(int cell) const { return broadcast(dy_[cell / kStrips]); }
-  V e(int cell) const { return part_[cell % kStrips] + broadcast(slant_[cell / kStrips]); }
-  V power(int cell, V e) const { return (along_ * e) * e + broadcast(rest_[cell / kStrips]); }
+  V dy(int cell) const { return broadcast(dy_[cell % kTile]); }
+  V e(int cell) const { return part_[cell / kTile] + broadcast(slant_[cell % kTile]); }
+  V power(int cell, V e) const { return (along_ * e) * e + broadcast(rest_[cell % kTile]); }
 
  private:
   V part_[kStrips], along_;

@@ -43,7 +43,7 @@ struct Inputs {
 struct alignas(64) Splat {
   float u, v, conic_xx, conic_xy, along, across, log2_opacity;
   float reach_x, reach_y;                       // half extents of alpha >= 1/255, pixels
-  float slope_x, slope_y;                       // centre of the row at dy is slope_x dy; of the column at dx slope_y dx
+  float slope_x, half_width;                    // at dy the row's centre is slope_x dy; its half extent at dy = 0
   float colour[3];
   float depth;
   uint32_t index;                               // of the Gaussian
