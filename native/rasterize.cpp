@@ -10,7 +10,21 @@
 namespace dd {
 namespace {
 
-constexpr size_t kIdleFrames = 3;
+constexpr size_t kIdleFrames = 2;
+
+// Memory that a pass needs only while it runs: one pass at a time works, as the threads are shared anyway.
+struct Workspace {
+  std::mutex mutex;
+  Buffer<Splat> projected;
+  Buffer<uint64_t> keys, spare_keys;
+  TileBinner binner;
+  Buffer<EntryGradient> entry_gradients;
+  Buffer<float> entry_channels, scratch;
+};
+Workspace& workspace() {
+  static Workspace* w = new Workspace();  // never destroyed: threads may outlive the module's statics
+  return *w;
+}
 
 struct Store {
   std::mutex mutex;
@@ -41,12 +55,12 @@ class Stopwatch {
 
 int64_t chunks_of(int64_t n) { return (n + kChunk - 1) / kChunk; }
 
-// Projects all Gaussians to frame.projected and leaves the keys of those that can be seen in frame.keys; none is visible yet.
-void project(const Inputs& in, Frame& frame, uint8_t* visible) {
+// Projects all Gaussians and leaves the keys of those that can be seen in work.keys; none is visible yet.
+void project(const Inputs& in, Frame& frame, Workspace& work, uint8_t* visible) {
   const Stopwatch watch(&StageSeconds::project);
   const int64_t chunks = chunks_of(in.n);
-  Splat* projected = frame.projected.resize(in.n);
-  uint64_t *sparse = frame.spare_keys.resize(in.n), *keys = frame.keys.resize(in.n);
+  Splat* projected = work.projected.resize(in.n);
+  uint64_t *sparse = work.spare_keys.resize(in.n), *keys = work.keys.resize(in.n);
   uint32_t* rank = frame.rank.resize(in.n);
   std::vector<int64_t> begin(chunks + 1, 0);
   parallel_for(chunks, [&](int64_t chunk, int) {
@@ -63,14 +77,14 @@ void project(const Inputs& in, Frame& frame, uint8_t* visible) {
 }
 
 // Leaves the splats in frame.splats in depth order; equal depths keep index order.
-void sort(Frame& frame) {
+void sort(Frame& frame, Workspace& work) {
   const Stopwatch watch(&StageSeconds::sort);
-  uint64_t* keys = frame.keys.data();
-  sort_by_depth(keys, frame.spare_keys.data(), frame.n_splats);
+  uint64_t* keys = work.keys.data();
+  sort_by_depth(keys, work.spare_keys.data(), frame.n_splats);
   Splat* splats = frame.splats.resize(frame.n_splats);
   parallel_for(chunks_of(frame.n_splats), [&](int64_t chunk, int) {
     const int64_t last = std::min(frame.n_splats, (chunk + 1) * kChunk);
-    for (int64_t i = chunk * kChunk; i < last; i++) splats[i] = frame.projected[uint32_t(keys[i])];
+    for (int64_t i = chunk * kChunk; i < last; i++) splats[i] = work.projected[uint32_t(keys[i])];
   });
 }
 
@@ -149,20 +163,22 @@ View make_view(const float m[16], float fx, float fy, float cx, float cy, int wi
 }
 
 void render_forward(const Inputs& in, Frame& frame, bool keep, const Images& out, uint8_t* visible) {
+  Workspace& work = workspace();
+  std::lock_guard<std::mutex> lock(work.mutex);
   frame.n = in.n;
-  project(in, frame, visible);
-  sort(frame);
+  project(in, frame, work, visible);
+  sort(frame, work);
   {
     const Stopwatch watch(&StageSeconds::tiles);
-    frame.binner.bin(frame.view, frame.splats.data(), frame.n_splats, keep, frame.lists, frame.rank.data(), visible);
+    work.binner.bin(frame.view, frame.splats.data(), frame.n_splats, keep, frame.lists, frame.rank.data(), visible);
   }
   const int64_t tiles = tile_count(frame), scratch = scratch_floats(in);
   if (keep) frame.records.resize(tiles);
-  frame.scratch.resize(thread_count() * scratch);
+  work.scratch.resize(thread_count() * scratch);
   const Stopwatch watch(&StageSeconds::composite);
   parallel_for(tiles, [&](int64_t tile, int worker) {
     TileTask task = tile_task(in, frame, tile, keep);
-    task.scratch = frame.scratch.data() + worker * scratch;
+    task.scratch = work.scratch.data() + worker * scratch;
     kernels().composite(task, out);
   });
 }
@@ -192,28 +208,25 @@ void render_inspect(const Inputs& in, Frame& frame, float* median, float* weight
 
 void render_backward(const Inputs& in, Frame& frame, const ImageGradients& upstream, const Gradients& out,
                      float pose[16]) {
-  static std::mutex mutex;  // the work space below is shared by all frames
-  static Buffer<EntryGradient>& entry_gradients = *new Buffer<EntryGradient>();
-  static Buffer<float>& entry_channels = *new Buffer<float>();
-  std::lock_guard<std::mutex> lock(mutex);
+  Workspace& work = workspace();
+  std::lock_guard<std::mutex> lock(work.mutex);
   const int64_t tiles = tile_count(frame), scratch = scratch_floats(in), chunks = chunks_of(in.n);
   const std::vector<uint32_t> reached_begin = begin_of_reached(frame);
-  entry_gradients.resize(reached_begin[tiles]);
-  entry_channels.resize(size_t(reached_begin[tiles]) * in.n_channels);
-  frame.scratch.resize(thread_count() * scratch);
+  EntryGradient* entry_gradients = work.entry_gradients.resize(reached_begin[tiles]);
+  float* entry_channels = work.entry_channels.resize(size_t(reached_begin[tiles]) * in.n_channels);
+  work.scratch.resize(thread_count() * scratch);
   {
     const Stopwatch watch(&StageSeconds::composite_backward);
     parallel_for(tiles, [&](int64_t tile, int worker) {
       TileTask task = tile_task(in, frame, tile, true);
-      task.scratch = frame.scratch.data() + worker * scratch;
-      kernels().composite_backward(task, upstream, out.screen_absolute, entry_gradients.data() + reached_begin[tile],
-                                   entry_channels.data() + size_t(reached_begin[tile]) * in.n_channels);
+      task.scratch = work.scratch.data() + worker * scratch;
+      kernels().composite_backward(task, upstream, out.screen_absolute, entry_gradients + reached_begin[tile],
+                                   entry_channels + size_t(reached_begin[tile]) * in.n_channels);
     });
   }
   const Stopwatch watch(&StageSeconds::project_backward);
-  const BackwardTask task = {frame.splats.data(),      frame.rank.data(),    frame.lists.slot_begin.data(),
-                             frame.lists.slots.data(), reached_begin.data(), entry_gradients.data(),
-                             entry_channels.data(),    out};
+  const BackwardTask task = {frame.splats.data(),  frame.rank.data(), frame.lists.slot_begin.data(),
+                             frame.lists.slots.data(), reached_begin.data(), entry_gradients, entry_channels, out};
   std::vector<float> pose_of_chunk(12 * chunks);
   parallel_for(chunks, [&](int64_t chunk, int) {
     const int64_t first = chunk * kChunk;

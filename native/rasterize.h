@@ -12,13 +12,10 @@ namespace dd {
 struct Frame {
   View view;
   int64_t n = 0, n_splats = 0;
-  Buffer<Splat> projected, splats;
-  Buffer<uint64_t> keys, spare_keys;
-  Buffer<uint32_t> rank;
-  TileBinner binner;
+  Buffer<Splat> splats;      // of those that can be seen, in depth order
+  Buffer<uint32_t> rank;     // of each Gaussian in splats, kHidden where it reaches no tile
   TileLists lists;
   Buffer<TileRecord> records;
-  Buffer<float> scratch;
 };
 
 // Frames are returned to a small store when dropped, so that their memory is used again.
