@@ -1,185 +1,181 @@
 """Milliseconds of splatting, forward and forward + backward, on the common street scenes.
 
-    python benchmarks/splat.py --scenes a b --json out.json [--threads N] [--repeat N]
+    python benchmarks/splat.py --scenes a b c --json FILE [--markdown docs/performance.md] [--threads N]
 
 A scene is t, a, b, c or an .npz file. Gradients go to means, quaternions, scales, opacities and colours (SH
-degree 0). Times are medians; ``best`` is the smallest. The peer is the project's plain-torch reference on
-1,000 Gaussians of the first scene at 160 x 96, run in the same process with as many threads. The image is
-compared with the float64 program of the common bench when a C++ compiler is there.
+degree 0). Times are medians, or the best where it says so. Shown are
+
+- how many times faster we are than OpenSplat's CPU rasteriser (a, b, c), as published and as scaled;
+- how near each stage is to the least time its operations and bytes can take here (needs a C++ compiler);
+- the largest difference of the image from the float64 program of the common bench (needs both);
+- OpenSplat itself, measured here, if ``--opensplat`` names a checkout of it (version of November 2025);
+- the project's plain-torch twin on 1,000 Gaussians at 160 x 96: never counted.
 """
 
 import argparse
 import json
-import shutil
-import subprocess
-import tempfile
-import time
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import torch
-from _street_scenes import bench_dir, load, write_bin
-from torch import Tensor
+from _machine import describe_machine
+from _markdown import replace_section
+from _opensplat import load_opensplat, opensplat_passes
+from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
+from _peer import OLDER_TIMES_MS, TIMES_MS, compare
+from _peer import THREADS as PEER_THREADS
+from _programs import count_work, float64_image, measure_peaks
+from _roofline import FORWARD, STAGES, least_ms, roofline
+from _splat_report import markdown, text
+from _street_scenes import COMMON, load
 
-from dreamdrive.scene.gaussians import SH_C0
-from dreamdrive.splat import native_info, rasterize, set_threads
+from dreamdrive import _native
+from dreamdrive.splat import one_torch_thread, rasterize, set_threads
 
-
-def arguments_of(scene: dict[str, np.ndarray]) -> tuple[dict[str, Tensor], dict[str, float]]:
-    """Tensors and pinhole that ``rasterize`` takes."""
-    values = {
-        "means": scene["means"],
-        "quaternions": scene["quats"],
-        "scales": scene["scales"],
-        "opacities": scene["opacities"],
-        "sh": ((scene["colors"] - 0.5) / SH_C0)[:, None],
-        "camera_from_world": scene["viewmat"],
-    }
-    names = {"fx_px": "fx", "fy_px": "fy", "cx_px": "cx", "cy_px": "cy", "width_px": "W", "height_px": "H"}
-    tensors = {name: torch.from_numpy(np.array(value, np.float32)) for name, value in values.items()}
-    return tensors, {ours: scene[theirs].item() for ours, theirs in names.items()}
+Scene = dict[str, np.ndarray]
+LANES = {"baseline": 4, "avx2": 8, "avx512": 16}
 
 
-def times_ms(run: Callable[[], object], repeat: int) -> list[float]:
-    """Wall-clock of ``repeat`` runs after two that warm up, sorted."""
-    taken = []
-    for index in range(repeat + 2):
-        start = time.perf_counter()
-        run()
-        if index >= 2:
-            taken.append(1e3 * (time.perf_counter() - start))
-    return sorted(taken)
-
-
-def both_passes(
-    tensors: dict[str, Tensor], camera: dict[str, float], upstream: Tensor, backend: str, repeat: int
-) -> tuple[list[float], list[float]]:
-    """Times of the forward pass without, and of both passes with gradients to all but the pose."""
-    leaves = {k: v.clone().requires_grad_(k != "camera_from_world") for k, v in tensors.items()}
-    wanted = [leaf for leaf in leaves.values() if leaf.requires_grad]
-
-    def forward() -> None:
-        rasterize(**tensors, **camera, backend=backend)
-
-    def forward_backward() -> None:
-        image = rasterize(**leaves, **camera, backend=backend).colour
-        torch.autograd.grad(image, wanted, upstream)
-
-    return times_ms(forward, repeat), times_ms(forward_backward, repeat)
-
-
-@cache
-def float64_program() -> Path | None:
-    """The compiled reference program, or None without a compiler or its source."""
-    compiler, folder = shutil.which("g++") or shutil.which("clang++"), bench_dir()
-    if compiler is None or folder is None:
-        return None
-    program = Path(tempfile.mkdtemp(prefix="dreamdrive-bench-")) / "reference_f64"
-    source = folder / "reference_f64.cpp"
-    subprocess.run([compiler, "-O3", "-std=c++17", "-o", program, source], check=True)
-    return program
-
-
-def image_error(scene: dict[str, np.ndarray], image: np.ndarray) -> tuple[float, float] | None:
-    """Largest and mean absolute difference of the image from the float64 program's."""
-    program = float64_program()
-    if program is None:
-        return None
-    with tempfile.TemporaryDirectory() as folder:
-        write_bin(scene, Path(folder) / "scene.bin")
-        subprocess.run([program, "scene.bin", "image.bin"], cwd=folder, check=True, capture_output=True)
-        numbers = np.fromfile(Path(folder) / "image.bin", np.float32)[: image.size]
-    difference = np.abs(numbers.reshape(image.shape) - image)
-    return float(difference.max()), float(difference.mean())
-
-
-def measure(name: str, scene: dict[str, np.ndarray], source: str, repeat: int) -> dict[str, object]:
+def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, peaks) -> dict:
     """One row of the result."""
-    tensors, camera = arguments_of(scene)
-    upstream = torch.from_numpy(np.array(scene["v_img"], np.float32))
-    forward, both = both_passes(tensors, camera, upstream, "native", repeat)
-    render = rasterize(**tensors, **camera)
-    error = image_error(scene, render.colour.numpy())
-    return {
+    view = view_of(scene)
+    with one_torch_thread():
+        forward = best_and_median(times_ms(forward_of(view), options.repeat))
+        both, stages_s = time_stages(view, options.repeat)
+        render = rasterize(**view.tensors, **view.camera)
+    row = {
         "name": name,
         "source": source,
-        "width": camera["width_px"],
-        "height": camera["height_px"],
-        "gaussians": len(tensors["means"]),
+        "width": view.camera["width_px"],
+        "height": view.camera["height_px"],
+        "gaussians": len(view.tensors["means"]),
         "visible": int(render.visible.sum()),
-        "forward_ms": forward[len(forward) // 2],
-        "forward_backward_ms": both[len(both) // 2],
+        "forward_ms": forward[1],
+        "forward_backward_ms": both[1],
         "best_forward_ms": forward[0],
         "best_forward_backward_ms": both[0],
-        "max_abs_error": None if error is None else error[0],
-        "mean_abs_error": None if error is None else error[1],
+        **difference(float64_image(scene), render.colour.numpy()),
     }
+    if source == COMMON and name in TIMES_MS and options.threads <= PEER_THREADS:
+        row["peer"] = compare(name, (forward[0], both[0]), peaks)
+    if peaks is not None:
+        row |= bounds(row, scene, peaks, stages_s)
+    if options.opensplat is not None:
+        row["opensplat"] = measure_opensplat(row, scene, view, options)
+    return row
 
 
-def against_peer(scene: dict[str, np.ndarray]) -> dict[str, object]:
+def time_stages(view: View, repeat: int) -> tuple[tuple[float, float], dict[str, float]]:
+    """Best and median of both passes, and the least seconds of each stage."""
+    if not hasattr(_native, "stage_seconds"):
+        return best_and_median(times_ms(forward_backward_of(view), repeat)), {}
+    seen: list[dict[str, float]] = []
+    times = times_ms(forward_backward_of(view), repeat, lambda: seen.append(_native.stage_seconds()))
+    return best_and_median(times), {stage: min(one[stage] for one in seen) for stage in STAGES}
+
+
+def difference(expected: np.ndarray | None, image: np.ndarray) -> dict[str, float | None]:
+    """Largest and mean absolute difference of the image from the float64 one, where there is one."""
+    if expected is None:
+        return {"max_abs_error": None, "mean_abs_error": None}
+    error = np.abs(expected - image)
+    return {"max_abs_error": float(error.max()), "mean_abs_error": float(error.mean())}
+
+
+def bounds(row: dict, scene: Scene, peaks: dict[str, float], stages_s: dict[str, float]) -> dict:
+    """The work of a scene and how near its stages are to the least time for it."""
+    work = count_work(scene, LANES[_native.isa()])
+    if work is None:
+        return {}
+    stages = roofline(work, row["gaussians"], row["width"] * row["height"], peaks, stages_s)
+    floor_ms = least_ms(stages, FORWARD), least_ms(stages, STAGES)
+    times = row["best_forward_ms"], row["best_forward_backward_ms"]
+    shares = [floor / ms for floor, ms in zip(floor_ms, times, strict=True)]
+    return {"work": work, "stages": stages, "floor_ms": floor_ms, "roofline_share": shares}
+
+
+def measure_opensplat(row: dict, scene: Scene, view: View, options: argparse.Namespace) -> dict:
+    """The peer's older version on the same scene, one thread."""
+    module = load_opensplat(options.opensplat)
+    forward, forward_backward = opensplat_passes(module, view, torch.from_numpy(scene["colors"]))
+    repeat = min(5, options.repeat)
+    with one_torch_thread():
+        image = forward()
+        times = times_ms(forward, repeat)[0], times_ms(forward_backward, repeat)[0]
+    ours = row["best_forward_ms"], row["best_forward_backward_ms"]
+    out = {
+        "ms": times,
+        "ratio": [peer / mine for peer, mine in zip(times, ours, strict=True)],
+        **difference(float64_image(scene), image.numpy()),
+    }
+    if row["source"] == COMMON and row["name"] in OLDER_TIMES_MS:
+        published = OLDER_TIMES_MS[row["name"]]
+        out["slowdown"] = [here / there for here, there in zip(times, published, strict=True)]
+    return out
+
+
+def against_twin(scene: Scene) -> dict:
     """The compiled backend and plain torch on the same small piece of a scene."""
-    tensors, camera = arguments_of(scene)
-    scale = 160 / camera["width_px"]
-    camera |= {k: camera[k] * scale for k in ("fx_px", "fy_px", "cx_px", "cy_px")}
+    whole = view_of(scene)
+    scale = 160 / whole.camera["width_px"]
+    camera = {k: scale * whole.camera[k] for k in ("fx_px", "fy_px", "cx_px", "cy_px")}
     camera |= {"width_px": 160, "height_px": 96}
-    keep = torch.arange(0, len(tensors["means"]), max(1, len(tensors["means"]) // 1000))[:1000]
-    part = {k: v if k == "camera_from_world" else v[keep] for k, v in tensors.items()}
-    upstream = torch.randn(96, 160, 3, generator=torch.Generator().manual_seed(0))
-    ours = [t[len(t) // 2] for t in both_passes(part, camera, upstream, "native", 9)]
-    theirs = [t[len(t) // 2] for t in both_passes(part, camera, upstream, "reference", 3)]
+    count = len(whole.tensors["means"])
+    keep = torch.arange(0, count, max(1, count // 1000))[:1000]
+    part = {k: v if k == "camera_from_world" else v[keep] for k, v in whole.tensors.items()}
+    view = View(part, camera, torch.randn(96, 160, 3, generator=torch.Generator().manual_seed(0)))
+    times = {}
+    for backend, repeat in (("native", 9), ("reference", 3)):
+        runs = forward_of(view, backend), forward_backward_of(view, backend)
+        times[backend] = [best_and_median(times_ms(run, repeat))[1] for run in runs]
     return {
         "peer": "plain torch reference, 1,000 Gaussians, 160x96",
-        "native_ms": ours,
-        "peer_ms": theirs,
-        "ratio": [peer / native for peer, native in zip(theirs, ours, strict=True)],
+        "native_ms": times["native"],
+        "peer_ms": times["reference"],
+        "ratio": [peer / ours for peer, ours in zip(times["reference"], times["native"], strict=True)],
     }
 
 
-def print_table(rows: list[dict[str, object]], peer: dict[str, object]) -> None:
-    """What was measured, for people."""
-    print(f"{'scene':<10}{'size':>10}{'Gaussians':>11}{'forward ms':>12}{'+ backward':>12}{'max error':>11}")
-    for row in rows:
-        size = f"{row['width']}x{row['height']}"
-        error = "-" if row["max_abs_error"] is None else f"{row['max_abs_error']:.1e}"
-        times = f"{row['forward_ms']:>12.2f}{row['forward_backward_ms']:>12.2f}"
-        print(f"{row['name']:<10}{size:>10}{row['gaussians']:>11}{times}{error:>11}   {row['source']}")
-    (forward, both), (peer_forward, peer_both) = peer["native_ms"], peer["peer_ms"]
-    print(
-        f"\n{peer['peer']}: {peer_forward:.1f} / {peer_both:.1f} ms, native {forward:.2f} / {both:.2f} ms: ",
-        end="",
-    )
-    print("{:.0f}x / {:.0f}x faster".format(*peer["ratio"]))
-
-
-def main() -> None:
-    """Measure the scenes asked for."""
+def parse() -> argparse.Namespace:
+    """The command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scenes", nargs="+", default=["a"], metavar="SCENE", help="t, a, b, c or FILE.npz")
     parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="a file whose section is written anew")
     parser.add_argument(
         "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
     )
     parser.add_argument("--repeat", type=int, default=15, metavar="N", help="runs a figure is the median of")
+    parser.add_argument("--opensplat", type=Path, metavar="DIR", help="checkout of OpenSplat to measure too")
     options = parser.parse_args()
     if options.threads is not None:
         set_threads(options.threads)
         torch.set_num_threads(options.threads)
+    options.threads = _native.threads()
+    return options
+
+
+def main() -> None:
+    """Measure the scenes asked for."""
+    options = parse()
+    machine = describe_machine()
     scenes = [load(name) for name in options.scenes]
-    rows = [measure(name, scene, source, options.repeat) for name, scene, source in scenes]
-    peer = against_peer(scenes[0][1])
-    print_table(rows, peer)
+    peaks = measure_peaks(options.threads)
+    report = {
+        "scenes": [measure(*scene, options, peaks) for scene in scenes],
+        "twin": against_twin(scenes[0][1]),
+        "peaks": peaks,
+        "machine": machine,
+        "statistic": f"median of {options.repeat}",
+    }
+    print(text(report))
     if options.json:
-        report = {
-            "scenes": rows,
-            "peer": peer,
-            "machine": native_info(),
-            "statistic": f"median of {options.repeat}",
-        }
+        options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(report, indent=2) + "\n")
+    if options.markdown:
+        replace_section(options.markdown, "splat", markdown(report))
 
 
 if __name__ == "__main__":
