@@ -62,14 +62,17 @@ def forward_backward_of(view: View, backend: str = "native") -> Callable[[], obj
 
 
 def times_ms(
-    run: Callable[[], object], repeat: int, after_each: Callable[[], object] = lambda: None
+    run: Callable[[], object],
+    repeat: int,
+    after_each: Callable[[], object] = lambda: None,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> list[float]:
-    """Wall-clock of ``repeat`` runs after two that warm up, sorted; ``after_each`` of them is not timed."""
+    """Times of ``repeat`` runs after two that warm up, sorted; ``after_each`` of them is not timed."""
     taken = []
     for index in range(repeat + 2):
-        start = time.perf_counter()
+        start = clock()
         run()
-        seconds = time.perf_counter() - start
+        seconds = clock() - start
         if index >= 2:
             taken.append(1e3 * seconds)
             after_each()

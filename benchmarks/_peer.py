@@ -23,6 +23,20 @@ def slowdown(peaks: dict[str, float]) -> float:
     return math.sqrt(math.prod(PEAKS[name] / peaks[name] for name in PEAKS))
 
 
+def compare_older(name: str, here_ms: tuple[float, float], best_ms: tuple[float, float]) -> dict[str, object]:
+    """How much slower the older version of the peer is here than where it was published, and what follows.
+
+    It is the same program on both machines: the ratio of its times tells what scaling by peaks is worth.
+    """
+    slower = tuple(here / there for here, there in zip(here_ms, OLDER_TIMES_MS[name], strict=True))
+    carried = tuple(factor * peer for factor, peer in zip(slower, TIMES_MS[name], strict=True))
+    return {
+        "slowdown": slower,
+        "carried_peer_ms": carried,
+        "carried_ratio": tuple(peer / ours for peer, ours in zip(carried, best_ms, strict=True)),
+    }
+
+
 def compare(name: str, best_ms: tuple[float, float], peaks: dict[str, float] | None) -> dict[str, object]:
     """The peer's times of common scene ``name`` and how many times faster we are, as measured and scaled."""
     times = TIMES_MS[name]

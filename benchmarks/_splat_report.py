@@ -26,6 +26,11 @@ def percent(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.0f} %"
 
 
+def error(value: float | None) -> str:
+    """A difference from the float64 image."""
+    return "-" if value is None else f"{value:.1e}"
+
+
 def best(row: dict) -> tuple[float, float]:
     """Our best times."""
     return row["best_forward_ms"], row["best_forward_backward_ms"]
@@ -45,7 +50,7 @@ def times(report: dict, layout: Layout) -> str:
     ]
     rows = []
     for row in report["scenes"]:
-        shares, errors = row.get("roofline_share"), (row["max_abs_error"], row["mean_abs_error"])
+        shares = row.get("roofline_share")
         rows.append(
             [
                 row["name"],
@@ -54,7 +59,8 @@ def times(report: dict, layout: Layout) -> str:
                 pair(best(row)),
                 pair((row["forward_ms"], row["forward_backward_ms"])),
                 "-" if shares is None else " / ".join(map(percent, shares)),
-                *("-" if error is None else f"{error:.1e}" for error in errors),
+                error(row["max_abs_error"]),
+                error(row["mean_abs_error"]),
             ]
         )
     return layout(head, rows)
@@ -80,31 +86,44 @@ def ratios(report: dict, layout: Layout) -> str:
 
 def opensplat(report: dict, layout: Layout) -> str:
     """The peer's older version, measured here."""
-    head = [
-        "scene",
-        "here, ms",
-        "published, ms",
-        "slower here",
-        "we are faster",
-        "largest error",
-        "mean",
-    ]
-    rows = [
+    rows = [row for row in report["scenes"] if "opensplat" in row]
+    head = ["scene", "here, ms", "we are faster", "largest error", "mean"]
+    body = [
         [
             row["name"],
             pair(row["opensplat"]["ms"], 0),
-            pair(_peer.OLDER_TIMES_MS[row["name"]] if "slowdown" in row["opensplat"] else None, 0),
-            pair(row["opensplat"].get("slowdown"), 2, "x"),
             pair(row["opensplat"]["ratio"], unit="x"),
-            *(
-                "-" if row["opensplat"][key] is None else f"{row['opensplat'][key]:.1e}"
-                for key in ("max_abs_error", "mean_abs_error")
-            ),
+            error(row["opensplat"]["max_abs_error"]),
+            error(row["opensplat"]["mean_abs_error"]),
         ]
-        for row in report["scenes"]
-        if "opensplat" in row
+        for row in rows
     ]
-    return layout(head, rows) if rows else ""
+    return layout(head, body) if body else ""
+
+
+def carried(report: dict, layout: Layout) -> str:
+    """The newer version's figures brought here by what the older one takes in both places."""
+    rows = [row for row in report["scenes"] if "slowdown" in row.get("opensplat", {})]
+    head = [
+        "scene",
+        "November there, ms",
+        "here slower by",
+        "August by that, ms",
+        "we are faster",
+        "goal",
+    ]
+    body = [
+        [
+            row["name"],
+            pair(_peer.OLDER_TIMES_MS[row["name"]], 0),
+            pair(row["opensplat"]["slowdown"], 2, "x"),
+            pair(row["opensplat"]["carried_peer_ms"], 0),
+            pair(row["opensplat"]["carried_ratio"], unit="x"),
+            pair(_peer.GOAL, 0, "x"),
+        ]
+        for row in rows
+    ]
+    return layout(head, body) if body else ""
 
 
 def work(report: dict, layout: Layout) -> str:
@@ -176,6 +195,7 @@ def parts(report: dict, layout: Layout) -> list[tuple[str, str]]:
         ("Times: forward / forward + backward", times(report, layout)),
         (f"Against {_peer.NAME}, measured on {_peer.MACHINE}", ratios(report, layout)),
         (older, opensplat(report, layout)),
+        ("OpenSplat of August 2026, carried over by that of November 2025", carried(report, layout)),
         ("Work", work(report, layout)),
         ("Stages of forward + backward", stages(report, layout)),
     ]

@@ -14,6 +14,7 @@ degree 0). Times are medians, or the best where it says so. Shown are
 
 import argparse
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,8 @@ from _machine import describe_machine
 from _markdown import replace_section
 from _opensplat import load_opensplat, opensplat_passes
 from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
-from _peer import OLDER_TIMES_MS, TIMES_MS, compare
 from _peer import THREADS as PEER_THREADS
+from _peer import TIMES_MS, compare, compare_older
 from _programs import count_work, float64_image, measure_peaks
 from _roofline import FORWARD, STAGES, least_ms, roofline
 from _splat_report import markdown, text
@@ -95,23 +96,20 @@ def bounds(row: dict, scene: Scene, peaks: dict[str, float], stages_s: dict[str,
 
 
 def measure_opensplat(row: dict, scene: Scene, view: View, options: argparse.Namespace) -> dict:
-    """The peer's older version on the same scene, one thread."""
+    """The peer's older version on the same scene: its processor time, as it has but one thread."""
     module = load_opensplat(options.opensplat)
     forward, forward_backward = opensplat_passes(module, view, torch.from_numpy(scene["colors"]))
     repeat = min(5, options.repeat)
     with one_torch_thread():
         image = forward()
-        times = times_ms(forward, repeat)[0], times_ms(forward_backward, repeat)[0]
+        times = [times_ms(run, repeat, clock=time.process_time)[0] for run in (forward, forward_backward)]
     ours = row["best_forward_ms"], row["best_forward_backward_ms"]
     out = {
         "ms": times,
         "ratio": [peer / mine for peer, mine in zip(times, ours, strict=True)],
         **difference(float64_image(scene), image.numpy()),
     }
-    if row["source"] == COMMON and row["name"] in OLDER_TIMES_MS:
-        published = OLDER_TIMES_MS[row["name"]]
-        out["slowdown"] = [here / there for here, there in zip(times, published, strict=True)]
-    return out
+    return out | compare_older(row["name"], times, ours) if "peer" in row else out
 
 
 def against_twin(scene: Scene) -> dict:
