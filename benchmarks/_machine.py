@@ -10,6 +10,8 @@ import torch
 
 from dreamdrive.splat import native_info
 
+QUIET = 0.05  # share of all cores that may be busy
+
 
 def processor() -> str:
     """Name of the processor, as far as the system tells."""
@@ -29,6 +31,13 @@ def busy_share(seconds: float = 1.0) -> float | None:
     passed = [int(word) - old for word, old in zip(stat.read_text().split()[1:9], before, strict=True)]
     idle = passed[3] + passed[4]  # idle and waiting for a disk
     return round(1 - idle / sum(passed), 2)
+
+
+def wait_until_quiet(patience_s: float) -> None:
+    """Wait, but not longer than this, until others leave the cores alone."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end and (busy_share() or 0) > QUIET:
+        pass
 
 
 def describe_machine() -> dict[str, object]:

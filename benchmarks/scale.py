@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from _machine import describe_machine
+from _machine import describe_machine, wait_until_quiet
 from _markdown import replace_section
 from _memory import peak_bytes, resident_bytes
 from _passes import forward_backward_of, forward_of, times_ms, view_of
@@ -78,7 +78,7 @@ def in_own_process(point: Point, scene_file: Path) -> dict[str, object]:
     return asdict(point) | result
 
 
-def measure_all(quick: bool) -> list[dict[str, object]]:
+def measure_all(quick: bool, patience_s: float) -> list[dict[str, object]]:
     """A row for each point, printed as it comes."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -89,6 +89,7 @@ def measure_all(quick: bool) -> list[dict[str, object]]:
             if wanted != made:
                 np.savez(scene_file, **street(*wanted)[0])
                 made = wanted
+            wait_until_quiet(patience_s)
             rows.append(in_own_process(point, scene_file))
             print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
     return rows
@@ -106,6 +107,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
     )
+    parser.add_argument(
+        "--patience",
+        type=float,
+        default=0,
+        metavar="S",
+        help="wait for idle cores",
+    )
     parser.add_argument("--point", type=Path, metavar="FILE.npz", help="measure one scene, print JSON, stop")
     return parser.parse_args()
 
@@ -119,7 +127,7 @@ def main() -> None:
         with one_torch_thread():
             print(json.dumps(measure(options.point)))
         return
-    report = {"machine": describe_machine(), "rows": measure_all(options.quick)}
+    report = {"machine": describe_machine(), "rows": measure_all(options.quick, options.patience)}
     print(text(report))
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from _machine import describe_machine
+from _machine import describe_machine, wait_until_quiet
 from _markdown import replace_section
 from _opensplat import load_opensplat, opensplat_passes
 from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
@@ -146,6 +146,9 @@ def parse() -> argparse.Namespace:
         "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
     )
     parser.add_argument("--repeat", type=int, default=15, metavar="N", help="runs a figure is the median of")
+    parser.add_argument(
+        "--patience", type=float, default=0, metavar="S", help="seconds to wait for idle cores"
+    )
     parser.add_argument("--opensplat", type=Path, metavar="DIR", help="checkout of OpenSplat to measure too")
     options = parser.parse_args()
     if options.threads is not None:
@@ -158,6 +161,7 @@ def parse() -> argparse.Namespace:
 def main() -> None:
     """Measure the scenes asked for."""
     options = parse()
+    wait_until_quiet(options.patience)
     machine = describe_machine()
     scenes = [load(name) for name in options.scenes]
     peaks = measure_peaks(options.threads)
