@@ -1,6 +1,5 @@
 """The C++ programs of the benchmark, compiled once for each state of their source, outside the repository."""
 
-import getpass
 import hashlib
 import json
 import os
@@ -14,13 +13,16 @@ import numpy as np
 from _street_scenes import bench_dir, write_bin
 
 HERE = Path(__file__).parent
+Scene = dict[str, np.ndarray]
 FLAGS = ["-O3", "-march=native", "-std=c++17", "-pthread"]
 
 
 def cache_dir() -> Path:
     """A folder of this machine: what is compiled for it need not run on another."""
-    folder = Path(tempfile.gettempdir()) / f"dreamdrive-bench-{getpass.getuser()}"
+    folder = Path(tempfile.gettempdir()) / f"dreamdrive-bench-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
+    if folder.stat().st_uid != os.getuid():
+        raise SystemExit(f"{folder} belongs to someone else: remove it, or choose another place with TMPDIR")
     return folder
 
 
@@ -51,18 +53,19 @@ def measure_peaks(threads: int) -> dict[str, float] | None:
     return json.loads(subprocess.run([program, str(threads)], check=True, capture_output=True).stdout)
 
 
-def count_work(scene: dict[str, np.ndarray], lanes: int) -> dict[str, int] | None:
-    """What has to be done to render the scene with rows of ``lanes`` pixels (see work.cpp)."""
+def walk(scene: Scene, lanes: int) -> tuple[dict[str, int], np.ndarray] | None:
+    """The work of rendering a scene with rows of ``lanes`` pixels, and its float64 image (see work.cpp)."""
     program = compiled(HERE / "work.cpp")
     if program is None:
         return None
     with tempfile.TemporaryDirectory() as folder:
         write_bin(scene, Path(folder) / "scene.bin")
         command = [program, "scene.bin", "image.bin", str(lanes)]
-        return json.loads(subprocess.run(command, cwd=folder, check=True, capture_output=True).stdout)
+        output = subprocess.run(command, cwd=folder, check=True, capture_output=True).stdout
+        return json.loads(output), read_image(Path(folder) / "image.bin", scene)
 
 
-def float64_image(scene: dict[str, np.ndarray]) -> np.ndarray | None:
+def common_image(scene: Scene) -> np.ndarray | None:
     """The scene in float64 by the common bench's program; None without it or a compiler.
 
     It takes minutes for large scenes, so that its images are kept.
@@ -71,7 +74,6 @@ def float64_image(scene: dict[str, np.ndarray]) -> np.ndarray | None:
     program = None if folder is None else compiled(folder / "reference_f64.cpp")
     if program is None:
         return None
-    shape = (scene["H"].item(), scene["W"].item(), 3)
     with tempfile.TemporaryDirectory() as work:
         write_bin(scene, Path(work) / "scene.bin")
         digest = hashlib.sha256((Path(work) / "scene.bin").read_bytes()).hexdigest()[:12]
@@ -80,4 +82,10 @@ def float64_image(scene: dict[str, np.ndarray]) -> np.ndarray | None:
             command = [program, "scene.bin", "image.bin"]
             subprocess.run(command, cwd=work, check=True, capture_output=True)
             shutil.move(Path(work) / "image.bin", image)
-    return np.fromfile(image, np.float32)[: np.prod(shape)].reshape(shape)
+    return read_image(image, scene)
+
+
+def read_image(path: Path, scene: Scene) -> np.ndarray:
+    """The image (h, w, 3) that a file begins with."""
+    shape = (scene["H"].item(), scene["W"].item(), 3)
+    return np.fromfile(path, np.float32, count=int(np.prod(shape))).reshape(shape)

@@ -6,10 +6,12 @@ A scene is t, a, b, c or an .npz file. Gradients go to means, quaternions, scale
 degree 0). Times are medians, or the best where it says so. Shown are
 
 - how many times faster we are than OpenSplat's CPU rasteriser (a, b, c), as published and as scaled;
-- how near each stage is to the least time its operations and bytes can take here (needs a C++ compiler);
-- the largest difference of the image from the float64 program of the common bench (needs both);
+- how near each stage is to the least time its operations and bytes can take here;
+- the difference of the image from a float64 program: the common bench's, else our own;
 - OpenSplat itself, measured here, if ``--opensplat`` names a checkout of it (version of November 2025);
 - the project's plain-torch twin on 1,000 Gaussians at 160 x 96: never counted.
+
+Without a C++ compiler the second and third are left out.
 """
 
 import argparse
@@ -25,7 +27,7 @@ from _opensplat import load_opensplat, opensplat_passes
 from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
 from _peer import THREADS as PEER_THREADS
 from _peer import TIMES_MS, compare, compare_older
-from _programs import count_work, float64_image, measure_peaks
+from _programs import Scene, common_image, measure_peaks, walk
 from _roofline import FORWARD, STAGES, least_ms, roofline
 from _splat_report import markdown, text
 from _street_scenes import COMMON, load
@@ -33,7 +35,6 @@ from _street_scenes import COMMON, load
 from dreamdrive import _native
 from dreamdrive.splat import one_torch_thread, rasterize, set_threads
 
-Scene = dict[str, np.ndarray]
 LANES = {"baseline": 4, "avx2": 8, "avx512": 16}
 
 
@@ -44,6 +45,7 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
         forward = best_and_median(times_ms(forward_of(view), options.repeat))
         both, stages_s = time_stages(view, options.repeat)
         render = rasterize(**view.tensors, **view.camera)
+    work, expected = float64(scene)
     row = {
         "name": name,
         "source": source,
@@ -55,14 +57,15 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
         "forward_backward_ms": both[1],
         "best_forward_ms": forward[0],
         "best_forward_backward_ms": both[0],
-        **difference(float64_image(scene), render.colour.numpy()),
+        **difference(expected, render.colour.numpy()),
     }
     if source == COMMON and name in TIMES_MS and options.threads <= PEER_THREADS:
         row["peer"] = compare(name, (forward[0], both[0]), peaks)
-    if peaks is not None:
-        row |= bounds(row, scene, peaks, stages_s)
+    if peaks is not None and work is not None:
+        row |= bounds(row, work, peaks, stages_s)
     if options.opensplat is not None:
-        row["opensplat"] = measure_opensplat(row, scene, view, options)
+        times, image = measure_opensplat(scene, view, options)
+        row["opensplat"] = against_opensplat(row, times) | difference(expected, image)
     return row
 
 
@@ -75,6 +78,15 @@ def time_stages(view: View, repeat: int) -> tuple[tuple[float, float], dict[str,
     return best_and_median(times), {stage: min(one[stage] for one in seen) for stage in STAGES}
 
 
+def float64(scene: Scene) -> tuple[dict[str, int] | None, np.ndarray | None]:
+    """What there is to do in a scene, and its float64 image; None without a compiler."""
+    walked = walk(scene, LANES[_native.isa()])
+    if walked is None:
+        return None, None
+    common = common_image(scene)
+    return walked[0], walked[1] if common is None else common
+
+
 def difference(expected: np.ndarray | None, image: np.ndarray) -> dict[str, float | None]:
     """Largest and mean absolute difference of the image from the float64 one, where there is one."""
     if expected is None:
@@ -83,11 +95,8 @@ def difference(expected: np.ndarray | None, image: np.ndarray) -> dict[str, floa
     return {"max_abs_error": float(error.max()), "mean_abs_error": float(error.mean())}
 
 
-def bounds(row: dict, scene: Scene, peaks: dict[str, float], stages_s: dict[str, float]) -> dict:
-    """The work of a scene and how near its stages are to the least time for it."""
-    work = count_work(scene, LANES[_native.isa()])
-    if work is None:
-        return {}
+def bounds(row: dict, work: dict[str, int], peaks: dict[str, float], stages_s: dict[str, float]) -> dict:
+    """How near the stages of a scene are to the least time for its work."""
     stages = roofline(work, row["gaussians"], row["width"] * row["height"], peaks, stages_s)
     floor_ms = least_ms(stages, FORWARD), least_ms(stages, STAGES)
     times = row["best_forward_ms"], row["best_forward_backward_ms"]
@@ -95,20 +104,22 @@ def bounds(row: dict, scene: Scene, peaks: dict[str, float], stages_s: dict[str,
     return {"work": work, "stages": stages, "floor_ms": floor_ms, "roofline_share": shares}
 
 
-def measure_opensplat(row: dict, scene: Scene, view: View, options: argparse.Namespace) -> dict:
-    """The peer's older version on the same scene: its processor time, as it has but one thread."""
+def measure_opensplat(
+    scene: Scene, view: View, options: argparse.Namespace
+) -> tuple[tuple[float, float], np.ndarray]:
+    """Times of the peer's older version, of the processor as it has but one thread; and its image."""
     module = load_opensplat(options.opensplat)
-    forward, forward_backward = opensplat_passes(module, view, torch.from_numpy(scene["colors"]))
+    forward, both = opensplat_passes(module, view, torch.from_numpy(scene["colors"]))
     repeat = min(5, options.repeat)
     with one_torch_thread():
-        image = forward()
-        times = [times_ms(run, repeat, clock=time.process_time)[0] for run in (forward, forward_backward)]
+        forward_ms, both_ms = (times_ms(run, repeat, clock=time.process_time)[0] for run in (forward, both))
+        return (forward_ms, both_ms), forward().numpy()
+
+
+def against_opensplat(row: dict, times: tuple[float, float]) -> dict:
+    """How many times faster we are, and what follows for the newer version."""
     ours = row["best_forward_ms"], row["best_forward_backward_ms"]
-    out = {
-        "ms": times,
-        "ratio": [peer / mine for peer, mine in zip(times, ours, strict=True)],
-        **difference(float64_image(scene), image.numpy()),
-    }
+    out = {"ms": times, "ratio": [peer / mine for peer, mine in zip(times, ours, strict=True)]}
     return out | compare_older(row["name"], times, ours) if "peer" in row else out
 
 
