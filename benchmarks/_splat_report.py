@@ -204,9 +204,8 @@ def parts(report: dict, layout: Layout) -> list[tuple[str, str]]:
 
 def text(report: dict) -> str:
     """For a terminal."""
-    sources = {row["name"]: row["source"] for row in report["scenes"]}
     lines = [machine_line(report["machine"]), peaks_line(report)]
-    lines += [f"scene {name}: {source}" for name, source in sources.items()]
+    lines += [f"scene {row['name']}: {row['source']}" for row in report["scenes"]]
     for title, body in parts(report, columns):
         lines += ["", title, body]
     return "\n".join([*lines, "", twin_line(report)])
