@@ -21,32 +21,49 @@ def processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def busy_share(seconds: float = 1.0) -> float | None:
-    """Share of all cores that others keep busy while this process sleeps (Linux)."""
-    stat = Path("/proc/stat")
-    if not stat.exists():
-        return None
-    before = [int(word) for word in stat.read_text().split()[1:9]]
+class OthersWatch:
+    """What other processes do from its making on (Linux; elsewhere nothing is known of them)."""
+
+    def __init__(self) -> None:
+        self.before = self.now()
+
+    @staticmethod
+    def now() -> tuple[float, float, float]:
+        """Seconds so far: of all cores, idle, and busy for this process and its finished children."""
+        own = os.times()
+        ours = own.user + own.system + own.children_user + own.children_system
+        stat = Path("/proc/stat")
+        if not stat.exists():
+            return time.monotonic(), time.monotonic(), 0
+        ticks = [int(word) / os.sysconf("SC_CLK_TCK") for word in stat.read_text().split()[1:9]]
+        return sum(ticks), ticks[3] + ticks[4], ours
+
+    def share(self) -> float:
+        """Part of all cores that others took."""
+        total, idle, ours = (now - then for now, then in zip(self.now(), self.before, strict=True))
+        return round(max(0.0, total - idle - ours) / total, 2)
+
+
+def busy_share(seconds: float = 1.0) -> float:
+    """Part of all cores that others take just now."""
+    watch = OthersWatch()
     time.sleep(seconds)
-    passed = [int(word) - old for word, old in zip(stat.read_text().split()[1:9], before, strict=True)]
-    idle = passed[3] + passed[4]  # idle and waiting for a disk
-    return round(1 - idle / sum(passed), 2)
+    return watch.share()
 
 
 def wait_until_quiet(patience_s: float) -> None:
     """Wait, but not longer than this, until others leave the cores alone."""
     end = time.monotonic() + patience_s
-    while time.monotonic() < end and (busy_share() or 0) > QUIET:
+    while time.monotonic() < end and busy_share() > QUIET:
         pass
 
 
 def describe_machine() -> dict[str, object]:
-    """Processor, cores, instruction set, threads, what others do just now, date."""
+    """Processor, cores, instruction set, threads, date."""
     return {
         **native_info(),
         "processor": processor(),
         "cores": os.cpu_count(),
-        "busy_before": busy_share(),
         "torch": torch.__version__,
         "date": datetime.date.today().isoformat(),
     }
@@ -54,8 +71,7 @@ def describe_machine() -> dict[str, object]:
 
 def machine_line(machine: dict[str, object]) -> str:
     """The same as a phrase."""
-    busy = "" if machine["busy_before"] is None else f", {100 * machine['busy_before']:.0f} % busy before"
     return (
         f"{machine['processor']}, {machine['cores']} cores, {machine['isa']}, {machine['threads']} threads, "
-        f"{machine['date']}{busy}"
+        f"{machine['date']}, others {100 * machine['others']:.0f} % of the cores"
     )

@@ -25,7 +25,7 @@ COLOUR_BYTES = 12
 SPLAT = 64  # a projected Gaussian
 KEY = 8
 INDEX = 4
-MOMENT_BYTES = 48
+MOMENT_BYTES = 4 * MOMENTS
 
 FORWARD = ("project", "sort", "tiles", "composite")
 STAGES = (*FORWARD, "composite_backward", "project_backward")
@@ -91,16 +91,8 @@ def roofline(
     for stage, cost in costs(work, gaussians, pixels).items():
         floors = cost.floor_s(peaks)
         bound = max(floors, key=lambda name: floors[name])
-        seconds, floor_s = stages_s.get(stage), floors[bound]
-        rows.append(
-            {
-                "stage": stage,
-                "ms": None if seconds is None else 1e3 * seconds,
-                "floor_ms": 1e3 * floor_s,
-                "bound": bound,
-                "share": None if seconds is None else floor_s / seconds,
-            }
-        )
+        row = {"stage": stage, "ms": 1e3 * stages_s[stage], "floor_ms": 1e3 * floors[bound], "bound": bound}
+        rows.append(row | {"share": row["floor_ms"] / row["ms"]})
     return rows
 
 

@@ -11,19 +11,14 @@ Layout = Callable[[Sequence[str], Sequence[Sequence[str]]], str]
 NOT_COUNTED = "Shown but never counted"
 
 
-def number(value: float | None, digits: int = 1) -> str:
-    """With so many decimals, or a dash."""
-    return "-" if value is None else f"{value:,.{digits}f}"
-
-
 def pair(values: Sequence[float] | None, digits: int = 1, unit: str = "") -> str:
     """Forward / forward + backward."""
     return "-" if values is None else " / ".join(f"{value:,.{digits}f}{unit}" for value in values)
 
 
-def percent(value: float | None) -> str:
+def percent(value: float) -> str:
     """A share."""
-    return "-" if value is None else f"{100 * value:.0f} %"
+    return f"{100 * value:.0f} %"
 
 
 def error(value: float | None) -> str:
@@ -151,18 +146,17 @@ def work(report: dict, layout: Layout) -> str:
 
 
 def stages(report: dict, layout: Layout) -> str:
-    """Measured and least time of each stage."""
+    """Measured and least time of each stage, and what a run takes beside them."""
     head = ["scene", "stage", "ms", "least, ms", "bound by", "share"]
-    rows = []
+    body = []
     for row in report["scenes"]:
-        parts = row.get("stages", [])
-        for part in parts:
-            floor, share = number(part["floor_ms"], 2), percent(part["share"])
-            rows.append([row["name"], part["stage"], number(part["ms"], 2), floor, str(part["bound"]), share])
-        if parts and parts[0]["ms"] is not None:
-            outside = row["best_forward_backward_ms"] - sum(part["ms"] for part in parts)
-            rows.append([row["name"], "outside the stages", number(outside, 2), "-", "-", "-"])
-    return layout(head, rows) if rows else ""
+        for part in row.get("stages", []):
+            figures = f"{part['ms']:.2f}", f"{part['floor_ms']:.2f}", part["bound"], percent(part["share"])
+            body.append([row["name"], part["stage"], *figures])
+        if "stages" in row:
+            outside = row["best_forward_backward_ms"] - sum(part["ms"] for part in row["stages"])
+            body.append([row["name"], "outside the stages", f"{outside:.2f}", "-", "-", "-"])
+    return layout(head, body) if body else ""
 
 
 def peaks_line(report: dict) -> str:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from _machine import describe_machine, wait_until_quiet
+from _machine import OthersWatch, describe_machine, wait_until_quiet
 from _markdown import replace_section
 from _opensplat import load_opensplat, opensplat_passes
 from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
@@ -71,8 +71,6 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
 
 def time_stages(view: View, repeat: int) -> tuple[tuple[float, float], dict[str, float]]:
     """Best and median of both passes, and the least seconds of each stage."""
-    if not hasattr(_native, "stage_seconds"):
-        return best_and_median(times_ms(forward_backward_of(view), repeat)), {}
     seen: list[dict[str, float]] = []
     times = times_ms(forward_backward_of(view), repeat, lambda: seen.append(_native.stage_seconds()))
     return best_and_median(times), {stage: min(one[stage] for one in seen) for stage in STAGES}
@@ -172,15 +170,15 @@ def parse() -> argparse.Namespace:
 def main() -> None:
     """Measure the scenes asked for."""
     options = parse()
-    wait_until_quiet(options.patience)
-    machine = describe_machine()
     scenes = [load(name) for name in options.scenes]
+    wait_until_quiet(options.patience)
+    watch = OthersWatch()
     peaks = measure_peaks(options.threads)
     report = {
         "scenes": [measure(*scene, options, peaks) for scene in scenes],
         "twin": against_twin(scenes[0][1]),
         "peaks": peaks,
-        "machine": machine,
+        "machine": describe_machine() | {"others": watch.share()},
         "statistic": f"median of {options.repeat}",
     }
     print(text(report))
