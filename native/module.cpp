@@ -6,13 +6,12 @@
 #include <nanobind/stl/unique_ptr.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "check.h"
 #include "rasterize.h"
 #include "threads.h"
 
@@ -200,23 +199,10 @@ void ssim_backward(InAny image, InAny target, InAny partials, InAny d_map, OutAn
   run_bands(task, dd::kernels().ssim_backward);
 }
 
-bool all_finite(InAny array) {
-  constexpr int64_t kBlock = 1 << 15;
-  const float* data = array.data();
-  const int64_t n = int64_t(array.size());
-  std::atomic<bool> finite{true};
+bool all_usable(const Gaussians& gaussians) {
+  const dd::Inputs in = gaussians.inputs();
   nb::gil_scoped_release release;
-  dd::parallel_for((n + kBlock - 1) / kBlock, [&](int64_t block, int) {
-    const int64_t last = std::min(n, (block + 1) * kBlock);
-    uint32_t bad = 0;
-    for (int64_t i = block * kBlock; i < last; i++) {
-      uint32_t bits;
-      std::memcpy(&bits, data + i, 4);
-      bad |= uint32_t((bits & 0x7f800000u) == 0x7f800000u);
-    }
-    if (bad) finite = false;
-  });
-  return finite;
+  return dd::all_usable(in);
 }
 
 nb::dict stage_seconds() {
@@ -254,7 +240,7 @@ NB_MODULE(_native, m) {
   m.def("inspect", &inspect, "gaussians"_a, "frame"_a, "median_depth"_a, "weight_sum"_a, "weight_most"_a);
   m.def("ssim_forward", &ssim_forward, "image"_a, "target"_a, "map"_a, "partials"_a.none());
   m.def("ssim_backward", &ssim_backward, "image"_a, "target"_a, "partials"_a, "d_map"_a, "d_image"_a);
-  m.def("all_finite", &all_finite, "array"_a);
+  m.def("all_usable", &all_usable, "gaussians"_a);
   m.def("stage_seconds", &stage_seconds);
   m.def("set_threads", &set_threads, "count"_a);
   m.def("threads", &dd::thread_count);

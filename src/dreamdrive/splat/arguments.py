@@ -1,6 +1,5 @@
 """What a splatting backend is given, and the checks every backend shares."""
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,8 +7,24 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from dreamdrive.scene.camera import check_rigid
+
 COEFFICIENTS = {1: 0, 4: 1, 9: 2, 16: 3}
 MAX_SIDE_PX = 32768
+MAX_PINHOLE_PX = 1e9
+LARGEST = 1e30  # products of it with a weight or an upstream gradient stay finite in float32
+SHORTEST, LONGEST = 1e-12, 1e18  # quaternions that float32 can normalise
+POSE_TOLERANCE = 1e-3
+_FINITE = (-LARGEST, LARGEST, f"finite numbers (at most {LARGEST:g} in magnitude)")
+_RANGES = {
+    "means": _FINITE,
+    "quaternions": (SHORTEST, LONGEST, f"lengths from {SHORTEST:g} to {LONGEST:g}"),
+    "scales": (0.0, LARGEST, "finite numbers of at least 0"),
+    "opacities": (0.0, 1.0, "numbers from 0 to 1"),
+    "sh": _FINITE,
+    "channels": _FINITE,
+    "screen_offsets_px": _FINITE,
+}
 
 
 @dataclass(frozen=True)
@@ -18,8 +33,8 @@ class SplatArguments:
 
     Attributes:
         means: Centres (N, 3) in metres, world frame.
-        quaternions: Rotations (N, 4), wxyz; normalised inside.
-        scales: Standard deviations (N, 3) in metres.
+        quaternions: Rotations (N, 4), wxyz, not zero; normalised inside.
+        scales: Standard deviations (N, 3) in metres; with zeros the Gaussian is a disc, a needle or a point.
         opacities: In [0, 1] (N,).
         sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16.
         camera_from_world: Rigid transform (4, 4) to the camera frame (x right, y down, z forward).
@@ -97,6 +112,10 @@ def check_shapes(tensors: dict[str, Tensor | None]) -> None:
         if not fits:
             expected = str(shape).replace("'", "")
             raise ValueError(f"{name}: expected shape {expected}, got {tuple(value.shape)}")
+        if not value.is_floating_point():
+            raise ValueError(
+                f"{name}: expected a floating type, got {str(value.dtype).removeprefix('torch.')}"
+            )
     sh = tensors["sh"]
     if sh is not None and sh.shape[1] not in COEFFICIENTS:
         raise ValueError(f"sh: expected 1, 4, 9 or 16 coefficients a channel, got {sh.shape[1]}")
@@ -107,11 +126,13 @@ def check_pinhole(
 ) -> None:
     """Raise ``ValueError`` unless focal lengths are positive, the centre finite and the size sensible."""
     for name, value in zip(("fx_px", "fy_px"), focal_px, strict=True):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name}: expected a positive number of pixels, got {value}")
+        if not 0 < value <= MAX_PINHOLE_PX:
+            raise ValueError(
+                f"{name}: expected a positive number of pixels up to {MAX_PINHOLE_PX:g}, got {value}"
+            )
     for name, value in zip(("cx_px", "cy_px"), centre_px, strict=True):
-        if not math.isfinite(value):
-            raise ValueError(f"{name}: expected a finite number of pixels, got {value}")
+        if not abs(value) <= MAX_PINHOLE_PX:
+            raise ValueError(f"{name}: expected a number of pixels up to {MAX_PINHOLE_PX:g}, got {value}")
     for name, value in zip(("width_px", "height_px"), size_px, strict=True):
         if not 1 <= value <= MAX_SIDE_PX:
             raise ValueError(f"{name}: expected 1 to {MAX_SIDE_PX}, got {value}")
@@ -148,3 +169,29 @@ def check_dtype(tensors: dict[str, Tensor], dtypes: tuple[torch.dtype, ...]) -> 
         if value.dtype not in dtypes:
             expected = " or ".join(str(d).removeprefix("torch.") for d in dtypes)
             raise ValueError(f"{name}: expected {expected}, got {str(value.dtype).removeprefix('torch.')}")
+
+
+def check_pose(camera_from_world: Float[Tensor, "4 4"]) -> None:
+    """Raise ``ValueError`` unless the pose is a rigid transform: a rotation, a translation, last row 0 0 0 1.
+
+    An optimiser that moves all 12 entries may leave the rotations by ``POSE_TOLERANCE``.
+    """
+    check_rigid(camera_from_world.detach().numpy(), "camera_from_world", POSE_TOLERANCE)
+
+
+def check_values(arguments: SplatArguments) -> None:
+    """Raise ``ValueError`` naming the first argument with a number that splatting cannot use, and its row.
+
+    The native core's ``all_usable`` tells in one quick pass whether there is any.
+    """
+    for name, (low, high, expected) in _RANGES.items():
+        value = getattr(arguments, name)
+        if value is None:
+            continue
+        numbers = value.detach()
+        if name == "quaternions":
+            numbers = numbers.norm(dim=1)
+        bad = ~((numbers >= low) & (numbers <= high))  # true for NaN
+        if bad.any():
+            row = int(torch.nonzero(bad)[0, 0])
+            raise ValueError(f"{name}: expected {expected}, got {numbers[bad][0]:g} in row {row}")

@@ -8,7 +8,7 @@ from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
 from dreamdrive.scene.render import Render
-from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
+from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype, check_pose, check_values
 
 # Position of each differentiable argument of _Rasterize.
 _NAMES = (
@@ -43,6 +43,8 @@ class _Rasterize(torch.autograd.Function):
         gaussians = _native.gaussians(
             means, quaternions, scales, opacities, sh, extra, offsets, arguments.sh_degree
         )
+        if not _native.all_usable(gaussians):
+            check_values(arguments)
         width, height = arguments.size_px
         colour, alpha, depth = (torch.empty(height, width, *tail) for tail in ((3,), (), ()))
         channels = torch.empty(height, width, 0 if extra is None else extra.shape[1])
@@ -88,16 +90,15 @@ def rasterize_native(arguments: SplatArguments) -> Render:
     """Splat float32 CPU tensors with the compiled core.
 
     Values and gradients do not depend on the number of threads. Gradients of Gaussians that reach no tile are
-    exactly zero.
+    exactly zero. NaN in the gradient of a pixel makes NaN the gradients of the Gaussians there, of no Gaussian that
+    ends more than a tile (16 px) away, and of the pose.
 
     Raises:
-        ValueError: A tensor is not float32 or holds NaN or infinite numbers.
+        ValueError: A tensor is not float32 or holds numbers of no use, see ``check_values``; the pose is not rigid.
     """
     tensors = arguments.tensors()
     check_device(tensors, "cpu")
     check_dtype(tensors, (torch.float32,))
-    for name, value in tensors.items():
-        if not _native.all_finite(value.detach().contiguous()):
-            raise ValueError(f"{name}: expected finite numbers, got NaN or infinite ones")
+    check_pose(arguments.camera_from_world)
     ordered = [getattr(arguments, name) for name in _NAMES]
     return Render(*_Rasterize.apply(*ordered, arguments))  # pyright: ignore[reportGeneralTypeIssues]

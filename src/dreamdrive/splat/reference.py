@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from dreamdrive.scene.render import Render
-from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
+from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype, check_pose, check_values
 
 NEAR_M = 0.2
 FAR_M = 1e10
@@ -151,6 +151,8 @@ def rasterize_reference(arguments: SplatArguments) -> Render:
     tensors = arguments.tensors()
     check_device(tensors, "cpu")
     check_dtype(tensors, (arguments.means.dtype,))
+    check_pose(arguments.camera_from_world)
+    check_values(arguments)
     index, centre, conic, opacity, depth = project(arguments)
     width, height = arguments.size_px
     absolute = None if arguments.screen_absolute_px is None else arguments.screen_absolute_px[index]

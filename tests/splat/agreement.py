@@ -1,0 +1,146 @@
+"""Whether two renders of one scene agree, pixel by pixel and Gaussian by Gaussian.
+
+Splatting is not continuous: an alpha at 1/255 counts or not, the Gaussian that takes the transmittance to
+1e-4 ends its pixel, and gradients jump where alpha is capped; float32 and float64 fall on different sides
+there. So pixels within rounding of such an edge are found in float64. No gradient is pulled through them, and
+their value may differ by what the edge is worth, and no more. Everything else has to agree to rounding.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from tests.splat.drawn import Case, arguments
+from tests.splat.scenes import IMAGES
+from torch import Tensor
+
+from dreamdrive.scene.render import Render
+from dreamdrive.splat import rasterize
+from dreamdrive.splat.reference import (
+    MAX_ALPHA,
+    MIN_ALPHA,
+    MIN_TRANSMITTANCE,
+    colours,
+    compositing_weights,
+    project,
+)
+
+EDGE = 1e-3  # relative error of alpha that rounding of a float32 projection may cause
+VALUE = 3e-4  # error of a pixel, as a share of the sum of its parts' magnitudes
+TOTAL = 1e-4  # error of an image, as a share of its norm
+ROW = 5e-3  # error of one Gaussian's gradient, as a share of its length
+FLOOR = 0.01  # of the root mean square over all Gaussians, added to that length
+
+Gradients = dict[str, Tensor]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Where a scene's image is not smooth.
+
+    Attributes:
+        sure: Pixels (H, W) away from every edge.
+        jump: Weight (H, W) that may come or go at an edge.
+        reaching: Gaussians (N,) that certainly reach a pixel.
+        magnitudes: Sums of the magnitudes of what is added, of the shape of each image.
+        largest: Largest magnitude of what is composited, by image.
+    """
+
+    sure: Tensor
+    jump: Tensor
+    reaching: Tensor
+    magnitudes: dict[str, Tensor]
+    largest: dict[str, float]
+
+    def cropped(self, rows: slice, columns: slice) -> "Edges":
+        """The edges of a part of the image."""
+        parts = {name: value[rows, columns] for name, value in self.magnitudes.items()}
+        return replace(self, sure=self.sure[rows, columns], jump=self.jump[rows, columns], magnitudes=parts)
+
+
+def edges(case: Case, scene: dict[str, Tensor]) -> Edges:
+    """Find the edges in float64."""
+    splat, (width, height) = arguments(case, scene), case.size_px
+    index, centre, conic, depth = project(splat)
+    opacities, n = scene["opacities"][index], len(scene["means"])
+    raw = _alpha(centre, conic, opacities, case.size_px)
+    alpha = torch.where(raw >= MIN_ALPHA, raw.clamp(max=MAX_ALPHA), 0.0)
+    after = torch.cumprod(1 - alpha, 1)
+    before = torch.cat([torch.ones_like(after[:, :1]), after[:, :-1]], 1)
+    in_or_out = (raw / MIN_ALPHA - 1).abs() < EDGE
+    # Each Gaussian that comes or goes changes the transmittance behind it by a share of 1/255.
+    share = EDGE + 1.1 * MIN_ALPHA * in_or_out.sum(1, keepdim=True)
+    live = before > MIN_TRANSMITTANCE * (1 - share)
+    last_or_not = (after / MIN_TRANSMITTANCE - 1).abs() < 10 * share
+    jumping, capped = live & (in_or_out | last_or_not), live & ((raw / MAX_ALPHA - 1).abs() < EDGE)
+    reaching = torch.zeros(n, dtype=torch.bool)
+    reaching[index] = (raw > (1 + EDGE) * MIN_ALPHA).any(0)
+    weights, _ = compositing_weights(centre, conic, opacities, case.size_px)
+    values = {"colour": colours(splat, index), "alpha": torch.ones(len(index), 1), "depth_m": depth[:, None]}
+    values["channels"] = depth.new_zeros(len(index), 0) if splat.channels is None else splat.channels[index]
+    return Edges(
+        sure=~(jumping | capped).any(1).reshape(height, width),
+        jump=(jumping * before * raw).sum(1).reshape(height, width),
+        reaching=reaching,
+        magnitudes={k: (weights @ v.double().abs()).reshape(height, width, -1) for k, v in values.items()},
+        largest={k: v.abs().max().item() if v.numel() else 0.0 for k, v in values.items()},
+    )
+
+
+def _alpha(centre: Tensor, conic: Tensor, opacities: Tensor, size_px: tuple[int, int]) -> Tensor:
+    """Alpha (pixels, M) before the cap and the threshold."""
+    width, height = size_px
+    y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
+    dx, dy = x.reshape(-1, 1) - centre[:, 0], y.reshape(-1, 1) - centre[:, 1]
+    return opacities * torch.exp(-0.5 * (conic[:, 0] * dx**2 + conic[:, 2] * dy**2) - conic[:, 1] * dx * dy)
+
+
+def pull(
+    case: Case, scene: dict[str, Tensor], sure: Tensor, backend: str = "native", factor: float = 1
+) -> tuple[Render, Gradients]:
+    """Render, and pull a fixed random gradient back through the sure pixels of every image."""
+    dtype = torch.float32 if backend == "native" else torch.float64
+    inputs = {name: value.to(dtype).clone().requires_grad_() for name, value in scene.items()}
+    out = rasterize(**inputs, **case.camera(), sh_degree=case.degree, backend=backend)
+    g = torch.Generator().manual_seed(7)
+    loss = torch.zeros((), dtype=dtype)
+    for name in IMAGES:
+        image = getattr(out, name)
+        upstream = torch.randn(image.shape, generator=g, dtype=torch.float64) * factor
+        kept = sure if image.ndim == 2 else sure[..., None]
+        loss = loss + (image * (upstream * kept).to(dtype)).sum()
+    loss.backward()
+    return out, {k: torch.zeros_like(v) if v.grad is None else v.grad for k, v in inputs.items()}
+
+
+def assert_images_agree(value: Render, expected: Render, where: Edges) -> None:
+    """Equal to rounding on sure pixels; elsewhere not further apart than the edges there allow."""
+    for name in IMAGES:
+        a, b = getattr(value, name).double(), getattr(expected, name).double()
+        assert torch.isfinite(a).all(), name
+        if not a.numel():
+            continue
+        a, b = (image.reshape(*where.sure.shape, -1) for image in (a, b))
+        allowed = VALUE * where.magnitudes[name] + 1e-6 * where.largest[name] + 1e-9
+        error = (a - b).abs()
+        wrong = (error > allowed) & where.sure[..., None]
+        assert not wrong.any(), f"{name}: off by {error[wrong].max():.3g} on {wrong.sum()} values"
+        wrong = error > allowed + 2.2 * where.largest[name] * where.jump[..., None]
+        assert not wrong.any(), f"{name}: jumps by {error[wrong].max():.3g} at an edge"
+        assert error[where.sure].norm() <= TOTAL * b[where.sure].norm() + 1e-9, name
+
+
+def assert_gradients_agree(value: Gradients, expected: Gradients, scene: dict[str, Tensor]) -> None:
+    """Each Gaussian's gradient agrees, however small beside the others'."""
+    for name, gradient in value.items():
+        a, b = (g.double().reshape(len(g), g.shape[1:].numel()) for g in (gradient, expected[name]))
+        assert torch.isfinite(a).all(), name
+        if not a.numel():
+            continue
+        length = b.norm(dim=1)
+        floor = FLOOR * length.square().mean().sqrt()
+        if name == "quaternions":  # of a nearly round Gaussian: a small difference of large gradients
+            by_log_scale = expected["scales"].double() * scene["scales"]
+            floor = floor + by_log_scale.norm(dim=1) / scene["quaternions"].norm(dim=1)
+        error = (a - b).norm(dim=1) / (length + floor + 1e-9)
+        row = int(error.argmax())
+        assert error[row] < ROW, f"{name}: row {row} is {a[row].tolist()}, expected {b[row].tolist()}"
