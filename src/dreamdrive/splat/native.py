@@ -90,11 +90,11 @@ def rasterize_native(arguments: SplatArguments) -> Render:
     """Splat float32 CPU tensors with the compiled core.
 
     Values and gradients do not depend on the number of threads. Gradients of Gaussians that reach no tile are
-    exactly zero. A NaN that comes from upstream for a pixel reaches the gradients of the Gaussians there and of the
-    pose, but of no Gaussian that ends more than a tile (16 px) away.
+    exactly zero. A NaN that comes from upstream for a pixel reaches the gradients of the Gaussians there and
+    of the pose, but of no Gaussian that ends more than a tile (16 px) away.
 
     Raises:
-        ValueError: A tensor is not float32 or holds numbers of no use (``check_values``); the pose is not rigid.
+        ValueError: A tensor is not float32 or holds numbers of no use; the pose is not rigid.
     """
     tensors = arguments.tensors()
     check_device(tensors, "cpu")
