@@ -16,12 +16,12 @@ OUT ?= out/demo
 INPUT ?=
 OPTIONS ?=
 
-.PHONY: help install demo test ci check format clean
+.PHONY: help install demo test ci check sanitize format clean
 
 help:
 	@echo "make demo [INPUT=clip.mp4] [OUT=out/demo] [OPTIONS='--quality draft']   a scene and its videos"
 	@echo "make test      the quick tests"
-	@echo "make ci        lint, types, slow tests, examples"
+	@echo "make ci        lint, types, sanitizers, slow tests, examples"
 	@echo "make install   only the set-up, into $(VENV)"
 
 # Third-party packages, pinned; again only when what is wanted changes.
@@ -50,7 +50,11 @@ check: install
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 
-ci: check
+# The tests of splatting on a core compiled with AddressSanitizer and UndefinedBehaviorSanitizer.
+sanitize: install
+	.ci/sanitize
+
+ci: check sanitize
 	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
 	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)"; done
 

@@ -10,6 +10,9 @@
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/asan_interface.h>
+#endif
 
 namespace dd {
 
@@ -30,11 +33,11 @@ class Buffer {
       data_ = static_cast<T*>(allocate(wanted * sizeof(T)));
       capacity_ = wanted;
     }
-    return data_;
+    return fenced(count);
   }
   // Room for `count`, the first `kept` values staying.
   T* grow(size_t kept, size_t count) {
-    if (count <= capacity_) return data_;
+    if (count <= capacity_) return fenced(count);
     Buffer larger;
     larger.resize(count);
     std::memcpy(larger.data_, data_, kept * sizeof(T));
@@ -48,6 +51,14 @@ class Buffer {
   const T& operator[](size_t i) const { return data_[i]; }
 
  private:
+  // AddressSanitizer reports what reads or writes beyond `count`, where an earlier, larger use left its values.
+  T* fenced([[maybe_unused]] size_t count) {
+#if defined(__SANITIZE_ADDRESS__)
+    ASAN_UNPOISON_MEMORY_REGION(data_, count * sizeof(T));
+    ASAN_POISON_MEMORY_REGION(data_ + count, (capacity_ - count) * sizeof(T));
+#endif
+    return data_;
+  }
   // Large memory is wanted in large pages: most of it is read in no order, and every small page would be looked up.
   static void* allocate(size_t bytes) {
     constexpr size_t kPage = size_t(1) << 21;
