@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import torch
 from hypothesis import strategies as st
+from tests.splat.scenes import IMAGES
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -35,6 +36,7 @@ class Case:
         stored: SH degree stored, at least ``degree``.
         channels: Extra channels or None.
         offsets: Whether there are screen offsets.
+        pulled: Images that a gradient is pulled through.
     """
 
     seed: int
@@ -47,6 +49,7 @@ class Case:
     stored: int = 1
     channels: int | None = 2
     offsets: bool = True
+    pulled: tuple[str, ...] = IMAGES
 
     def camera(self) -> dict[str, float]:
         """The pinhole, as options of ``rasterize``."""
@@ -76,6 +79,7 @@ def cases(kinds: tuple[str, ...] = KINDS, most: int = 60) -> st.SearchStrategy[C
         focal=st.tuples(focal, focal),
         channels=st.none() | st.integers(0, 5),
         offsets=st.booleans(),
+        pulled=st.just(IMAGES) | st.sampled_from(IMAGES).map(lambda one: (one,)),
     )
 
 
@@ -107,8 +111,9 @@ def build(case: Case) -> dict[str, Tensor]:
             case "beside":
                 centre_px[i] = draw.uniform(-3, 4, 2) * torch.tensor(case.size_px)
                 footprint_px[i] *= 5
-            case "opaque":
+            case "opaque":  # and broad, so that some pixels lie under the cap of alpha
                 opacity[i] = 1
+                footprint_px[i] *= 5
             case "faint":
                 opacity[i] = MIN_ALPHA * draw.uniform(0.5, 2)
             case "absent":

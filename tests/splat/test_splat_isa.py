@@ -74,7 +74,7 @@ def test_each_instruction_set_agrees_with_the_reference(by_isa, isa):
         where = edges(case, scene)
         expected, expected_gradients = pull(case, scene, where.sure, "reference")
         assert_images_agree(Render(**value), expected, where)
-        assert_gradients_agree(gradients, expected_gradients, scene)
+        assert_gradients_agree(gradients, expected_gradients, where)
     image, target = (photo.double() for photo in photos())
     similarity = ssim_map_reference(image.requires_grad_(), target)
     similarity.square().sum().backward()
@@ -88,8 +88,9 @@ def test_instruction_sets_agree_with_each_other(by_isa):
     for a, b in combinations(by_isa.values(), 2):
         for case, (value, gradients), (other, by_other) in zip(CASES, a["splats"], b["splats"], strict=True):
             scene = build(case)
-            assert_images_agree(Render(**value), Render(**other), edges(case, scene))
-            assert_gradients_agree(gradients, by_other, scene)
+            where = edges(case, scene)
+            assert_images_agree(Render(**value), Render(**other), where)
+            assert_gradients_agree(gradients, by_other, where)
 
 
 def test_unknown_instruction_set_is_refused():

@@ -1,5 +1,6 @@
 """What must not change an image, and what must change it in a known way."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import torch
@@ -67,7 +68,7 @@ def test_equal_depths_keep_index_order_among_many():
     value, gradients = pull(case, scene, where.sure)
     expected, expected_gradients = pull(case, scene, where.sure, "reference")
     assert_images_agree(value, expected, where)
-    assert_gradients_agree(gradients, expected_gradients, scene)
+    assert_gradients_agree(gradients, expected_gradients, where)
     turned = pull(case, select(scene, torch.arange(len(scene["means"])).flip(0)), where.sure)[0]
     assert (turned.colour - value.colour).abs().max() > 0.01
 
@@ -117,7 +118,7 @@ def test_moving_camera_and_world_together_changes_nothing(case, seed):
     by_moved["means"] = (by_moved["means"].double() @ turn).float()
     for turned in ("quaternions", "camera_from_world"):
         del gradients[turned]
-    assert_gradients_agree(gradients, by_moved, scene)
+    assert_gradients_agree(gradients, by_moved, where)
 
 
 @given(cases(("plain", "needle", "opaque", "near", "tied")), st.data())
@@ -161,6 +162,16 @@ def test_thread_count_changes_no_byte(case):
         set_threads(before)
     assert_same_bytes(results[0], results[1])
     assert_same_bytes(results[0], results[2])
+
+
+def test_renders_at_the_same_time_do_not_mix():
+    """Two Python threads share the core's pool and its store of buffers."""
+    cases_at_once = [Case(seed, n=60 + seed, channels=seed % 3, size_px=(30 + seed, 20)) for seed in range(8)]
+    alone = [pull(case, build(case), ALL) for case in cases_at_once]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda case: pull(case, build(case), ALL), cases_at_once))
+    for one, other in zip(alone, together, strict=True):
+        assert_same_bytes(one, other)
 
 
 def test_buffers_of_a_huge_scene_leave_no_trace():
