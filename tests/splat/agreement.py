@@ -21,6 +21,7 @@ from dreamdrive.splat.reference import (
     MIN_TRANSMITTANCE,
     colours,
     compositing_weights,
+    offsets_from,
     project,
 )
 
@@ -43,6 +44,8 @@ class Edges:
         sure: Pixels (H, W) away from every edge.
         jump: Weight (H, W) that may come or go at an edge.
         reaching: Gaussians (N,) that certainly reach a pixel.
+        near: Gaussians (N, H, W) that reach a pixel or nearly do.
+        half_sure: Pixels (H, W) where it is certain which Gaussian covers the second half.
         magnitudes: Sums of the magnitudes of what is added, of the shape of each image.
         largest: Largest magnitude of what is composited, by image.
         condition: Longer over shorter axis of each footprint, squared (N,); 0 for what is not projected.
@@ -52,6 +55,8 @@ class Edges:
     sure: Tensor
     jump: Tensor
     reaching: Tensor
+    near: Tensor
+    half_sure: Tensor
     magnitudes: dict[str, Tensor]
     largest: dict[str, float]
     condition: Tensor
@@ -60,15 +65,24 @@ class Edges:
     def cropped(self, rows: slice, columns: slice) -> "Edges":
         """The edges of a part of the image."""
         parts = {name: value[rows, columns] for name, value in self.magnitudes.items()}
-        return replace(self, sure=self.sure[rows, columns], jump=self.jump[rows, columns], magnitudes=parts)
+        at = (..., rows, columns)
+        return replace(
+            self,
+            sure=self.sure[at],
+            jump=self.jump[at],
+            near=self.near[at],
+            half_sure=self.half_sure[at],
+            magnitudes=parts,
+        )
 
 
 def edges(case: Case, scene: dict[str, Tensor]) -> Edges:
     """Find the edges in float64."""
     splat, (width, height) = arguments(case, scene), case.size_px
-    index, centre, conic, depth = project(splat)
-    opacities, n = scene["opacities"][index], len(scene["means"])
-    raw = _alpha(centre, conic, opacities, case.size_px)
+    index, centre, conic, opacities, depth = project(splat)
+    dx, dy = offsets_from(centre, None, case.size_px)
+    sigma = 0.5 * (conic[:, 0] * dx**2 + conic[:, 2] * dy**2) + conic[:, 1] * dx * dy
+    raw = opacities * torch.exp(-sigma)
     alpha = torch.where(raw >= MIN_ALPHA, raw.clamp(max=MAX_ALPHA), 0.0)
     after = torch.cumprod(1 - alpha, 1)
     before = torch.cat([torch.ones_like(after[:, :1]), after[:, :-1]], 1)
@@ -78,12 +92,15 @@ def edges(case: Case, scene: dict[str, Tensor]) -> Edges:
     live = before > MIN_TRANSMITTANCE * (1 - share)
     last_or_not = (after / MIN_TRANSMITTANCE - 1).abs() < 10 * share
     jumping, capped = live & (in_or_out | last_or_not), live & ((raw / MAX_ALPHA - 1).abs() < CAP_EDGE)
+    half_in_doubt = ((after / 0.5 - 1).abs() < 10 * share).any(1)
+    trace, determinant = conic[:, 0] + conic[:, 2], conic[:, 0] * conic[:, 2] - conic[:, 1] ** 2
+    n = len(scene["means"])
+    near, condition = torch.zeros(n, height, width, dtype=torch.bool), torch.zeros(n, dtype=torch.float64)
+    near[index] = (raw > (1 - EDGE) * MIN_ALPHA).T.reshape(-1, height, width)
+    condition[index] = trace**2 / determinant
     reaching = torch.zeros(n, dtype=torch.bool)
     reaching[index] = (raw > (1 + EDGE) * MIN_ALPHA).any(0)
-    condition = torch.zeros(n, dtype=torch.float64)
-    trace, determinant = conic[:, 0] + conic[:, 2], conic[:, 0] * conic[:, 2] - conic[:, 1] ** 2
-    condition[index] = trace**2 / determinant
-    weights, _ = compositing_weights(centre, conic, opacities, case.size_px)
+    weights, _ = compositing_weights(dx, dy, conic, opacities)
     values = {"colour": colours(splat, index), "alpha": torch.ones(len(index), 1), "depth_m": depth[:, None]}
     values["channels"] = depth.new_zeros(len(index), 0) if splat.channels is None else splat.channels[index]
     sure = ~(jumping | capped).any(1).reshape(height, width)
@@ -91,6 +108,8 @@ def edges(case: Case, scene: dict[str, Tensor]) -> Edges:
         sure=sure,
         jump=(jumping * before * raw).sum(1).reshape(height, width),
         reaching=reaching,
+        near=near,
+        half_sure=sure & ~half_in_doubt.reshape(height, width),
         magnitudes={k: (weights @ v.double().abs()).reshape(height, width, -1) for k, v in values.items()},
         largest={k: v.abs().max().item() if v.numel() else 0.0 for k, v in values.items()},
         condition=condition,
@@ -109,14 +128,6 @@ def _lengths(case: Case, scene: dict[str, Tensor], sure: Tensor) -> dict[str, Te
     return {name: row.square().sum(2).mean(0).sqrt() for name, row in rows.items()}
 
 
-def _alpha(centre: Tensor, conic: Tensor, opacities: Tensor, size_px: tuple[int, int]) -> Tensor:
-    """Alpha (pixels, M) before the cap and the threshold."""
-    width, height = size_px
-    y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
-    dx, dy = x.reshape(-1, 1) - centre[:, 0], y.reshape(-1, 1) - centre[:, 1]
-    return opacities * torch.exp(-0.5 * (conic[:, 0] * dx**2 + conic[:, 2] * dy**2) - conic[:, 1] * dx * dy)
-
-
 def _rows(values: Tensor) -> Tensor:
     """As a matrix (N, the rest), whatever is empty."""
     return values.reshape(len(values), values.shape[1:].numel())
@@ -133,7 +144,8 @@ def pull(
     """Render, and pull a random gradient times ``factor`` back through the sure pixels."""
     dtype = torch.float32 if backend == "native" else torch.float64
     inputs = {name: value.to(dtype).clone().requires_grad_() for name, value in scene.items()}
-    out = rasterize(**inputs, **case.camera(), sh_degree=case.degree, backend=backend)
+    options = {"sh_degree": case.degree, "antialiased": case.antialiased, "inspect": case.inspect}
+    out = rasterize(**inputs, **case.camera(), **options, backend=backend)
     g = torch.Generator().manual_seed(seed)
     loss = torch.zeros((), dtype=dtype)
     for name in IMAGES:
@@ -161,6 +173,17 @@ def assert_images_agree(value: Render, expected: Render, where: Edges) -> None:
         wrong = error > allowed + 2.2 * where.largest[name] * where.jump[..., None]
         assert not wrong.any(), f"{name}: jumps by {error[wrong].max():.3g} at an edge"
         assert error[where.sure].norm() <= TOTAL * b[where.sure].norm() + 1e-9, name
+
+
+def assert_inspections_agree(value: Render, expected: Render, where: Edges) -> None:
+    """Median depth and weights of the Gaussians."""
+    depths = (render.median_depth_m[where.half_sure].double() for render in (value, expected))
+    torch.testing.assert_close(*depths, rtol=1e-4, atol=0)
+    jump = (where.near * where.jump).flatten(1)
+    for name, jumps in (("weight_sum_px", jump.sum(1)), ("weight_most", jump.amax(1))):
+        a, b = getattr(value, name).double(), getattr(expected, name).double()
+        wrong = (a - b).abs() > 1e-3 * b + 2.2 * jumps + 1e-6
+        assert not wrong.any(), f"{name}: {a[wrong].tolist()}, expected {b[wrong].tolist()}"
 
 
 def assert_gradients_agree(value: Gradients, expected: Gradients, where: Edges) -> None:

@@ -36,6 +36,9 @@ class Case:
         stored: SH degree stored, at least ``degree``.
         channels: Extra channels or None.
         offsets: Whether there are screen offsets.
+        absolute: Whether absolute gradients by the projected centres are wanted.
+        antialiased: As of ``rasterize``.
+        inspect: As of ``rasterize``.
         pulled: Images that a gradient is pulled through.
     """
 
@@ -49,6 +52,9 @@ class Case:
     stored: int = 1
     channels: int | None = 2
     offsets: bool = True
+    absolute: bool = False
+    antialiased: bool = False
+    inspect: bool = False
     pulled: tuple[str, ...] = IMAGES
 
     def camera(self) -> dict[str, float]:
@@ -79,6 +85,9 @@ def cases(kinds: tuple[str, ...] = KINDS, most: int = 60) -> st.SearchStrategy[C
         focal=st.tuples(focal, focal),
         channels=st.none() | st.integers(0, 5),
         offsets=st.booleans(),
+        absolute=st.booleans(),
+        antialiased=st.booleans(),
+        inspect=st.booleans(),
         pulled=st.just(IMAGES) | st.sampled_from(IMAGES).map(lambda one: (one,)),
     )
 
@@ -138,6 +147,8 @@ def build(case: Case) -> dict[str, Tensor]:
         scene["channels"] = draw.normal(n, case.channels)
     if case.offsets:
         scene["screen_offsets_px"] = draw.normal(n, 2)
+    if case.absolute:
+        scene["screen_absolute_px"] = torch.zeros(n, 2)
     scene = {name: value.float().double() for name, value in scene.items()}
     return select(scene, away_from_thresholds(arguments(case, scene)))
 
@@ -156,6 +167,7 @@ def arguments(case: Case, scene: dict[str, Tensor]) -> SplatArguments:
         centre_px=(camera["cx_px"], camera["cy_px"]),
         size_px=case.size_px,
         sh_degree=case.degree,
+        antialiased=case.antialiased,
     )
 
 

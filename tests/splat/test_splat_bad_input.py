@@ -64,7 +64,8 @@ def test_numbers_of_no_use_are_refused_by_name_and_row(backend, name, value, mes
         (lambda p: p.index_fill(0, torch.tensor([3]), 1.0), "last row must be 0 0 0 1"),
         (lambda p: p.T, "last row must be 0 0 0 1"),
         (lambda p: p * NAN, "NaN or infinite"),
-        (lambda p: p[None], r"expected shape \(4, 4\), got \(1, 4, 4\)"),
+        (lambda p: p[:3], r"expected shape \(4, 4\), got \(3, 4\)"),
+        (lambda p: torch.stack([p, 2 * p]), "not a rotation"),
     ],
 )
 def test_poses_that_are_not_rigid_are_refused(backend, change, message):

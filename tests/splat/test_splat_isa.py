@@ -8,7 +8,13 @@ from pathlib import Path
 
 import pytest
 import torch
-from tests.splat.agreement import assert_gradients_agree, assert_images_agree, edges, pull
+from tests.splat.agreement import (
+    assert_gradients_agree,
+    assert_images_agree,
+    assert_inspections_agree,
+    edges,
+    pull,
+)
 from tests.splat.drawn import KINDS, Case, build
 from torch import Tensor
 
@@ -22,8 +28,12 @@ ISAS = ("baseline", "avx2", "avx512")
 CASES = (
     Case(1, n=3, size_px=(5, 7), degree=0, stored=0, channels=None, offsets=False),
     Case(2, n=61, kinds=KINDS, size_px=(45, 35), degree=1, stored=2, channels=1),
-    Case(3, n=127, kinds=("plain", "opaque", "needle"), size_px=(33, 17), degree=2, stored=2, channels=5),
-    Case(4, n=250, kinds=("plain", "beside", "faint"), size_px=(65, 30), degree=3, stored=3, channels=0),
+    Case(
+        3, n=127, kinds=("plain", "opaque", "needle"), size_px=(33, 17), degree=2, stored=2, antialiased=True
+    ),
+    Case(
+        4, n=250, kinds=("plain", "beside"), size_px=(65, 30), degree=3, stored=3, absolute=True, inspect=True
+    ),
 )
 
 
@@ -75,6 +85,8 @@ def test_each_instruction_set_agrees_with_the_reference(by_isa, isa):
         expected, expected_gradients = pull(case, scene, where.sure, "reference")
         assert_images_agree(Render(**value), expected, where)
         assert_gradients_agree(gradients, expected_gradients, where)
+        if case.inspect:
+            assert_inspections_agree(Render(**value), expected, where)
     image, target = (photo.double() for photo in photos())
     similarity = ssim_map_reference(image.requires_grad_(), target)
     similarity.square().sum().backward()
@@ -91,6 +103,8 @@ def test_instruction_sets_agree_with_each_other(by_isa):
             where = edges(case, scene)
             assert_images_agree(Render(**value), Render(**other), where)
             assert_gradients_agree(gradients, by_other, where)
+            if case.inspect:
+                assert_inspections_agree(Render(**value), Render(**other), where)
 
 
 def test_unknown_instruction_set_is_refused():
