@@ -1,15 +1,19 @@
 """What a figure was measured on."""
 
+import argparse
 import datetime
 import os
 import platform
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 
 from dreamdrive.splat import native_info
 
+T = TypeVar("T")
 QUIET = 0.05  # share of all cores that may be busy
 
 
@@ -58,6 +62,29 @@ def wait_until_quiet(patience_s: float) -> None:
         pass
 
 
+def undisturbed(measure: Callable[[], T], options: argparse.Namespace) -> tuple[T, float]:
+    """Measure, and again while others disturb it: the quietest try, and what others took in it."""
+    tries = []
+    for _ in range(options.tries):
+        wait_until_quiet(options.patience)
+        watch = OthersWatch()
+        result = measure()
+        tries.append((result, watch.share()))
+        if tries[-1][1] <= QUIET:
+            break
+    return min(tries, key=lambda one: one[1])
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """What to do about others on the machine."""
+    parser.add_argument(
+        "--patience", type=float, default=0, metavar="S", help="wait for idle cores, so many seconds at most"
+    )
+    parser.add_argument(
+        "--tries", type=int, default=1, metavar="N", help="again, so often at most, while others disturb"
+    )
+
+
 def describe_machine() -> dict[str, object]:
     """Processor, cores, instruction set, threads, date."""
     return {
@@ -73,5 +100,5 @@ def machine_line(machine: dict[str, object]) -> str:
     """The same as a phrase."""
     return (
         f"{machine['processor']}, {machine['cores']} cores, {machine['isa']}, {machine['threads']} threads, "
-        f"{machine['date']}, others {100 * machine['others']:.0f} % of the cores"
+        f"{machine['date']}, others took up to {100 * machine['others']:.0f} % of the cores"
     )

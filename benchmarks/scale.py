@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from _machine import QUIET, OthersWatch, describe_machine, wait_until_quiet
+from _machine import add_options, describe_machine, undisturbed
 from _markdown import replace_section
 from _memory import peak_bytes, resident_bytes
 from _passes import forward_backward_of, forward_of, times_ms, view_of
@@ -72,18 +72,14 @@ def measure(scene_file: Path) -> dict[str, float]:
 
 
 def in_own_process(point: Point, scene_file: Path, options: argparse.Namespace) -> dict[str, object]:
-    """The row of one point: the least of as many tries as it takes until others leave the cores alone."""
+    """The row of one point."""
     command = [sys.executable, __file__, "--point", str(scene_file), "--threads", str(point.threads)]
-    best: dict[str, float] = {}
-    for _ in range(options.tries):
-        wait_until_quiet(options.patience)
-        watch = OthersWatch()
-        result = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-        result["others"] = watch.share()
-        best = {key: min(value, best.get(key, value)) for key, value in result.items()}
-        if result["others"] <= QUIET:
-            break
-    return asdict(point) | best
+
+    def run() -> dict[str, float]:
+        return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+
+    result, others = undisturbed(run, options)
+    return asdict(point) | result | {"others": others}
 
 
 def measure_all(options: argparse.Namespace) -> list[dict[str, object]]:
@@ -114,16 +110,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
     )
-    parser.add_argument(
-        "--patience",
-        type=float,
-        default=0,
-        metavar="S",
-        help="wait for idle cores",
-    )
-    parser.add_argument(
-        "--tries", type=int, default=1, metavar="N", help="again, so often at most, while others disturb"
-    )
+    add_options(parser)
     parser.add_argument("--point", type=Path, metavar="FILE.npz", help="measure one scene, print JSON, stop")
     return parser.parse_args()
 

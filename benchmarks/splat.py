@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from _machine import OthersWatch, describe_machine, wait_until_quiet
+from _machine import add_options, describe_machine, undisturbed
 from _markdown import replace_section
 from _opensplat import load_opensplat, opensplat_passes
 from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
@@ -42,9 +42,9 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
     """One row of the result."""
     view = view_of(scene)
     with one_torch_thread():
-        forward = best_and_median(times_ms(forward_of(view), options.repeat))
-        both, stages_s = time_stages(view, options.repeat)
+        timed, others = undisturbed(lambda: time_passes(view, options.repeat), options)
         render = rasterize(**view.tensors, **view.camera)
+    forward, both, stages_s = timed
     work, expected = float64(scene)
     row = {
         "name": name,
@@ -57,6 +57,7 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
         "forward_backward_ms": both[1],
         "best_forward_ms": forward[0],
         "best_forward_backward_ms": both[0],
+        "others": others,
         **difference(expected, render.colour.numpy()),
     }
     if source == COMMON and name in TIMES_MS and options.threads <= PEER_THREADS:
@@ -69,11 +70,13 @@ def measure(name: str, scene: Scene, source: str, options: argparse.Namespace, p
     return row
 
 
-def time_stages(view: View, repeat: int) -> tuple[tuple[float, float], dict[str, float]]:
-    """Best and median of both passes, and the least seconds of each stage."""
+def time_passes(view: View, repeat: int) -> tuple[tuple[float, float], tuple[float, float], dict[str, float]]:
+    """Best and median of the forward pass and of both passes, and the least seconds of each stage in both."""
+    forward = times_ms(forward_of(view), repeat)
     seen: list[dict[str, float]] = []
-    times = times_ms(forward_backward_of(view), repeat, lambda: seen.append(_native.stage_seconds()))
-    return best_and_median(times), {stage: min(one[stage] for one in seen) for stage in STAGES}
+    both = times_ms(forward_backward_of(view), repeat, lambda: seen.append(_native.stage_seconds()))
+    stages_s = {stage: min(one[stage] for one in seen) for stage in STAGES}
+    return best_and_median(forward), best_and_median(both), stages_s
 
 
 def float64(scene: Scene) -> tuple[dict[str, int] | None, np.ndarray | None]:
@@ -155,9 +158,7 @@ def parse() -> argparse.Namespace:
         "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
     )
     parser.add_argument("--repeat", type=int, default=15, metavar="N", help="runs a figure is the median of")
-    parser.add_argument(
-        "--patience", type=float, default=0, metavar="S", help="seconds to wait for idle cores"
-    )
+    add_options(parser)
     parser.add_argument("--opensplat", type=Path, metavar="DIR", help="checkout of OpenSplat to measure too")
     options = parser.parse_args()
     if options.threads is not None:
@@ -171,14 +172,13 @@ def main() -> None:
     """Measure the scenes asked for."""
     options = parse()
     scenes = [load(name) for name in options.scenes]
-    wait_until_quiet(options.patience)
-    watch = OthersWatch()
-    peaks = measure_peaks(options.threads)
+    peaks, _ = undisturbed(lambda: measure_peaks(options.threads), options)
+    rows = [measure(*scene, options, peaks) for scene in scenes]
     report = {
-        "scenes": [measure(*scene, options, peaks) for scene in scenes],
+        "scenes": rows,
         "twin": against_twin(scenes[0][1]),
         "peaks": peaks,
-        "machine": describe_machine() | {"others": watch.share()},
+        "machine": describe_machine() | {"others": max(row["others"] for row in rows)},
         "statistic": f"median of {options.repeat}",
     }
     print(text(report))
