@@ -27,7 +27,7 @@ from dreamdrive.splat.reference import (
 
 EDGE = 1e-3  # relative error of alpha that rounding of a float32 projection may cause
 CAP_EDGE = 1e-4  # the same at the cap, where the power is nearly zero
-VALUE = 3e-4  # error of a pixel, as a share of the sum of its parts' magnitudes
+VALUE = 5e-4  # error of a pixel, as a share of the sum of its parts' magnitudes
 TOTAL = 1e-4  # error of an image, as a share of its norm
 ROW = 5e-3  # error of one Gaussian's gradient, as a share of its length
 ROUNDING = 5e-7  # of float32: more error of that gradient for each unit of its footprint's condition number

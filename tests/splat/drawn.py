@@ -17,7 +17,7 @@ KINDS = (
     "tied",
 )  # fmt: skip
 COUNTS = (1, 4, 9, 17, 30, 40, 50, 60, 100, 200)
-SIZES_PX = ((40, 30), (16, 16), (17, 15), (100, 3), (2, 90), (33, 48), (1, 1))
+SIZES_PX = ((40, 30), (16, 16), (17, 15), (100, 3), (2, 90), (33, 48), (1, 1), (19, 290), (300, 18))
 CLEARANCE = 1e-4  # relative distance that float32 cannot cross
 
 
@@ -31,7 +31,7 @@ class Case:
         kinds: Taken in turn.
         size_px: Image width and height.
         centre: Principal point as a share of the image.
-        focal: Focal lengths as a share of the longer side.
+        focal: Focal lengths as a share of the longer side, of 60 px at most: rounding grows with them.
         degree: SH degree evaluated.
         stored: SH degree stored, at least ``degree``.
         channels: Extra channels or None.
@@ -59,7 +59,7 @@ class Case:
 
     def camera(self) -> dict[str, float]:
         """The pinhole, as options of ``rasterize``."""
-        (width, height), longer = self.size_px, max(*self.size_px, 4)
+        (width, height), longer = self.size_px, min(max(*self.size_px, 4), 60)
         return {
             "fx_px": self.focal[0] * longer,
             "fy_px": self.focal[1] * longer,
