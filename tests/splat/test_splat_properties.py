@@ -44,6 +44,7 @@ def test_each_kind_agrees_with_the_reference(kind: str) -> None:
 @example(Case(0, n=0, absolute=True, inspect=True))
 @example(Case(1, n=1, size_px=(1, 1), degree=0, stored=0, channels=0))
 @example(Case(2, n=60, kinds=("opaque", "huge"), size_px=(17, 33)))
+@example(Case(3, n=40, kinds=("needle",), size_px=(80, 280)))  # across more tiles than a row of lanes holds
 def test_random_scenes_agree_with_the_reference(case: Case) -> None:
     check_against_the_reference(case)
 
