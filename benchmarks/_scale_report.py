@@ -118,7 +118,7 @@ def plot(report: dict, path: Path) -> None:
             axes.loglog(sizes, values, "o-", color=colour, label=label)
             if name == "gaussians":
                 axes.loglog(sizes, values[-1] * sizes / sizes[-1], ":", color=colour, linewidth=1)
-        axes.set_xticks(sizes, [label_of(name, row) for row in rows], fontsize="small")
+        axes.set_xticks(sizes, [label_of(name, row) for row in rows], fontsize="x-small")
         axes.tick_params(axis="x", which="minor", bottom=False)
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter(short)
