@@ -6,6 +6,8 @@
 
 namespace dd::DD_ISA {
 
-const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, cover, composite, composite_backward, inspect, ssim, ssim_backward};
+const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, cover, composite, composite_backward, inspect, ssim, ssim_backward,
+                        l1_ssim, l1_ssim_backward, over_sky, over_sky_backward, geometry_loss, adam, activate,
+                        activate_backward, network, network_backward};
 
 }  // namespace dd::DD_ISA

@@ -13,6 +13,16 @@ void composite_backward(const TileTask&, const ImageGradients&, bool absolute, E
 void inspect(const TileTask&, float* median, Contribution*);
 void ssim(const SsimTask&);
 void ssim_backward(const SsimTask&);
+void l1_ssim(const SsimTask&);
+void l1_ssim_backward(const SsimTask&);
+void over_sky(const PictureTask&);
+void over_sky_backward(const PictureTask&);
+void geometry_loss(const GeometryLossTask&);
+void adam(const AdamTask&);
+void activate(const ActivationTask&);
+void activate_backward(const ActivationTask&);
+void network(const NetworkTask&);
+void network_backward(const NetworkTask&);
 
 extern const Kernels kTable;
 

@@ -24,6 +24,17 @@ static inline V load(const float* p) {
   return v;
 }
 static inline void store(float* p, V v) { __builtin_memcpy(p, &v, sizeof(v)); }
+// The first lanes of a row that may end within them.
+static inline V load_part(const float* p, int count) {
+  if (count >= kLanes) return load(p);
+  V v = V{};
+  for (int l = 0; l < count; l++) v[l] = p[l];
+  return v;
+}
+static inline void store_part(float* p, V v, int count) {
+  if (count >= kLanes) return store(p, v);
+  for (int l = 0; l < count; l++) p[l] = v[l];
+}
 static inline I load(const int32_t* p) {
   I v;
   __builtin_memcpy(&v, p, sizeof(v));

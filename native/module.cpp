@@ -5,13 +5,12 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "check.h"
+#include "module_fit.h"
 #include "rasterize.h"
 #include "threads.h"
 
@@ -145,60 +144,6 @@ void inspect(const Gaussians& gaussians, PyFrame& frame, OutAny median_depth, Ou
   dd::render_inspect(in, *frame.frame, median, sum, most);
 }
 
-// Runs one SSIM kernel over bands of rows.
-void run_bands(dd::SsimTask task, void (*kernel)(const dd::SsimTask&)) {
-  constexpr int kBand = 24;
-  const int bands = (task.height + kBand - 1) / kBand;
-  const size_t scratch = size_t(dd::kSsimScratchRows) * dd::ssim_row(task.width);
-  std::vector<float> work(scratch * dd::thread_count());
-  dd::parallel_for(bands, [&](int64_t band, int worker) {
-    dd::SsimTask part = task;
-    part.first_row = int(band) * kBand;
-    part.last_row = std::min(task.height, part.first_row + kBand);
-    part.scratch = work.data() + worker * scratch;
-    kernel(part);
-  });
-}
-
-dd::SsimTask ssim_task(const InAny& image, const InAny& target) {
-  if (image.ndim() != 3 || image.shape(2) != 3) throw nb::value_error("image: expected (h, w, 3)");
-  expect_size("target", target.size(), image.size());
-  dd::SsimTask task = {};
-  task.image = image.data();
-  task.target = target.data();
-  task.height = int(image.shape(0));
-  task.width = int(image.shape(1));
-  return task;
-}
-
-void ssim_forward(InAny image, InAny target, OutAny map, std::optional<OutAny> partials) {
-  dd::SsimTask task = ssim_task(image, target);
-  expect_size("map", map.size(), image.size());
-  task.map = map.data();
-  if (partials) {
-    expect_size("partials", partials->size(), 3 * image.size());
-    task.d_mean = partials->data();
-    task.d_square = task.d_mean + image.size();
-    task.d_product = task.d_square + image.size();
-  }
-  nb::gil_scoped_release release;
-  run_bands(task, dd::kernels().ssim);
-}
-
-void ssim_backward(InAny image, InAny target, InAny partials, InAny d_map, OutAny d_image) {
-  dd::SsimTask task = ssim_task(image, target);
-  expect_size("partials", partials.size(), 3 * image.size());
-  expect_size("d_map", d_map.size(), image.size());
-  expect_size("d_image", d_image.size(), image.size());
-  task.d_mean = const_cast<float*>(partials.data());
-  task.d_square = task.d_mean + image.size();
-  task.d_product = task.d_square + image.size();
-  task.d_map = d_map.data();
-  task.d_image = d_image.data();
-  nb::gil_scoped_release release;
-  run_bands(task, dd::kernels().ssim_backward);
-}
-
 bool all_usable(const Gaussians& gaussians) {
   const dd::Inputs in = gaussians.inputs();
   nb::gil_scoped_release release;
@@ -238,11 +183,10 @@ NB_MODULE(_native, m) {
         "d_opacities"_a.none(), "d_sh"_a.none(), "d_channels"_a.none(), "d_screen"_a.none(), "d_screen_absolute"_a.none(),
         "d_pose"_a);
   m.def("inspect", &inspect, "gaussians"_a, "frame"_a, "median_depth"_a, "weight_sum"_a, "weight_most"_a);
-  m.def("ssim_forward", &ssim_forward, "image"_a, "target"_a, "map"_a, "partials"_a.none());
-  m.def("ssim_backward", &ssim_backward, "image"_a, "target"_a, "partials"_a, "d_map"_a, "d_image"_a);
   m.def("all_usable", &all_usable, "gaussians"_a);
   m.def("stage_seconds", &stage_seconds);
   m.def("set_threads", &set_threads, "count"_a);
   m.def("threads", &dd::thread_count);
   m.def("isa", [] { return std::string(dd::kernels().isa); });
+  bind_fit(m);
 }

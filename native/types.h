@@ -3,6 +3,8 @@
 #pragma once
 #include <cstdint>
 
+#include "fit_types.h"
+
 namespace dd {
 
 constexpr int kTile = 16;                       // tile side in pixels
@@ -114,13 +116,17 @@ struct BackwardTask {
 struct SsimTask {
   const float *image, *target;                  // (h, w, 3)
   int height, width, first_row, last_row;
-  float* map;                                   // (h, w, 3)
+  float* map;                                   // (h, w, 3); not written by the loss
   float *d_mean, *d_square, *d_product;         // of the map by E[x], E[x^2], E[xy]; null if no gradient is wanted
   const float* d_map;                           // upstream gradient
   float* d_image;
   float* scratch;                               // kSsimScratchRows * ssim_row(width)
+  // Of the loss alone.
+  const uint8_t* mask;                          // (h, w), pixels that count
+  double* sums;                                 // of |image - target| and of the similarity, over the band
+  float by_difference, by_similarity;           // gradient of the loss by each of their terms
 };
-constexpr int kSsimRadius = 5, kSsimScratchRows = 5 * (1 + 11);
+constexpr int kSsimRadius = 5, kSsimScratchRows = 4 * (1 + 11) + 1;
 // Floats of one row with its padding, rounded up so that whole lanes may be read past the end.
 static inline int ssim_row(int width) { return (3 * (width + 2 * kSsimRadius) + 31) / 16 * 16; }
 
@@ -145,6 +151,16 @@ struct Kernels {
   void (*inspect)(const TileTask&, float* median, Contribution*);
   void (*ssim)(const SsimTask&);
   void (*ssim_backward)(const SsimTask&);
+  void (*l1_ssim)(const SsimTask&);
+  void (*l1_ssim_backward)(const SsimTask&);
+  void (*over_sky)(const PictureTask&);
+  void (*over_sky_backward)(const PictureTask&);
+  void (*geometry_loss)(const GeometryLossTask&);
+  void (*adam)(const AdamTask&);
+  void (*activate)(const ActivationTask&);
+  void (*activate_backward)(const ActivationTask&);
+  void (*network)(const NetworkTask&);
+  void (*network_backward)(const NetworkTask&);
 };
 
 const Kernels& kernels();                       // the set chosen at run time

@@ -1,6 +1,7 @@
-"""Types of the compiled core (native/module.cpp).
+"""Types of the compiled core (native/module.cpp, native/module_fit.cpp).
 
-Arrays are contiguous float32 CPU tensors, ``visible`` is bool.
+Arrays are contiguous float32 CPU tensors; ``visible``, ``mask`` and the ``sky`` of the geometry loss are
+bool, ``actor`` is int64.
 """
 
 from torch import Tensor
@@ -62,6 +63,130 @@ def ssim_forward(image: Tensor, target: Tensor, map: Tensor, partials: Tensor | 
 def ssim_backward(
     image: Tensor, target: Tensor, partials: Tensor, d_map: Tensor, d_image: Tensor
 ) -> None: ...
+def l1_ssim(image: Tensor, target: Tensor, mask: Tensor, partials: Tensor | None) -> tuple[float, float]: ...
+def l1_ssim_backward(
+    image: Tensor,
+    target: Tensor,
+    mask: Tensor,
+    partials: Tensor,
+    by_l1: float,
+    by_ssim: float,
+    d_image: Tensor,
+) -> None: ...
+def over_sky(colour: Tensor, alpha: Tensor, sky: Tensor, affine: Tensor, picture: Tensor) -> None: ...
+def over_sky_backward(
+    colour: Tensor,
+    alpha: Tensor,
+    sky: Tensor,
+    affine: Tensor,
+    d_picture: Tensor,
+    d_colour: Tensor,
+    d_alpha: Tensor,
+    d_affine: Tensor,
+) -> None: ...
+def geometry_loss(
+    depth_sum: Tensor,
+    alpha: Tensor,
+    reference: Tensor,
+    weight: Tensor,
+    sky: Tensor,
+    by_disparity: float,
+    by_coverage: float,
+    whole_weight: float,
+    d_depth_sum: Tensor | None,
+    d_alpha: Tensor | None,
+) -> float: ...
+def activate(
+    means: Tensor,
+    unit: Tensor | None,
+    offsets: Tensor | None,
+    quaternions: Tensor,
+    log_scales: Tensor,
+    logits: Tensor,
+    sh: Tensor,
+    to: int,
+    out_means: Tensor,
+    out_quaternions: Tensor,
+    scales: Tensor,
+    opacities: Tensor,
+    out_sh: Tensor,
+) -> None: ...
+def activate_backward(
+    unit: Tensor | None,
+    to: int,
+    scales: Tensor,
+    opacities: Tensor,
+    d_means: Tensor,
+    d_scales: Tensor,
+    d_opacities: Tensor,
+    d_offsets: Tensor | None,
+    d_log_scales: Tensor,
+    d_logits: Tensor,
+) -> None: ...
+def adam(
+    values: list[Tensor],
+    gradients: list[Tensor],
+    means: list[Tensor],
+    squares: list[Tensor],
+    rates: list[list[float]],
+    steps: list[int],
+    beta1: float,
+    beta2: float,
+    epsilon: float,
+) -> None: ...
+
+class Network:
+    """Weights of a deformation network, by reference."""
+
+def network(
+    tensors: list[Tensor], depth: int, position_octaves: int, time_code: int, skip: int
+) -> Network: ...
+def network_values(network: Network, n: int) -> int: ...
+def network_forward(
+    network: Network,
+    means: Tensor,
+    centre: Tensor,
+    radius: float,
+    time_code: Tensor,
+    values: Tensor | None,
+    out: Tensor,
+) -> None: ...
+def network_backward(network: Network, values: Tensor, d_out: Tensor, gradients: list[Tensor]) -> None: ...
+
+class Pose:
+    """Canonical Gaussians, what the network adds to them and the tracks of a time, by reference."""
+
+def pose(
+    means: Tensor,
+    quaternions: Tensor,
+    log_scales: Tensor,
+    logits: Tensor,
+    residual: Tensor,
+    lifespan: Tensor | None,
+    actor: Tensor | None,
+    translation: Tensor,
+    yaw: Tensor,
+    pivot: Tensor,
+    up: Tensor,
+    time_s: float,
+) -> Pose: ...
+def pose_forward(
+    pose: Pose, means: Tensor, quaternions: Tensor, log_scales: Tensor, logits: Tensor
+) -> None: ...
+def pose_backward(
+    pose: Pose,
+    means: Tensor,
+    quaternions: Tensor,
+    log_scales: Tensor,
+    logits: Tensor,
+    d_means: Tensor,
+    d_quaternions: Tensor,
+    d_logits: Tensor,
+    d_residual: Tensor,
+    d_translation: Tensor,
+    d_yaw: Tensor,
+) -> None: ...
+def keep_freed_memory() -> None: ...
 def stage_seconds() -> dict[str, float]: ...
 def all_usable(gaussians: Gaussians) -> bool: ...
 def set_threads(count: int) -> None: ...

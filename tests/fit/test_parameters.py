@@ -47,14 +47,38 @@ def test_a_step_of_the_position_is_a_share_of_the_footprint():
     )
 
 
+def test_view_dependent_colour_has_a_step_of_its_own():
+    p = parameters()
+    before = p.frozen().sh
+    one_step(p)
+    moved, rates = (p.frozen().sh - before).abs(), LearningRates()
+    torch.testing.assert_close(moved[:, :1], torch.full_like(moved[:, :1], rates.sh_dc), rtol=1e-3, atol=1e-6)
+    torch.testing.assert_close(
+        moved[:, 1:], torch.full_like(moved[:, 1:], rates.sh_rest), rtol=1e-2, atol=1e-6
+    )
+
+
+def test_the_step_of_the_position_decays():
+    p = parameters()
+    p.set_progress(1.0)
+    before = p.frozen().means
+    one_step(p)
+    moved = (p.frozen().means - before).abs()
+    torch.testing.assert_close(
+        moved, torch.full_like(moved, 0.1 * LearningRates().offsets_end), rtol=1e-2, atol=0
+    )
+
+
 def test_keep_carries_the_moments_along():
     p = parameters()
     one_step(p)
-    moments = p.optimiser.state[p.offsets]["exp_avg"].clone()
+    moments = p.moments["offsets"].mean.clone()
     mask = torch.arange(12) % 3 == 0
     p.keep(mask)
     assert len(p) == 4
-    torch.testing.assert_close(p.optimiser.state[p.offsets]["exp_avg"], moments[mask])
+    assert torch.equal(p.moments["offsets"].mean, moments[mask])
+    assert p.moments["offsets"].square.shape == p.offsets.shape
+    assert p.moments["offsets"].steps == 1
     one_step(p)
 
 
@@ -68,8 +92,8 @@ def test_children_inherit_all_but_the_changes_and_start_with_fresh_moments():
     for name in ("source_frame", "features", "lifespan", "actor", "means", "sh"):
         torch.testing.assert_close(getattr(now, name)[-2:], getattr(now, name)[parents])
     assert (now.log_scales[-2:] == -9).all()
-    assert (p.optimiser.state[p.offsets]["exp_avg"][-2:] == 0).all()
-    assert (p.optimiser.state[p.offsets]["exp_avg"][:12] != 0).any()
+    assert (p.moments["offsets"].mean[-2:] == 0).all()
+    assert (p.moments["offsets"].mean[:12] != 0).any()
     one_step(p)
 
 
@@ -81,9 +105,20 @@ def densified(gradient: float, log_scale: float, **changes: float) -> Parameters
     densifier = GradientDensifier(settings, len(p), (10.0, 10.0))
     pull = torch.zeros(len(p), 2)
     pull[:3, 0] = gradient
-    densifier.observe(pull, torch.ones(len(p), dtype=torch.bool))
+    densifier.observe(None, pull, torch.ones(len(p), dtype=torch.bool))
     densifier.update(p, 1, 10, torch.Generator().manual_seed(0))
     return p
+
+
+def test_pull_on_some_rows_is_theirs_alone():
+    p = parameters()
+    densifier = GradientDensifier(DensifySettings(every=1, start=0, stop=1, gradient=4.0), len(p), (3.0, 4.0))
+    seen = torch.tensor([True, True, False])
+    # Per half image: (3, 4) and so 5 a row, of which row 7 is seen twice and row 2 is not.
+    densifier.observe(torch.tensor([7, 4, 2]), torch.ones(3, 2), seen)
+    densifier.observe(torch.tensor([7]), torch.zeros(1, 2), torch.ones(1, dtype=torch.bool))
+    densifier.update(p, 1, 10, torch.Generator())
+    assert p.frozen().source_frame.tolist() == [*(torch.arange(12) % 5).tolist(), 2, 4]
 
 
 def test_small_ones_that_want_to_move_are_cloned():

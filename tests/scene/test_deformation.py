@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dreamdrive.scene.compiled_deformation import network_residual
 from dreamdrive.scene.deformation import (
     DeformationConfig,
     DeformationField,
@@ -19,6 +20,7 @@ from dreamdrive.scene.deformation import (
     multiply_quaternions,
 )
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.splat import set_threads, threads
 
 UP = np.array([0.0, -1.0, 0.0])
 DOMAIN = Domain(np.array([1.0, 0.0, 20.0]), 8.0, 0.0, 2.0, UP)
@@ -246,3 +248,107 @@ def test_quaternion_product_composes_rotations(numbers: list[float]) -> None:
     np.testing.assert_allclose(
         rotation(product).as_matrix(), (rotation(a) * rotation(b)).as_matrix(), atol=1e-9
     )
+
+
+LEARNED = ("means", "quaternions", "log_scales", "logit_opacities")
+
+
+def moved_with_gradients(
+    deformation: DeformationField, start: Gaussians, t_s: float
+) -> dict[str, torch.Tensor]:
+    """Values at ``t_s`` by name, and the gradients of a random sum of them."""
+    leaves = {name: getattr(start, name).clone().requires_grad_() for name in LEARNED}
+    after = deformation.apply_at(Gaussians(**start.tensors() | leaves), t_s)
+    generator = torch.Generator().manual_seed(8)
+    weights = {
+        n: torch.randn(getattr(after, n).shape, generator=generator, dtype=torch.float64) for n in LEARNED
+    }
+    total = sum((getattr(after, n) * weights[n].to(after.means.dtype)).sum() for n in LEARNED)
+    named = leaves | dict(deformation.named_parameters())
+    found = torch.autograd.grad(total, list(named.values()), allow_unused=True)
+    values = {f"value of {n}": getattr(after, n).detach() for n in LEARNED}
+    return values | {n: g for n, g in zip(named, found, strict=True) if g is not None}
+
+
+def woken(deformation: DeformationField) -> DeformationField:
+    """The field with heads that do something."""
+    generator = torch.Generator().manual_seed(3)
+    for head in (deformation.head_mean, deformation.head_quaternion, deformation.head_log_scale):
+        torch.nn.init.normal_(head.weight, std=0.3, generator=generator)
+        torch.nn.init.normal_(head.bias, std=0.3, generator=generator)
+    return deformation
+
+
+@pytest.mark.parametrize(
+    ("tracks", "shape"),
+    [
+        (TRACKS, {}),
+        (None, {"depth": 1, "width": 5, "position_frequencies": 0, "time_frequencies": 0}),
+        (TRACKS, {"depth": 6, "width": 20, "position_frequencies": 4}),
+        (None, {"depth": 7, "width": 40}),
+    ],
+)
+@pytest.mark.parametrize("count", [1, 64, 131])
+def test_the_compiled_core_agrees_with_plain_torch(
+    tracks: Tracks | None, shape: dict[str, int], count: int
+) -> None:
+    generator = torch.Generator().manual_seed(count)
+    more = {
+        "actor": torch.arange(count) % 3 - 1,
+        "lifespan": torch.rand(count, 2, generator=generator) + torch.tensor([0.0, 0.3]),
+    }
+    start = gaussians(count, torch.float32, **more if tracks is not None else {})
+    single = moved_with_gradients(woken(field(tracks, **shape)), start, 0.6)
+    double = {name: v.double() if v.is_floating_point() else v for name, v in start.tensors().items()}
+    expected = moved_with_gradients(woken(field(tracks, **shape)).double(), Gaussians(**double), 0.6)
+    for name, wanted in expected.items():
+        scale = wanted.abs().max().item() + 1e-6
+        torch.testing.assert_close(single[name].double(), wanted, rtol=0, atol=2e-5 * scale, msg=name)
+
+
+def test_the_compiled_encoding_is_exact_far_out() -> None:
+    """One layer that adds up the encoding: sines and cosines of angles up to ten thousand."""
+    means = torch.linspace(-19, 19, 501)[:, None] * torch.tensor([1.0, 0.7, -0.3])
+    weights = [torch.eye(63), torch.full((63,), 2.0)]
+    found = []
+    for rows in torch.eye(63).split(10):
+        head = torch.cat([rows, torch.zeros(10 - len(rows), 63)])
+        parts = [tensor for part in head.split([3, 4, 3]) for tensor in (part, torch.zeros(len(part)))]
+        found.append(
+            network_residual(means, torch.zeros(3), 1.0, torch.zeros(0), 10, 1, None, [*weights, *parts])
+        )
+    encoded = encode(means.double(), 10)
+    # ReLU lets the value, between -19 and 19, through from -2 on.
+    expected = torch.relu(encoded + 2)
+    torch.testing.assert_close(torch.cat(found, 1)[:, :63].double(), expected, rtol=0, atol=2e-6)
+
+
+def test_thread_count_changes_no_bit_of_the_deformation() -> None:
+    start = gaussians(3000, actor=torch.arange(3000) % 3 - 1)
+    before, results = threads(), []
+    try:
+        for count in (1, 2, 3):
+            set_threads(count)
+            results.append(moved_with_gradients(woken(field(TRACKS)), start, 0.6))
+    finally:
+        set_threads(before)
+    for other in results[1:]:
+        assert all(torch.equal(results[0][name], other[name]) for name in results[0])
+
+
+def test_without_gradients_the_values_are_the_same() -> None:
+    deformation, start = woken(field(TRACKS)), gaussians(100, actor=torch.arange(100) % 3 - 1)
+    with torch.no_grad():
+        quiet = deformation.apply_at(start, 1.2)
+    assert torch.equal(quiet.means, deformation.apply_at(start, 1.2).means)
+
+
+def test_life_spans_with_gradients_need_float64() -> None:
+    learned = gaussians(2, lifespan=torch.ones(2, 2, requires_grad=True))
+    with pytest.raises(ValueError, match="lifespan"):
+        field().apply_at(learned, 0.5)
+
+
+def test_an_actor_without_a_track_is_refused() -> None:
+    with pytest.raises(ValueError, match="actor"):
+        field(TRACKS).apply_at(gaussians(2, actor=torch.tensor([0, 2])), 0.5)

@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from benchmarks import _plain_step as plain
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.exposure import Exposure, ExposureNetwork, transform_colour
+from dreamdrive.scene.exposure import Exposure, ExposureNetwork, recorded_picture, transform_colour
 from dreamdrive.scene.sky import Sky
+from dreamdrive.splat import set_threads, threads
 
 
 def camera(yaw_deg: float = 0.0, pitch_deg: float = 0.0, position: tuple[float, ...] = (0, 0, 0)) -> Camera:
@@ -104,6 +106,43 @@ def test_exposure_gradients() -> None:
     assert network.embedding.grad is not None
     assert network.embedding.grad[1].abs().sum() > 0
     assert network.embedding.grad[0].abs().sum() == 0
+
+
+def picture_with_gradients(function, dtype: torch.dtype) -> list[torch.Tensor]:
+    generator = torch.Generator().manual_seed(2)
+    shapes = ((90, 101, 3), (90, 101), (90, 101, 3), (3, 4), (90, 101, 3))
+    colour, alpha, sky, affine, pull = (
+        torch.rand(shape, generator=generator, dtype=torch.float64).to(dtype) for shape in shapes
+    )
+    learned = [value.requires_grad_() for value in (colour, alpha, affine)]
+    picture = function(colour, alpha, sky, affine)
+    return [picture.detach(), *torch.autograd.grad((picture * pull).sum(), learned)]
+
+
+def test_a_recorded_picture_is_the_transform_of_colour_over_sky() -> None:
+    ours = picture_with_gradients(recorded_picture, torch.float32)
+    expected = picture_with_gradients(plain.over_sky, torch.float64)
+    for value, wanted in zip(ours, expected, strict=True):
+        torch.testing.assert_close(value.double(), wanted, rtol=1e-5, atol=1e-5)
+
+
+def test_thread_count_changes_no_bit_of_a_recorded_picture() -> None:
+    before, results = threads(), []
+    try:
+        for count in (1, 2, 3):
+            set_threads(count)
+            results.append(picture_with_gradients(recorded_picture, torch.float32))
+    finally:
+        set_threads(before)
+    for other in results[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
+
+
+def test_a_recorded_picture_has_no_gradient_for_the_sky() -> None:
+    with pytest.raises(ValueError, match="sky"):
+        recorded_picture(
+            torch.zeros(2, 2, 3), torch.zeros(2, 2), torch.ones(2, 2, 3, requires_grad=True), torch.eye(3, 4)
+        )
 
 
 def test_wrong_values_are_refused() -> None:

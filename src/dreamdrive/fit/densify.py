@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from dreamdrive.fit.parameters import Parameters
@@ -14,8 +14,10 @@ from dreamdrive.fit.parameters import Parameters
 class Densifier(Protocol):
     """What the trainer asks of a densification strategy."""
 
-    def observe(self, gradient_px: Float[Tensor, "n 2"], visible: Bool[Tensor, " n"]) -> None:
-        """Take in one step's gradient with respect to the projected means, per pixel."""
+    def observe(
+        self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
+    ) -> None:
+        """Take in one step's gradient by the projected means, per pixel, of some rows or of all (None)."""
         ...
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
@@ -70,10 +72,18 @@ class GradientDensifier:
         self._sum = torch.zeros(count)
         self._seen = torch.zeros(count)
 
-    def observe(self, gradient_px: Float[Tensor, "n 2"], visible: Bool[Tensor, " n"]) -> None:
+    def observe(
+        self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
+    ) -> None:
         """Add one step's gradients to the running mean over the views that saw each Gaussian."""
-        self._sum += torch.linalg.vector_norm(gradient_px * self._half_size, dim=1)
-        self._seen += visible
+        # torch.linalg.vector_norm takes nearly twice as long over two numbers.
+        strength = (gradient_px.square() @ self._half_size.square()).sqrt()
+        if rows is None:
+            self._sum += strength
+            self._seen += visible
+        else:
+            self._sum.index_add_(0, rows, strength)
+            self._seen.index_add_(0, rows, visible.to(self._seen.dtype))
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
         """Clone, split and prune after every ``every``-th step inside the growing window."""
@@ -127,7 +137,9 @@ class GradientDensifier:
 class NoDensifier:
     """Keep the set as it was seeded."""
 
-    def observe(self, gradient_px: Float[Tensor, "n 2"], visible: Bool[Tensor, " n"]) -> None:
+    def observe(
+        self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
+    ) -> None:
         """Nothing is collected."""
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:

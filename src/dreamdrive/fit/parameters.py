@@ -1,4 +1,4 @@
-"""Gaussians while they are being fitted: leaf tensors, their Adam state, and surgery on both."""
+"""Gaussians while they are being fitted: leaf tensors, their Adam moments, and surgery on both."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,9 +7,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.fit.adam import Moments, adam_step
 from dreamdrive.scene.gaussians import Gaussians
 
-_LEARNED = ("offsets", "quaternions", "log_scales", "logit_opacities", "sh_dc", "sh_rest")
+_LEARNED = ("offsets", "quaternions", "log_scales", "logit_opacities", "sh")
 _CARRIED = ("anchors", "unit_m", "source_frame", "features", "lifespan", "actor")
 
 
@@ -38,10 +39,14 @@ class LearningRates:
 
 
 class Parameters:
-    """N Gaussians as leaf tensors with an optimiser; ``fit`` works on this and returns frozen ``Gaussians``.
+    """N Gaussians as leaf tensors with Adam's moments; a fit works on this and returns frozen ``Gaussians``.
 
     Positions are ``anchors + unit_m * offsets``: the offset is dimensionless, so that Adam's steps are a
     fraction of a pixel at any depth.
+
+    Attributes:
+        rates: Step sizes.
+        moments: Adam's memory of each leaf, by name.
     """
 
     def __init__(self, gaussians: Gaussians, unit_m: Float[Tensor, " n"], rates: LearningRates) -> None:
@@ -57,12 +62,12 @@ class Parameters:
         self.quaternions = gaussians.quaternions.clone()
         self.log_scales = gaussians.log_scales.clone()
         self.logit_opacities = gaussians.logit_opacities.clone()
-        self.sh_dc = gaussians.sh[:, :1].clone()
-        self.sh_rest = gaussians.sh[:, 1:].clone()
-        groups = [
-            {"params": [self._leaf(name)], "lr": getattr(rates, name), "name": name} for name in _LEARNED
-        ]
-        self.optimiser = torch.optim.Adam(groups, eps=1e-15, fused=True)
+        self.sh = gaussians.sh.clone()
+        self._offset_rate = rates.offsets
+        self.moments = {
+            name: Moments(torch.zeros_like(leaf), torch.zeros_like(leaf))
+            for name, leaf in ((name, self._leaf(name)) for name in _LEARNED)
+        }
 
     def _leaf(self, name: str) -> Tensor:
         leaf = getattr(self, name).contiguous().requires_grad_(True)
@@ -76,11 +81,6 @@ class Parameters:
     def means(self) -> Float[Tensor, "n 3"]:
         """Centres in metres, differentiable."""
         return torch.addcmul(self.anchors, self.unit_m[:, None], self.offsets)
-
-    @property
-    def sh(self) -> Float[Tensor, "n k 3"]:
-        """All spherical-harmonic coefficients, differentiable."""
-        return torch.cat([self.sh_dc, self.sh_rest], dim=1) if self.sh_rest.shape[1] else self.sh_dc
 
     def gaussians(self) -> Gaussians:
         """The Gaussians as they are now, still attached to the leaves."""
@@ -104,24 +104,32 @@ class Parameters:
     def set_progress(self, done: float) -> None:
         """Decay the step of the positions; ``done`` runs from 0 to 1."""
         rates = self.rates
-        for group in self.optimiser.param_groups:
-            if group["name"] == "offsets":
-                group["lr"] = rates.offsets * (rates.offsets_end / rates.offsets) ** done
+        self._offset_rate = rates.offsets * (rates.offsets_end / rates.offsets) ** done
 
     def step(self) -> None:
         """One Adam step, then forget the gradients."""
-        self.optimiser.step()
-        self.optimiser.zero_grad(set_to_none=True)
+        rates = self.rates
+        adam_step(
+            {name: getattr(self, name) for name in _LEARNED},
+            self.moments,
+            {
+                "offsets": [self._offset_rate],
+                "quaternions": [rates.quaternions],
+                "log_scales": [rates.log_scales],
+                "logit_opacities": [rates.logit_opacities],
+                "sh": [rates.sh_dc] * 3 + [rates.sh_rest] * 3 * (self.sh.shape[1] - 1),
+            },
+        )
 
     @torch.no_grad()
     def keep(self, mask: Bool[Tensor, " n"]) -> None:
-        """Drop the Gaussians outside ``mask`` with their optimiser state."""
+        """Drop the Gaussians outside ``mask`` with their moments."""
         index = torch.nonzero(mask).squeeze(1)
         self._rebuild(lambda value: value[index])
 
     @torch.no_grad()
     def append_children(self, parents: Int[Tensor, " m"], changes: dict[str, Tensor]) -> None:
-        """Append copies of ``parents`` with ``changes`` to some fields and fresh optimiser state.
+        """Append copies of ``parents`` with ``changes`` to some fields and fresh moments.
 
         Everything else, source frame, features, life span and actor included, is the parent's.
         """
@@ -146,13 +154,7 @@ class Parameters:
         self, change: Callable[[str, Tensor], Tensor], change_state: Callable[[Tensor], Tensor]
     ) -> None:
         """Replace each leaf and carry its Adam moments over."""
-        for group in self.optimiser.param_groups:
-            name = group["name"]
-            old = getattr(self, name)
-            state = self.optimiser.state.pop(old, None)
-            setattr(self, name, change(name, old.detach()))
-            new = self._leaf(name)
-            group["params"] = [new]
-            if state:
-                moments = {key: change_state(state[key]) for key in ("exp_avg", "exp_avg_sq")}
-                self.optimiser.state[new] = {"step": state["step"], **moments}
+        for name in _LEARNED:
+            setattr(self, name, change(name, getattr(self, name).detach()))
+            self._leaf(name)
+            self.moments[name] = self.moments[name].changed(change_state)

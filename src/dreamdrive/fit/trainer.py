@@ -4,19 +4,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
+from dreamdrive import _native
+from dreamdrive.fit.activation import Activated, activate
 from dreamdrive.fit.densify import Densifier
-from dreamdrive.fit.losses import LossName, disparity_loss, render_loss, shape_loss
+from dreamdrive.fit.losses import LossName, geometry_loss, render_loss, shape_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.deformation import DeformationField, alive_at
-from dreamdrive.scene.exposure import ExposureNetwork, transform_colour
+from dreamdrive.scene.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import one_torch_thread, rasterize
 
 Progress = Callable[[int, int], None]
 
@@ -76,25 +79,81 @@ class Model:
     sky: Sky
     exposure: ExposureNetwork
 
-    def at(self, t_s: float) -> tuple[Gaussians, list[Tensor]]:
-        """What is there at a time, differentiable: the static Gaussians, then the living dynamic ones.
-
-        The second value tells, for each of ``parts()``, which of its rows they are.
-        """
-        parts: list[Gaussians] = []
-        rows: list[Tensor] = []
-        if self.static is not None:
-            parts.append(self.static.gaussians().without_features())
-            rows.append(torch.arange(len(self.static)))
-        if self.dynamic is not None and self.deformation is not None:
-            whole = self.dynamic.gaussians().without_features()
-            rows.append(alive_at(whole, t_s))
-            parts.append(self.deformation.apply_at(whole.select(rows[-1]), t_s))
-        return (Gaussians.concatenate(*parts) if len(parts) > 1 else parts[0]), rows
+    def moved(self, t_s: float) -> tuple[Gaussians | None, Int[Tensor, " m"] | None]:
+        """The living dynamic Gaussians at a time, differentiable, and which rows of ``dynamic`` they are."""
+        if self.dynamic is None or self.deformation is None:
+            return None, None
+        whole = self.dynamic.gaussians().without_features()
+        rows = alive_at(whole, t_s)
+        return self.deformation.apply_at(whole.select(rows), t_s), rows
 
     def parts(self) -> list[Parameters]:
-        """The present parameter sets in the order of ``at``."""
+        """The present parameter sets, in the order in which they are splatted."""
         return [p for p in (self.static, self.dynamic) if p is not None]
+
+
+class Trainer:
+    """The state of a fit between two steps.
+
+    Attributes:
+        model: What changes.
+        densifiers: One for each of ``model.parts()``.
+        options: Length, rates and weights.
+        generator: Source of the order of the frames and of the places of split Gaussians.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        densifiers: Sequence[Densifier],
+        options: FitOptions,
+        generator: torch.Generator,
+    ) -> None:
+        self.model = model
+        self.densifiers = densifiers
+        self.options = options
+        self.generator = generator
+        self._optimiser = _shared_optimiser(model, options)
+
+    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> None:
+        """Render a frame, compare, learn and densify.
+
+        Args:
+            step: Number of the step, from 0.
+            view: The frame.
+            sky: What its camera sees of the sky alone.
+            shrink: By how much the frame is shrunk.
+        """
+        model, options = self.model, self.options
+        done = step / options.steps
+        moved, rows = model.moved(view.time_s)
+        activated = activate(model.static, moved)
+        offsets_px = torch.zeros(len(activated.means), 2, requires_grad=True)
+        rendered = _splat(activated, view.camera, offsets_px, None if done >= options.sh_after else 0)
+        loss = _loss(model, rendered, view, sky, options, done)
+        if step % SHAPE_EVERY == 0:
+            log_scales = [part.log_scales for part in (model.static, moved) if part is not None]
+            loss = loss + options.shape_weight * shape_loss(torch.cat(log_scales), options.shape_ratio)
+        loss.backward()
+        _decay(model, self._optimiser, options, done)
+        _step(model, self._optimiser)
+        self._observe(rows, offsets_px, rendered, shrink)
+        for part, densifier in zip(model.parts(), self.densifiers, strict=True):
+            densifier.update(part, step, options.steps, self.generator)
+
+    def _observe(
+        self, rows: Int[Tensor, " m"] | None, offsets_px: Tensor, rendered: Render, shrink: int
+    ) -> None:
+        """Hand each part its share of the screen gradients."""
+        gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
+        if shrink != 1:
+            gradient = gradient / shrink  # a pixel of a half-size frame is two pixels wide
+        static = 0 if self.model.static is None else len(self.model.static)
+        densifiers = iter(self.densifiers)
+        if static:
+            next(densifiers).observe(None, gradient[:static], rendered.visible[:static])
+        if rows is not None:
+            next(densifiers).observe(rows, gradient[static:], rendered.visible[static:])
 
 
 @one_torch_thread()
@@ -116,31 +175,41 @@ def optimise(
         seed: Order of the frames and places of split Gaussians.
         progress: Called with steps done and steps in all.
     """
+    _native.keep_freed_memory()
     generator = torch.Generator().manual_seed(seed)
-    skies = {shrink: [model.sky.colour(v.camera) for v in shrunk] for shrink, shrunk in views.items()}
-    optimiser = _shared_optimiser(model, options)
+    trainer = Trainer(model, densifiers, options, generator)
+    skies = {
+        shrink: [model.sky.colour(v.camera).contiguous() for v in shrunk] for shrink, shrunk in views.items()
+    }
     order: list[int] = []
     for step in range(options.steps):
-        done = step / options.steps
         if not order:
             order = torch.randperm(len(views[1]), generator=generator).tolist()
-        shrink = 2 if done < options.half_size_share else 1
+        shrink = 2 if step / options.steps < options.half_size_share else 1
         which = order.pop()
-        view = views[shrink][which]
-        gaussians, rows = model.at(view.time_s)
-        offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
-        degree = gaussians.sh_degree if done >= options.sh_after else 0
-        rendered = render(gaussians, view.camera, screen_offsets_px=offsets_px, sh_degree=degree)
-        loss = _loss(model, rendered, view, skies[shrink][which], options, done)
-        if step % SHAPE_EVERY == 0:
-            loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
-        loss.backward()
-        _decay(model, optimiser, options, done)
-        _step(model, optimiser)
-        _observe(densifiers, rows, [len(p) for p in model.parts()], offsets_px, rendered, shrink)
-        for part, densifier in zip(model.parts(), densifiers, strict=True):
-            densifier.update(part, step, options.steps, generator)
+        trainer.step(step, views[shrink][which], skies[shrink][which], shrink)
         progress(step + 1, options.steps)
+
+
+def _splat(
+    activated: Activated, camera: Camera, offsets_px: Float[Tensor, "n 2"], sh_degree: int | None
+) -> Render:
+    return rasterize(
+        activated.means,
+        activated.quaternions,
+        activated.scales,
+        activated.opacities,
+        activated.sh,
+        torch.as_tensor(camera.camera_from_world, dtype=torch.float32),
+        fx_px=camera.fx_px,
+        fy_px=camera.fy_px,
+        cx_px=camera.cx_px,
+        cy_px=camera.cy_px,
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        screen_offsets_px=offsets_px,
+        sh_degree=sh_degree,
+    )
 
 
 def _loss(
@@ -151,17 +220,17 @@ def _loss(
     options: FitOptions,
     done: float,
 ) -> Float[Tensor, ""]:
-    image = rendered.colour + (1 - rendered.alpha)[..., None] * sky
-    image = transform_colour(image, model.exposure(view.index))
-    loss = render_loss(image, view.image, view.mask, options.loss)
-    if options.depth_weight:
-        weight = options.depth_weight * 0.1**done
-        loss = loss + weight * disparity_loss(
-            rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight
-        )
-    if options.sky_weight:
-        loss = loss + options.sky_weight * (rendered.alpha * view.sky).mean()
-    return loss
+    image = recorded_picture(rendered.colour, rendered.alpha, sky, model.exposure(view.index))
+    depth_weight = options.depth_weight * 0.1**done
+    return render_loss(image, view.image, view.mask, options.loss) + geometry_loss(
+        rendered.depth_m,
+        rendered.alpha,
+        view.depth_m,
+        view.depth_weight,
+        view.sky,
+        depth_weight,
+        options.sky_weight,
+    )
 
 
 def _shared_optimiser(model: Model, options: FitOptions) -> torch.optim.Adam:
@@ -191,23 +260,3 @@ def _step(model: Model, optimiser: torch.optim.Adam) -> None:
         part.step()
     optimiser.step()
     optimiser.zero_grad(set_to_none=True)
-
-
-def _observe(
-    densifiers: Sequence[Densifier],
-    rows: list[Tensor],
-    counts: list[int],
-    offsets_px: Tensor,
-    rendered: Render,
-    shrink: int,
-) -> None:
-    """Hand each part its share of the screen gradients, those of absent rows being zero."""
-    # A pixel of a half-size frame is two pixels wide.
-    gradient = (offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)) / shrink
-    start = 0
-    for densifier, present, count in zip(densifiers, rows, counts, strict=True):
-        here = slice(start, start + len(present))
-        whole = torch.zeros(count, 2).index_copy_(0, present, gradient[here])
-        seen = torch.zeros(count, dtype=torch.bool).index_copy_(0, present, rendered.visible[here])
-        densifier.observe(whole, seen)
-        start += len(present)

@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from dreamdrive.scene.compiled_deformation import network_residual, posed
 from dreamdrive.scene.gaussians import Gaussians
 
 
@@ -215,13 +216,11 @@ class DeformationField(nn.Module):
 
     def residual(self, means: Float[Tensor, "n 3"], t_s: float) -> Offsets:
         """What the network alone adds; ``means`` (N, 3) canonical, in metres."""
-        start_s, end_s = self.time_range_s.tolist()
-        time = means.new_tensor([(t_s - start_s) / (end_s - start_s)])
         position = (means.detach() - self.centre_m) / self.radius_m
         encoded = torch.cat(
             [
                 encode(position, self.config.position_frequencies),
-                encode(time, self.config.time_frequencies).expand(len(means), -1),
+                self._time_code(means, t_s).expand(len(means), -1),
             ],
             dim=-1,
         )
@@ -231,6 +230,10 @@ class DeformationField(nn.Module):
             hidden = torch.relu(layer(hidden))
         return Offsets(self.head_mean(hidden), self.head_quaternion(hidden), self.head_log_scale(hidden))
 
+    def _time_code(self, like: Tensor, t_s: float) -> Float[Tensor, " e"]:
+        start_s, end_s = self.time_range_s.tolist()
+        return encode(like.new_tensor([(t_s - start_s) / (end_s - start_s)]), self.config.time_frequencies)
+
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
@@ -238,23 +241,9 @@ class DeformationField(nn.Module):
         key frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off.
         Before the first and after the last key frame the velocity there continues.
         """
-        times = self.track_times_s.tolist()
-        if len(times) < 2:
-            return self.track_translation.sum(dim=1), self.track_yaw_rad.sum(dim=1)
-        keys = torch.cat([self.track_translation, self.track_yaw_rad[..., None]], dim=-1)
-        i = min(max(int(np.searchsorted(times, t_s, side="right")) - 1, 0), len(times) - 2)
-        step = times[i + 1] - times[i]
-        u = (t_s - times[i]) / step
-        start, end = keys[:, i], keys[:, i + 1]
-        slope, next_slope = (_slope(keys, times, k) * step for k in (i, i + 1))
-        if u < 0:
-            at = start + u * slope
-        elif u > 1:
-            at = end + (u - 1) * next_slope
-        else:
-            bend = 2 * (start - end) + slope + next_slope
-            at = start + u * (slope + u * (end - start - slope - bend + u * bend))
-        return at[:, :3], at[:, 3]
+        weights = self.track_yaw_rad.new_tensor(_key_weights(self.track_times_s.tolist(), t_s))
+        translation = torch.einsum("atk,t->ak", self.track_translation, weights)
+        return translation, self.track_yaw_rad @ weights
 
     def forward(
         self,
@@ -290,9 +279,15 @@ class DeformationField(nn.Module):
         )
 
     def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
-        """The Gaussians as they are at ``t_s``: moved, turned, scaled and faded; differentiable."""
+        """The Gaussians as they are at ``t_s``: moved, turned, scaled and faded; differentiable.
+
+        float32 on the CPU goes through the compiled core, which has no gradient for life spans; all else goes
+        through plain torch.
+        """
         if len(gaussians) == 0:
             return faded(gaussians, t_s)
+        if gaussians.means.dtype == torch.float32 and gaussians.means.is_cpu:
+            return self._compiled_at(gaussians, t_s)
         offsets = self(gaussians.means, gaussians.quaternions, gaussians.actor, t_s)
         moved = replace(
             gaussians,
@@ -302,18 +297,74 @@ class DeformationField(nn.Module):
         )
         return faded(moved, t_s)
 
+    def _compiled_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
+        if gaussians.lifespan is not None and gaussians.lifespan.requires_grad:
+            raise ValueError("lifespan: the compiled core has no gradient for it; detach it or use float64")
+        residual = network_residual(
+            gaussians.means,
+            self.centre_m,
+            self.radius_m.item(),
+            self._time_code(gaussians.means, t_s),
+            self.config.position_frequencies,
+            self.config.depth,
+            self._skip,
+            [tensor for layer in self._dense() for tensor in (layer.weight, layer.bias)],
+        )
+        means, quaternions, log_scales, logits = posed(
+            (gaussians.means, gaussians.quaternions, gaussians.log_scales, gaussians.logit_opacities),
+            residual,
+            gaussians.lifespan,
+            gaussians.actor if self.config.actors else None,
+            self.pose(t_s),
+            self.track_pivot_m,
+            self.up,
+            t_s,
+        )
+        return replace(
+            gaussians,
+            means=means,
+            quaternions=quaternions,
+            log_scales=log_scales,
+            logit_opacities=logits,
+            lifespan=None,
+        )
+
+    def _dense(self) -> list[nn.Linear]:
+        """The hidden layers, then the heads."""
+        return [*self.layers, self.head_mean, self.head_quaternion, self.head_log_scale]  # pyright: ignore[reportReturnType]
+
 
 def _tensor(values: np.ndarray | float) -> Tensor:
     return torch.tensor(values, dtype=torch.float32)
 
 
-def _slope(keys: Float[Tensor, "a t 4"], times: list[float], k: int) -> Float[Tensor, "a 4"]:
+def _key_weights(times: list[float], t_s: float) -> list[float]:
+    """What each key frame contributes at ``t_s``: a spline is linear in its key frames."""
+    if len(times) < 2:
+        return [1.0] * len(times)
+    i = min(max(int(np.searchsorted(times, t_s, side="right")) - 1, 0), len(times) - 2)
+    step = times[i + 1] - times[i]
+    u = (t_s - times[i]) / step
+    start, end = np.eye(len(times))[i : i + 2]
+    slope, next_slope = (_slope_weights(times, k) * step for k in (i, i + 1))
+    if u < 0:
+        at = start + u * slope
+    elif u > 1:
+        at = end + (u - 1) * next_slope
+    else:
+        bend = 2 * (start - end) + slope + next_slope
+        at = start + u * (slope + u * (end - start - slope - bend + u * bend))
+    return at.tolist()
+
+
+def _slope_weights(times: list[float], k: int) -> Float[np.ndarray, " t"]:
     """Velocity at key frame ``k``, of the parabola through it and its neighbours; one-sided at the ends."""
+    keys = np.eye(len(times))
     before, after = min(k, len(times) - 2), max(k, 1)
-    ahead = (keys[:, before + 1] - keys[:, before]) / (times[before + 1] - times[before])
-    behind = (keys[:, after] - keys[:, after - 1]) / (times[after] - times[after - 1])
+    ahead = (keys[before + 1] - keys[before]) / (times[before + 1] - times[before])
+    behind = (keys[after] - keys[after - 1]) / (times[after] - times[after - 1])
     share = (times[after] - times[after - 1]) / (times[before + 1] - times[after - 1])
-    return torch.lerp(behind, ahead, share)
+    return behind + share * (ahead - behind)
 
 
 def _rotate(vectors: Tensor, axis: Tensor, angle_rad: Tensor) -> Tensor:

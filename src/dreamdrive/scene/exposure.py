@@ -1,11 +1,15 @@
 """Colour of the recording camera: one affine transform a frame."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
+
+from dreamdrive import _native
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,48 @@ class Exposure:
 def transform_colour(image: Float[Tensor, "h w 3"], affine: Float[Tensor, "3 4"]) -> Float[Tensor, "h w 3"]:
     """``A rgb + b`` for every pixel, with ``affine`` = [A | b]."""
     return image @ affine[:, :3].T + affine[:, 3]
+
+
+def recorded_picture(
+    colour: Float[Tensor, "h w 3"],
+    alpha: Float[Tensor, "h w"],
+    sky: Float[Tensor, "h w 3"],
+    affine: Float[Tensor, "3 4"],
+) -> Float[Tensor, "h w 3"]:
+    """What a camera records: ``transform_colour(colour + (1 - alpha) sky, affine)``, of float32 in one pass.
+
+    Args:
+        colour: Splatted colour without background.
+        alpha: Share of each pixel that it covers.
+        sky: What lies behind, without gradient.
+        affine: The exposure.
+
+    Raises:
+        ValueError: The sky requires a gradient.
+    """
+    if sky.requires_grad:
+        raise ValueError("sky: the recorded picture has no gradient for it; detach it")
+    return _RecordedPicture.apply(colour, alpha, sky, affine)  # pyright: ignore[reportReturnType]
+
+
+class _RecordedPicture(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, *inputs: Tensor) -> Tensor:
+        colour, alpha, sky, affine = (t.detach().contiguous() for t in inputs)
+        ctx.save_for_backward(colour, alpha, sky, affine)
+        picture = torch.empty_like(colour)
+        _native.over_sky(colour, alpha, sky, affine, picture)
+        return picture
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        colour, alpha, sky, affine = ctx.saved_tensors
+        d_colour, d_alpha, d_affine = (torch.empty_like(t) for t in (colour, alpha, affine))
+        _native.over_sky_backward(
+            colour, alpha, sky, affine, upstream[0].detach().contiguous(), d_colour, d_alpha, d_affine
+        )
+        return d_colour, d_alpha, None, d_affine
 
 
 class ExposureNetwork(nn.Module):

@@ -1,0 +1,5 @@
+// Bindings of the kernels of a training step.
+#pragma once
+#include <nanobind/nanobind.h>
+
+void bind_fit(nanobind::module_& m);

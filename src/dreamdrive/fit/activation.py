@@ -1,0 +1,106 @@
+"""From the parameters a fit learns to those splatting takes, for static and moved Gaussians together."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from dreamdrive import _native
+from dreamdrive.fit.parameters import Parameters
+from dreamdrive.scene.gaussians import Gaussians
+
+# Of one part, in the order of _Activated's arguments.
+_TENSORS = ("means", "unit_m", "offsets", "quaternions", "log_scales", "logit_opacities", "sh")
+
+
+@dataclass(frozen=True)
+class Activated:
+    """Gaussians as ``rasterize`` takes them.
+
+    Attributes:
+        means: Centres (N, 3) in metres.
+        quaternions: Rotations (N, 4), wxyz, of any length.
+        scales: Standard deviations (N, 3) in metres.
+        opacities: In [0, 1] (N,).
+        sh: Spherical-harmonic colour (N, K, 3).
+    """
+
+    means: Float[Tensor, "n 3"]
+    quaternions: Float[Tensor, "n 4"]
+    scales: Float[Tensor, "n 3"]
+    opacities: Float[Tensor, " n"]
+    sh: Float[Tensor, "n k 3"]
+
+
+def activate(static: Parameters | None, moved: Gaussians | None) -> Activated:
+    """Exponential of log-scales, sigmoid of logits, positions in metres: the static part, then the moved one.
+
+    Args:
+        static: Gaussians free of time, or None.
+        moved: Dynamic Gaussians as they are at the time, without life spans, or None.
+    """
+    tensors: list[Tensor | None] = []
+    if static is not None:
+        tensors += [static.anchors, *(getattr(static, name) for name in _TENSORS[1:])]
+    if moved is not None:
+        tensors += [getattr(moved, name, None) for name in _TENSORS]
+    return Activated(*_Activated.apply(*tensors))  # pyright: ignore[reportGeneralTypeIssues]
+
+
+def _parts(tensors: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+    return [tensors[k : k + len(_TENSORS)] for k in range(0, len(tensors), len(_TENSORS))]
+
+
+class _Activated(torch.autograd.Function):
+    """From the tensors of ``_TENSORS`` of one or two parts to those of ``Activated`` for all of them.
+
+    The means are ``means + unit_m * offsets``, of which only the offsets get a gradient, or as given.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, *tensors: Any) -> tuple[Tensor, ...]:
+        parts = _parts(tuple(None if t is None else t.detach().contiguous() for t in tensors))
+        counts, coefficients = [len(part[0]) for part in parts], parts[0][-1].shape[1]
+        tails = ((3,), (4,), (3,), (), (coefficients, 3))
+        means, quaternions, scales, opacities, sh = (torch.empty(sum(counts), *tail) for tail in tails)
+        start = 0
+        for (base, unit, offsets, q, log_scales, logits, colour), count in zip(parts, counts, strict=True):
+            _native.activate(
+                base, unit, offsets, q, log_scales, logits, colour, start,
+                means, quaternions, scales, opacities, sh,
+            )  # fmt: skip
+            start += count
+        ctx.counts, ctx.units = counts, [part[1] for part in parts]
+        ctx.save_for_backward(scales, opacities)
+        return means, quaternions, scales, opacities, sh
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        scales, opacities = ctx.saved_tensors
+        d_means, d_quaternions, d_scales, d_opacities, d_sh = (g.detach().contiguous() for g in upstream)
+        gradients: list[Tensor | None] = []
+        start = 0
+        for count, unit in zip(ctx.counts, ctx.units, strict=True):
+            rows = slice(start, start + count)
+            d_offsets = None if unit is None else torch.empty(count, 3)
+            d_log_scales, d_logits = torch.empty(count, 3), torch.empty(count)
+            _native.activate_backward(
+                unit,
+                start,
+                scales,
+                opacities,
+                d_means,
+                d_scales,
+                d_opacities,
+                d_offsets,
+                d_log_scales,
+                d_logits,
+            )
+            gradients += [d_means[rows] if unit is None else None, None, d_offsets]
+            gradients += [d_quaternions[rows], d_log_scales, d_logits, d_sh[rows]]
+            start += count
+        return tuple(gradients)

@@ -1,0 +1,61 @@
+"""Adam (Kingma and Ba 2015) for sets of Gaussians, on all threads."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from dreamdrive import _native
+
+BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-15
+
+
+@dataclass
+class Moments:
+    """What Adam remembers of one tensor.
+
+    Attributes:
+        mean: Running mean of the gradient, of the tensor's shape.
+        square: Running mean of its square.
+        steps: Steps taken.
+    """
+
+    mean: Tensor
+    square: Tensor
+    steps: int = 0
+
+    def changed(self, change: Callable[[Tensor], Tensor]) -> "Moments":
+        """The same after surgery on the rows."""
+        return Moments(change(self.mean), change(self.square), self.steps)
+
+
+@torch.no_grad()
+def adam_step(
+    leaves: Mapping[str, Tensor], moments: Mapping[str, Moments], rates: Mapping[str, Sequence[float]]
+) -> None:
+    """One step of ``torch.optim.Adam`` with betas and epsilon of 3DGS; then the gradients are forgotten.
+
+    Args:
+        leaves: Contiguous float32 tensors by name; those without a gradient stay as they are.
+        moments: Of each leaf, changed in place.
+        rates: Step sizes of each leaf, taken in turn by its numbers: one for all of them, or 3 K for the
+            coefficients of (N, K, 3).
+    """
+    moving = {name: leaf for name, leaf in leaves.items() if leaf.grad is not None}
+    for name in moving:
+        moments[name].steps += 1
+    _native.adam(
+        [leaf.detach() for leaf in moving.values()],
+        [leaf.grad.contiguous() for leaf in moving.values() if leaf.grad is not None],
+        [moments[name].mean for name in moving],
+        [moments[name].square for name in moving],
+        [list(rates[name]) for name in moving],
+        [moments[name].steps for name in moving],
+        BETA1,
+        BETA2,
+        EPSILON,
+    )
+    for leaf in moving.values():
+        torch.autograd.graph.increment_version(leaf)
+        leaf.grad = None
