@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from dreamdrive.data.street import Street, make_street
+from dreamdrive.data.world import Drive, make_street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
 
 
-def street_clip(street: Street, hold_out: int | None = None) -> Clip:
+def street_clip(street: Drive, hold_out: int | None = None) -> Clip:
     """The frames as a clip with known intrinsics and simple colour features."""
     count, height, width = street.frames.shape[:3]
     rig = street.cameras[0]
@@ -30,7 +30,7 @@ def street_clip(street: Street, hold_out: int | None = None) -> Clip:
     )
 
 
-def true_geometry(street: Street, evidence: bool = True) -> Geometry:
+def true_geometry(street: Drive, evidence: bool = True) -> Geometry:
     """Exact cameras, depth, sky and, unless switched off, moving evidence."""
     moving = street.moving.astype(np.float32)
     return Geometry(
@@ -47,7 +47,7 @@ def true_geometry(street: Street, evidence: bool = True) -> Geometry:
     )
 
 
-def small_street(**changes: object) -> Street:
+def small_street(**changes: object) -> Drive:
     """A quick street for tests."""
     settings: dict[str, object] = {"seed": 3, "frames": 8, "size": (96, 64), "movers": 1, "parked": 3}
     return make_street(**{**settings, **changes})  # type: ignore[arg-type]

@@ -80,7 +80,7 @@ def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
     expect(run, out, clip, "--hold-out", "64", message="withholds nothing")
     expect(run, out, clip, "--fps", "-3", message="--fps -3")
     expect(run, out, clip, "--camera-height", "0", message="--camera-height")
-    expect(run, out, clip, "--prior", "street-world", message="takes no path")
+    expect(run, out, clip, "--prior", "street-world", message="expected a layout as JSON")
 
 
 def test_frames_that_do_not_fit_together(run: Run, clip: Path, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def test_scores_tell_the_moving_car_from_the_street(fitted):
     truth = seeds.features[:, 0] >= 0.5
     assert ((scores >= 0) & (scores <= 1)).all()
     assert scores[truth].median() > 0.6
-    assert scores[~truth].quantile(0.9) < 0.35
+    assert scores[~truth].quantile(0.9) < 0.45  # groups decide at 0.5
 
 
 def test_errors_alone_rank_the_moving_car_above_the_street(fitted):

@@ -1,6 +1,5 @@
 """``dreamdrive generate``: from a recording to a scene and its videos."""
 
-import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,14 +8,16 @@ from tyro.conf import Positional, arg
 
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
 from dreamdrive.cli.progress import Bars
-from dreamdrive.errors import InputError
+from dreamdrive.cli.sizes import parse_size
 
 
 def generate(
     input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
-    prior: Annotated[Literal["replay", "street-world"], arg(metavar="NAME")] = "replay",
+    prior: Annotated[
+        Literal["replay", "street-world"] | None, arg(metavar="NAME", help_behavior_hint="")
+    ] = None,
     geometry: Annotated[Literal["classical"], arg(metavar="NAME")] = "classical",
     quality: Literal["draft", "standard", "high"] = "standard",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
@@ -36,12 +37,13 @@ def generate(
     ] = None,
     force: bool = False,
 ) -> None:
-    """Make a 4D scene and its videos from a recording.
+    """Make a 4D scene and its videos from a recording or a layout.
 
     Args:
-        input: A video or a folder of images; leave it out with --prior street-world.
+        input: A video, a folder of images or a layout as JSON; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
-        prior: replay takes the recording as it is; street-world draws a street of its own.
+        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
+            it the input decides.
         geometry: How cameras and depth are found.
         quality: How many steps the fits take.
         frames: Frames of the input to use, counted from 0.
@@ -79,7 +81,7 @@ def generate(
         made = run(
             control,
             out,
-            prior=prior,
+            prior=prior or ("street-world" if input is not None and input.suffix == ".json" else "replay"),
             geometry_method=geometry,
             geometry_files=geometry_files,
             quality=quality,
@@ -93,15 +95,3 @@ def generate(
         console.print(f"{out} is already finished; --from STAGE computes it again from a stage on")
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
         console.print(f"{what:<7} {out / name}", soft_wrap=True)
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """Width and height from ``480x270``.
-
-    Raises:
-        InputError: The text has another form.
-    """
-    match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
-    if match is None:
-        raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")
-    return int(match[1]), int(match[2])

@@ -1,12 +1,13 @@
-"""The prior that ships in the box: a drive through the procedural street."""
+"""The prior that ships in the box: a drive through a procedural street, drawn at random or given."""
 
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
 
+from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.select import Selection, held_out_mask
-from dreamdrive.data.street import Street, make_street
+from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.scene.clip import Clip, Known
@@ -21,20 +22,23 @@ SIZE = (320, 192)
 
 
 def street_world(control: Control, *, truth: bool = False) -> Clip:
-    """A clip of the procedural street that ``control.seed`` decides; Z_ref is ``features["appearance"]``.
+    """A clip of simulated frames; Z_ref is ``features["appearance"]``.
+
+    The street is that of the layout ``control.path``, or one that ``control.seed`` decides.
 
     Args:
-        control: Frames, rate, size, withheld frames and seed; no files.
+        control: Layout or seed, frames, rate, size, withheld frames; no other files.
         truth: Whether the exact poses, depth and sky are handed over. Without them the clip is what a
             calibrated dashcam would give, and the reconstruction has to find them.
 
     Raises:
-        InputError: A file is given, the size is odd, or the frames cannot be selected.
+        InputError: A file is given that it cannot use, the layout is wrong, the size is odd, or the frames
+            cannot be selected.
     """
-    for name in ("path", "intrinsics", "poses", "hfov_deg"):
+    for name in ("intrinsics", "poses", "hfov_deg"):
         if getattr(control, name) is not None:
             raise InputError(
-                f"the prior street-world draws its own street and takes no {name}; leave it out, "
+                f"the prior street-world draws its own frames and takes no {name}; leave it out, "
                 "or use --prior replay for a recording"
             )
     size = control.size or SIZE
@@ -44,13 +48,19 @@ def street_world(control: Control, *, truth: bool = False) -> Clip:
     if selection.stop is None:
         selection = replace(selection, stop=max(FRAMES, selection.start + FRAMES))
     wanted = list(selection.resolve(FRAMES if selection.needs_count else None, "the street"))
-    street = make_street(control.seed, wanted[-1] + 1, control.fps or RATE_HZ, size)
-    clip = _clip(street, np.array(wanted), truth)
+    count, fps = wanted[-1] + 1, control.fps or RATE_HZ
+    if control.path is None:
+        layout = draw_street(control.seed, StreetOptions(seconds=count / fps))
+        source = f"a procedural street, seed {control.seed}"
+    else:
+        layout = read_layout(control.path)
+        source = f"the layout {control.path.name}"
+    clip = _clip(drive(layout, count, fps, size), np.array(wanted), truth)
     provenance = {
         "prior": "street-world",
         "seed": control.seed,
         "notes": [
-            f"The input is the built-in procedural street, seed {control.seed}, handed over with "
+            f"The references are simulated: frames of {source}, handed over with "
             f"{'exact poses and depth' if truth else 'exact intrinsics only'}."
         ],
     }
@@ -59,19 +69,19 @@ def street_world(control: Control, *, truth: bool = False) -> Clip:
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
 
 
-def _clip(street: Street, index: np.ndarray, truth: bool) -> Clip:
-    """Some frames of a street; time 0 and the world are those of the first of them."""
-    first = street.cameras[index[0]]
+def _clip(made: Drive, index: np.ndarray, truth: bool) -> Clip:
+    """Some frames of a drive; time 0 and the world are those of the first of them."""
+    first = made.cameras[index[0]]
     known = Known(intrinsics=True)
     if truth:
-        poses = first.camera_from_world @ street.trajectory.world_from_camera[index]
+        poses = first.camera_from_world @ made.trajectory.world_from_camera[index]
         poses[0] = np.eye(4)
-        known = Known(poses, intrinsics=True, depth_m=street.depth_m[index], sky=street.sky[index])
-    frames = street.frames[index]
+        known = Known(poses, intrinsics=True, depth_m=made.depth_m[index], sky=made.sky[index])
+    frames = made.frames[index]
     nothing: Bool[np.ndarray, " f"] = np.zeros(len(index), dtype=bool)
     return Clip(
         frames=frames,
-        times_s=street.times_s[index] - street.times_s[index[0]],
+        times_s=made.times_s[index] - made.times_s[index[0]],
         camera=np.zeros(len(index), dtype=np.int64),
         rig=(first.at(np.eye(4)),),
         valid=np.ones(frames.shape[:3], dtype=bool),

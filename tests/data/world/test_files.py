@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from dreamdrive.data import read_clip
-from dreamdrive.data.street import Street, make_street
-from dreamdrive.data.street_files import write_world
+from dreamdrive.data.world import Drive, make_street
+from dreamdrive.data.world.files import write_world
 from dreamdrive.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def street() -> Street:
+def street() -> Drive:
     return make_street(1, 4, size=(64, 48))
 
 
-def test_a_world_folder_is_read_back_as_a_clip(street: Street, tmp_path: Path) -> None:
-    write_world(street, tmp_path / "w")
+def test_a_world_folder_is_read_back_as_a_clip(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "w")
     clip = read_clip(
         tmp_path / "w" / "frames",
         intrinsics=tmp_path / "w" / "meta.json",
@@ -31,8 +31,8 @@ def test_a_world_folder_is_read_back_as_a_clip(street: Street, tmp_path: Path) -
     np.testing.assert_allclose(clip.known.world_from_camera, street.trajectory.world_from_camera, atol=1e-9)
 
 
-def test_depth_labels_and_boxes_are_all_there(street: Street, tmp_path: Path) -> None:
-    write_world(street, tmp_path / "w")
+def test_depth_labels_and_boxes_are_all_there(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "w")
     with np.load(tmp_path / "w" / "depth.npz") as stored:
         assert (stored["depth_m"] == street.depth_m).all()
     label = cv2.imread(str(tmp_path / "w" / "instances" / "0002.png"), cv2.IMREAD_UNCHANGED)
@@ -41,11 +41,11 @@ def test_depth_labels_and_boxes_are_all_there(street: Street, tmp_path: Path) ->
     assert [b["moving"] for b in boxes] == [b.moving for b in street.boxes]
 
 
-def test_writing_twice_gives_equal_bytes_and_replaces_only_when_told(street: Street, tmp_path: Path) -> None:
-    write_world(street, tmp_path / "a")
-    write_world(street, tmp_path / "b")
+def test_writing_twice_gives_equal_bytes_and_replaces_only_when_told(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "a")
+    write_world({"front": street}, tmp_path / "b")
     for path in sorted((tmp_path / "a").rglob("*.*")):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
     with pytest.raises(InputError, match="exists already"):
-        write_world(street, tmp_path / "a")
-    write_world(street, tmp_path / "a", replace=True)
+        write_world({"front": street}, tmp_path / "a")
+    write_world({"front": street}, tmp_path / "a", replace=True)

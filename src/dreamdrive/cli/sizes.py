@@ -1,0 +1,17 @@
+"""Sizes of pictures on the command line."""
+
+import re
+
+from dreamdrive.errors import InputError
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height from ``480x270``.
+
+    Raises:
+        InputError: The text has another form.
+    """
+    match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
+    if match is None:
+        raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")
+    return int(match[1]), int(match[2])

@@ -1,0 +1,85 @@
+"""``dreamdrive world``: streets with exact truth."""
+
+import time
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from rich.console import Console
+from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Suppress, arg, subcommand
+
+from dreamdrive.cli.machine import use_all_cores
+from dreamdrive.cli.progress import Bars
+from dreamdrive.cli.sizes import parse_size
+from dreamdrive.errors import InputError
+
+
+def make(
+    *,
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    layout: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    frames: Annotated[int, arg(metavar="N")] = 24,
+    fps: Annotated[float, arg(metavar="F")] = 10.0,
+    size: Annotated[str, arg(metavar="WxH")] = "320x192",
+    cameras: Literal["front", "surround"] = "front",
+    one_ray: bool = False,
+    force: bool = False,
+) -> None:
+    """Draw a street, drive through it, and write frames with all truth.
+
+    Args:
+        out: Folder to write.
+        seed: Decides the street.
+        layout: Draw this street instead, see docs/layout.md.
+        frames: Number of frames.
+        fps: Frames a second.
+        size: Size of the frames.
+        cameras: front is one camera; surround six, each in a folder of its own.
+        one_ray: One ray a pixel, twice as fast, with rough edges.
+        force: Replace a world that is there already.
+    """
+    use_all_cores()
+    from dreamdrive.data.layout_file import read_layout
+    from dreamdrive.data.world import MOUNTS, StreetOptions, World, draw_street, drive
+    from dreamdrive.data.world.files import write_world
+
+    wanted = parse_size(size)
+    if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(wanted) < 16:
+        raise InputError(
+            f"--frames {frames} --fps {fps:g} --seed {seed} --size {size}: expected at least one frame, a "
+            "positive rate, a seed of 0 or more and at least 16x16 pixels"
+        )
+    street = draw_street(seed, StreetOptions(seconds=frames / fps)) if layout is None else read_layout(layout)
+    world = World(street)
+    console = Console()
+    start = time.perf_counter()
+    with Bars(console) as bars:
+        drives = {
+            mount: drive(
+                street,
+                frames,
+                fps,
+                wanted,
+                world=world,
+                mount=mount,
+                antialiased=not one_ray,
+                progress=lambda done, total, name=mount: bars(name, done, total),
+            )
+            for mount in (MOUNTS if cameras == "surround" else MOUNTS[:1])
+        }
+    seconds = time.perf_counter() - start
+    write_world(drives, out, replace=force)
+    count = frames * len(drives)
+    console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s", soft_wrap=True)
+
+
+# As tyro does for the commands themselves; a union needs a second member where there is one command only.
+_World = Annotated[Any, subcommand("make", constructor=make)] | Annotated[None, Suppress]
+
+
+def world(what: Annotated[_World, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]
+    """Streets with exact truth.
+
+    Args:
+        what: What to do.
+    """

@@ -1,0 +1,186 @@
+"""M_ctrl of the paper: what a map-conditioned prior is told. A map, boxes on tracks and the path of the car.
+
+Map frame: x east, y north, z up with the road at 0, in metres; angles in radians, counted from x towards y.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+from msgspec import Meta
+from scipy.interpolate import CubicSpline
+
+Positive = Annotated[float, Meta(gt=0)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+Look = Annotated[int, Meta(ge=0, description="Appearance: equal numbers of one kind look the same.")]
+Point = Annotated[tuple[float, float], Meta(description="x and y in metres.")]
+Ring = Annotated[list[Point], Meta(min_length=3, description="Corners of a polygon, not repeated.")]
+
+AreaKind = Literal["road", "sidewalk", "crossing", "parking", "grass"]
+LineKind = Literal["lane_divider", "road_divider", "road_edge", "stop_line"]
+BoxKind = Literal["car", "van", "truck", "bicycle", "pedestrian"]
+PropKind = Literal["tree", "lamp", "sign"]
+
+FORMAT = 1
+
+
+class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What all parts of a layout have in common."""
+
+
+class Area(_Part, frozen=True):
+    """A polygon of the map.
+
+    Attributes:
+        kind: What covers it; later areas lie on earlier ones.
+        polygon: Its outline.
+        holes: Outlines of what is left out.
+    """
+
+    kind: AreaKind
+    polygon: Ring
+    holes: list[Ring] = []
+
+
+class Line(_Part, frozen=True):
+    """A painted line of the map."""
+
+    kind: LineKind
+    points: Annotated[list[Point], Meta(min_length=2)]
+
+
+class TrackPoint(_Part, frozen=True):
+    """Where something is at a time: the middle of its footprint and its heading."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+Track = Annotated[list[TrackPoint], Meta(min_length=1, description="In the order of time.")]
+
+
+class Box(_Part, frozen=True):
+    """A road user, standing on the ground.
+
+    Attributes:
+        id: Its name, unique in the layout.
+        kind: What it is.
+        size_m: Length, width and height.
+        track: Its path; a single point stands still.
+        look: Its appearance.
+    """
+
+    id: str
+    kind: BoxKind
+    size_m: tuple[Positive, Positive, Positive]
+    track: Track
+    look: Look = 0
+
+
+class Building(_Part, frozen=True):
+    """A house with upright walls."""
+
+    polygon: Ring
+    height_m: Positive
+    look: Look = 0
+
+
+class Prop(_Part, frozen=True):
+    """Something upright beside the road; ``yaw_rad`` is where a lamp's arm or a sign points."""
+
+    kind: PropKind
+    at_m: Point
+    height_m: Positive
+    yaw_rad: float = 0.0
+    look: Look = 0
+
+
+class Light(_Part, frozen=True):
+    """Weather and camera.
+
+    Attributes:
+        sun_azimuth_rad: Where the sun stands.
+        sun_elevation_rad: How high.
+        sun: Share of the light that comes straight from it; the rest comes from the sky.
+        haze_per_m: Light lost along each metre of sight.
+        clouds: Share of the sky.
+        exposure_drift: Largest relative change of brightness over the drive.
+    """
+
+    sun_azimuth_rad: float = 0.9
+    sun_elevation_rad: Annotated[float, Meta(gt=0, le=1.5708)] = 0.8
+    sun: Share = 0.6
+    haze_per_m: Annotated[float, Meta(ge=0)] = 0.002
+    clouds: Share = 0.4
+    exposure_drift: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+
+
+class Ego(_Part, frozen=True):
+    """The recording car.
+
+    Attributes:
+        track: Path of the front camera over the ground.
+        camera_height_m: Its height.
+        shake_rad: Amplitude of its nod and roll.
+    """
+
+    track: Track
+    camera_height_m: Positive = 1.5
+    shake_rad: Annotated[float, Meta(ge=0, lt=0.2)] = 0.0
+
+
+class Layout(_Part, frozen=True):
+    """A street to be drawn.
+
+    Attributes:
+        ego: The recording car.
+        areas: What covers the ground; grass elsewhere.
+        lines: Paint on it.
+        boxes: Road users.
+        buildings: Houses.
+        props: Trees, lamps, signs.
+        light: Weather.
+        seed: Decides what nothing above decides, such as the grain of the asphalt.
+        format: Version of this description.
+    """
+
+    ego: Ego
+    areas: list[Area] = []
+    lines: list[Line] = []
+    boxes: list[Box] = []
+    buildings: list[Building] = []
+    props: list[Prop] = []
+    light: Light = Light()
+    seed: Annotated[int, Meta(ge=0)] = 0
+    format: Literal[1] = FORMAT
+
+
+def track_function(track: list[TrackPoint]) -> Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, "t 3"]]:
+    """From times (T,) to x, y in metres and yaw in radians (T, 3): a cubic spline through the points.
+
+    Before the first and after the last point the velocity there continues.
+    """
+    values = np.array([[p.x_m, p.y_m, p.yaw_rad] for p in track], dtype=np.float64)
+    if len(track) == 1:
+        return lambda times_s: np.repeat(values, len(times_s), axis=0)
+    values[:, 2] = np.unwrap(values[:, 2])
+    knots = np.array([p.t_s for p in track])
+    spline = CubicSpline(knots, values, bc_type="natural")
+    velocity = spline.derivative()
+
+    def poses(times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t 3"]:
+        inside = np.clip(times_s, knots[0], knots[-1])
+        return spline(inside) + velocity(inside) * (times_s - inside)[:, None]
+
+    return poses
+
+
+def is_moving(track: list[TrackPoint]) -> bool:
+    """Whether a track leads anywhere: by more than 5 cm or 3 degrees."""
+    values = np.array([[p.x_m, p.y_m, p.yaw_rad] for p in track])
+    spread = np.ptp(values, axis=0)
+    return bool(np.hypot(*spread[:2]) > 0.05 or spread[2] > 0.05)
