@@ -108,7 +108,7 @@ def evaluate_consistency(
     error = None if path is None or asked is None else compare_paths(path.world_from_camera, _poses(asked))
     camera, poses, whose = _lines(clip, path, asked)
     gaps = tuple(_gap(clip, seen, found, camera, poses, gap) for gap in GAPS)
-    notes = tuple(_notes(clip, path, asked))
+    notes = tuple(_notes(clip, path, asked, whose))
     method = None if path is None else path.method
     return Consistency(len(clip), clip.size[0], error, method, whose, gaps, notes)
 
@@ -182,7 +182,9 @@ def _gap(
     return GapFigures(gap, lines, warp_error(clip, gap))
 
 
-def _notes(clip: Clip, path: Recovered | None, asked: Trajectory | None) -> list[str]:
+def _notes(
+    clip: Clip, path: Recovered | None, asked: Trajectory | None, whose: Literal["asked", "found"] | None
+) -> list[str]:
     notes: list[str] = []
     if not clip.known.intrinsics:
         notes.append("The focal length is not calibrated: where it is wrong, turns are measured wrongly.")
@@ -194,6 +196,8 @@ def _notes(clip: Clip, path: Recovered | None, asked: Trajectory | None) -> list
         notes.append("The camera of the video stands still.")
     if asked is not None and asked.length_m == 0:
         notes.append("The path asked for stands still: errors over its length have no meaning.")
+    if whose == "found":
+        notes.append("No path was asked for: the epipolar lines are those of the path found in the video.")
     missing = [str(gap) for gap in GAPS if gap >= len(clip)]
     if missing:
         notes.append(f"{len(clip)} frames are too few for pairs {' and '.join(missing)} frames apart.")

@@ -14,6 +14,7 @@ from dreamdrive.geometry.classical.evidence import Evidence
 from dreamdrive.geometry.classical.features import Features
 from dreamdrive.geometry.classical.focal import settle
 from dreamdrive.geometry.classical.paths import fill
+from dreamdrive.geometry.classical.poses import MIN_TRACKS
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 
@@ -57,6 +58,8 @@ def recover(
         The path, or None where the frames show none.
     """
     camera = clip.rig[0]
+    if seen.motion.tracks < MIN_TRACKS:
+        return None
     if seen.motion.standing:
         return Recovered(np.tile(np.eye(4), (len(clip), 1, 1)), camera, "standing")
     mapped = _mapped(clip, seen, found, seed)
