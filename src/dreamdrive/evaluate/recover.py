@@ -44,8 +44,8 @@ def recover(
     """Find the path of a clip.
 
     Structure from motion counts here even where ``geometry.reconstruct`` refuses it as too coarse to build a
-    scene on: its residual is what inconsistent frames look like, and on the built-in street corrupted by
-    ``generated`` its path is still 1.5 times as near to the truth (RPE 1.9 %) as that of odometry (3.0 %).
+    scene on: its residual is what inconsistent frames look like. On two built-in streets (320x192, 24 frames)
+    its path ends 0.2 % of a stretch off, that of odometry 0.8 %; corrupted by ``generated``, 1.9 and 3.0 %.
 
     Args:
         clip: Frames of one camera.

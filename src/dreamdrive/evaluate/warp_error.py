@@ -34,10 +34,10 @@ def warp_error(clip: Clip, gap: int) -> WarpError:
     """Carry each frame i + ``gap`` onto frame i by optical flow (DIS, medium) and compare their colours.
 
     The figure of Lai et al. 2018 with absolute in place of squared differences. Over several frames the flow
-    from frame to frame is strung together and refined: flow from nothing is lost on a drive 8 frames long,
-    where it left 12 grey levels on the built-in street (320x192) and this leaves 5, against 9 and more when
-    corrupted. Only pixels count whose flow comes back to within half a pixel; what is hidden in one of the
-    frames, or cannot be followed, is left out.
+    from frame to frame is strung together and refined: flow from nothing loses its way on a drive. On the
+    built-in street (320x192, seed 1) it left 13.9 grey levels over 8 frames, and 15.4 once corrupted by
+    ``generated``, where this leaves 7.4 and 10.0. Only pixels count whose flow comes back to within half a
+    pixel; what is hidden in one of the frames, or cannot be followed, is left out.
 
     Args:
         clip: Frames, and where they hold a picture.
