@@ -19,8 +19,13 @@ def carried(points: Float[np.ndarray, "m 2"], flow: Float[np.ndarray, "h w 2"]) 
     return points + flow[row, column]
 
 
-def neighbour_flow(clip: Clip, frame: int, other: int) -> Float[np.ndarray, "h w 2"]:
-    """Where each pixel of ``frame`` lies in ``other``, minus where it is, in pixels (DIS, medium preset)."""
+def neighbour_flow(
+    clip: Clip, frame: int, other: int, start: Float[np.ndarray, "h w 2"] | None = None
+) -> Float[np.ndarray, "h w 2"]:
+    """Where each pixel of ``frame`` lies in ``other``, minus where it is, in pixels (DIS, medium preset).
+
+    The search goes out from ``start``, or from no motion.
+    """
     method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    start = np.zeros((*clip.frames.shape[1:3], 2), np.float32)
-    return np.asarray(method.calc(grey(clip.frames[frame]), grey(clip.frames[other]), start))
+    guess = np.zeros((*clip.frames.shape[1:3], 2), np.float32) if start is None else start.copy()
+    return np.asarray(method.calc(grey(clip.frames[frame]), grey(clip.frames[other]), guess))

@@ -1,0 +1,81 @@
+"""``dreamdrive evaluate consistency``: whether a video keeps to its path and shows one and the same world."""
+
+import json as json_format
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import Positional, arg
+
+if TYPE_CHECKING:
+    from dreamdrive.evaluate.consistency import Consistency
+
+
+def consistency(
+    video: Annotated[Positional[Path], arg(metavar="VIDEO")],
+    *,
+    trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
+    fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+) -> None:
+    """Measure how precisely a video follows a path and how well its frames agree.
+
+    Args:
+        video: A video or a folder of images; frames wider than 480 pixels are scaled down to that.
+        trajectory: The path that the video was asked to follow, one pose a frame: JSON or TUM.
+        intrinsics: Calibration of the camera as JSON, for the size of the video.
+        hfov: Horizontal field of view, where there is no calibration; it counts as known.
+        fps: Rate of the frames, where the video does not tell it rightly.
+        json: Write the figures to this file as well.
+    """
+    from dreamdrive.data import read_clip, read_trajectory
+    from dreamdrive.evaluate.consistency import evaluate_consistency
+
+    asked = None if trajectory is None else read_trajectory(trajectory)
+    clip = read_clip(video, fps=fps, intrinsics=intrinsics, hfov_deg=hfov)
+    known = clip.known.intrinsics or hfov is not None
+    console = Console()
+    with console.status("looking for the path and following the pixels"):
+        figures = evaluate_consistency(
+            clip.frames, clip.times_s, clip.rig[0], asked, calibrated=known, valid=clip.valid
+        )
+    console.print(_table(figures))
+    for note in figures.notes:
+        console.print(note, soft_wrap=True, highlight=False)
+    if json is not None:
+        _write(json, figures)
+        console.print(f"{json}", soft_wrap=True)
+
+
+def _table(figures: "Consistency") -> Table:
+    """The figures with their units, one a row; a dash for what was not measured."""
+    table = Table("figure", "value", "unit", title=f"{figures.frames} frames, {figures.width_px} px wide")
+    table.columns[1].justify = "right"
+    path = figures.path
+    table.add_row("path: distance (ATE)", _number(path and path.ate_percent, 2), "% of the path")
+    table.add_row("path: translation (RPE)", _number(path and path.translation_percent, 2), "% of a stretch")
+    table.add_row("path: rotation (RPE)", _number(path and path.rotation_deg_per_m, 4), "deg/m")
+    for at in figures.gaps:
+        share = at.epipolar and at.epipolar.share
+        within = f"% of {at.epipolar.matches} matches" if at.epipolar else "% of matches"
+        table.add_row(f"epipolar within 2 px, {at.gap} apart", _number(share, 1, 100), within)
+    for at in figures.gaps:
+        level = at.warp and at.warp.grey_levels
+        on = f"grey levels on {100 * at.warp.share:.0f} % of pixels" if at.warp else "grey levels"
+        table.add_row(f"warp error, {at.gap} apart", _number(level, 2), on)
+    return table
+
+
+def _number(value: float | None, digits: int, factor: float = 1.0) -> str:
+    return "-" if value is None else f"{value * factor:.{digits}f}"
+
+
+def _write(path: Path, figures: "Consistency") -> None:
+    from dreamdrive.scene.atomic import new_file
+
+    text = json_format.dumps(figures.to_json(), indent=1, allow_nan=False) + "\n"
+    with new_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
