@@ -8,8 +8,8 @@ import pytest
 
 from dreamdrive.cli.evaluate_consistency import consistency
 from dreamdrive.data import read_trajectory, write_trajectory
-from dreamdrive.data.street import make_street
-from dreamdrive.data.street_files import write_world
+from dreamdrive.data.world import make_street
+from dreamdrive.data.world.files import write_world
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -17,7 +17,7 @@ from dreamdrive.scene.trajectory import Trajectory
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("world") / "street"
-    write_world(make_street(seed=1, frames=5, size=(160, 96)), folder)
+    write_world({"front": make_street(seed=1, frames=5, size=(160, 96))}, folder)
     return folder
 
 

@@ -10,12 +10,12 @@ from dreamdrive.data.corruption import Corruption, corrupt, parse_corruption
 from dreamdrive.data.corruption.noise import Noise
 from dreamdrive.data.corruption.settings import STRENGTHS
 from dreamdrive.data.corruption.shapes import slide, wobble
-from dreamdrive.data.street import Street, make_street
+from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def street() -> Street:
+def street() -> Drive:
     return make_street(seed=2, frames=6, size=(160, 96))
 
 
@@ -23,7 +23,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def change(street: Street, corruption: Corruption) -> np.ndarray:
+def change(street: Drive, corruption: Corruption) -> np.ndarray:
     corrupted = corrupt(street.frames, corruption, street.depth_m)
     return corrupted.astype(np.float64) - street.frames
 
@@ -36,7 +36,7 @@ def displacement_px(clean: np.ndarray, corrupted: np.ndarray) -> np.ndarray:
     return np.linalg.norm(method.calc(*grey, start), axis=-1)
 
 
-def test_off_leaves_every_bit(street: Street) -> None:
+def test_off_leaves_every_bit(street: Drive) -> None:
     corrupted = corrupt(street.frames, Corruption(seed=5))
     np.testing.assert_array_equal(corrupted, street.frames)
     corrupted[:] = 0
@@ -44,28 +44,28 @@ def test_off_leaves_every_bit(street: Street) -> None:
 
 
 @pytest.mark.parametrize("name", STRENGTHS)
-def test_each_is_a_function_of_the_seed(street: Street, name: str) -> None:
+def test_each_is_a_function_of_the_seed(street: Drive, name: str) -> None:
     corruption = Corruption(**{name: 0.5}, seed=1)
     first = corrupt(street.frames, corruption, street.depth_m)
     np.testing.assert_array_equal(first, corrupt(street.frames, corruption, street.depth_m))
     assert (first != corrupt(street.frames, replace(corruption, seed=2), street.depth_m)).any()
 
 
-def test_a_longer_clip_begins_with_the_same_frames(street: Street) -> None:
+def test_a_longer_clip_begins_with_the_same_frames(street: Drive) -> None:
     corruption = parse_corruption("generated", seed=3)
     whole = corrupt(street.frames, corruption, street.depth_m)
     np.testing.assert_array_equal(corrupt(street.frames[:4], corruption, street.depth_m[:4]), whole[:4])
 
 
 @pytest.mark.parametrize("name", STRENGTHS)
-def test_more_strength_changes_more(street: Street, name: str) -> None:
+def test_more_strength_changes_more(street: Drive, name: str) -> None:
     sizes = [rms(change(street, Corruption(**{name: s}))) for s in (0.0, 0.25, 0.5, 1.0)]
     assert sizes[0] == 0
     assert (np.diff(sizes) > 0.15).all(), sizes
 
 
 @pytest.mark.parametrize("name", ["warp", "far"])
-def test_more_strength_moves_pixels_farther(street: Street, name: str) -> None:
+def test_more_strength_moves_pixels_farther(street: Drive, name: str) -> None:
     moved = [
         displacement_px(
             street.frames[2],
@@ -97,13 +97,13 @@ def test_the_far_slides_and_the_near_stays() -> None:
     assert sky == pytest.approx(4.4 / 2, rel=0.15)
 
 
-def test_far_leaves_the_near_road_alone(street: Street) -> None:
+def test_far_leaves_the_near_road_alone(street: Drive) -> None:
     difference = np.abs(change(street, Corruption(far=1.0))).mean(axis=-1)
     near = (street.depth_m > 0) & (street.depth_m < 6)
     assert difference[near].mean() < 0.25 * difference[~near].mean()
 
 
-def test_flicker_moves_the_mean_of_frames_and_drift_does_so_slowly(street: Street) -> None:
+def test_flicker_moves_the_mean_of_frames_and_drift_does_so_slowly(street: Drive) -> None:
     flicker = change(street, Corruption(flicker=1.0)).mean(axis=(1, 2, 3))
     drift = change(street, Corruption(drift=1.0)).mean(axis=(1, 2, 3))
     assert rms(np.diff(flicker)) > 2
@@ -166,6 +166,6 @@ def test_a_negative_seed_is_refused() -> None:
         Corruption(seed=-1)
 
 
-def test_far_without_depth_is_refused(street: Street) -> None:
+def test_far_without_depth_is_refused(street: Drive) -> None:
     with pytest.raises(InputError, match="add far=0"):
         corrupt(street.frames, parse_corruption("generated"))

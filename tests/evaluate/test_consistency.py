@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.data.corruption import Corruption, corrupt, parse_corruption
-from dreamdrive.data.street import Street, make_street
+from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.consistency import GAPS, Consistency, evaluate_consistency
 from dreamdrive.scene.trajectory import Trajectory
 
 
-def evaluate(street: Street, frames: np.ndarray, asked: Trajectory | None, **options: object) -> Consistency:
+def evaluate(street: Drive, frames: np.ndarray, asked: Trajectory | None, **options: object) -> Consistency:
     times_s = street.times_s[: len(frames)]
     return evaluate_consistency(frames, times_s, street.cameras[0], asked, **options)  # type: ignore[arg-type]
 
@@ -34,12 +34,12 @@ def worse(bad: Consistency, good: Consistency) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def street() -> Street:
+def street() -> Drive:
     return make_street(seed=1, frames=10, size=(160, 96))
 
 
 @pytest.fixture(scope="module")
-def clean(street: Street) -> Consistency:
+def clean(street: Drive) -> Consistency:
     return evaluate(street, street.frames, street.trajectory, moving=street.moving)
 
 
@@ -51,10 +51,14 @@ def test_the_truth_scores_well(clean: Consistency) -> None:
     assert clean.path.translation_percent < 0.6
     assert clean.path.rotation_deg_per_m < 0.02
     assert [gap.gap for gap in clean.gaps] == list(GAPS)
-    assert all(gap.epipolar is not None and gap.epipolar.share > 0.88 for gap in clean.gaps)  # type: ignore[operator]
+    # Rows of equal windows are taken for one another, the more so the further apart the frames.
+    for gap, least in zip(clean.gaps, (0.95, 0.9, 0.75), strict=True):
+        assert gap.epipolar is not None
+        assert gap.epipolar.share is not None
+        assert gap.epipolar.share > least
 
 
-def test_a_corrupted_video_scores_worse_on_every_figure(street: Street, clean: Consistency) -> None:
+def test_a_corrupted_video_scores_worse_on_every_figure(street: Drive, clean: Consistency) -> None:
     frames = corrupt(street.frames, Corruption(1, 1, 1, 1, 1), street.depth_m)
     assert worse(evaluate(street, frames, street.trajectory, moving=street.moving), clean) == []
 
@@ -68,13 +72,13 @@ def test_the_preset_scores_worse_on_every_figure() -> None:
     assert worse(bad, clean) == []
 
 
-def test_the_same_frames_give_the_same_figures(street: Street) -> None:
+def test_the_same_frames_give_the_same_figures(street: Drive) -> None:
     first, second = (evaluate(street, street.frames[:4], None) for _ in range(2))
     assert first == second
     assert first.found_by == "structure from motion"
 
 
-def test_a_wrong_path_is_measured_at_its_size(street: Street, clean: Consistency) -> None:
+def test_a_wrong_path_is_measured_at_its_size(street: Drive, clean: Consistency) -> None:
     poses, travelled = street.trajectory.world_from_camera.copy(), [0.0]
     travelled += np.cumsum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)).tolist()
     turns = Rotation.from_euler("y", 0.4 * np.array(travelled)[:, None], degrees=True).as_matrix()
@@ -90,7 +94,7 @@ def test_a_wrong_path_is_measured_at_its_size(street: Street, clean: Consistency
         assert one.epipolar.share < two.epipolar.share - 0.05  # type: ignore[union-attr, operator]
 
 
-def test_a_video_that_stands_misses_the_whole_path(street: Street) -> None:
+def test_a_video_that_stands_misses_the_whole_path(street: Drive) -> None:
     frames = np.repeat(street.frames[:1], 10, axis=0)
     found = evaluate(street, frames, street.trajectory)
     assert found.found_by == "standing"
@@ -99,7 +103,7 @@ def test_a_video_that_stands_misses_the_whole_path(street: Street) -> None:
     assert all(gap.warp is not None and gap.warp.grey_levels == 0 for gap in found.gaps)
 
 
-def test_few_frames_leave_out_what_they_cannot_show(street: Street) -> None:
+def test_few_frames_leave_out_what_they_cannot_show(street: Drive) -> None:
     cut = Trajectory(street.trajectory.world_from_camera[:3], street.times_s[:3])
     found = evaluate(street, street.frames[:3], cut)
     assert [gap.warp is None for gap in found.gaps] == [False, True, True]
@@ -109,7 +113,7 @@ def test_few_frames_leave_out_what_they_cannot_show(street: Street) -> None:
     assert json.loads(text)["gaps"][2] == {"gap": 8, "epipolar": None, "warp": None}
 
 
-def test_without_a_path_the_lines_are_those_found(street: Street) -> None:
+def test_without_a_path_the_lines_are_those_found(street: Drive) -> None:
     found = evaluate(street, street.frames[:6], None)
     assert found.path is None
     assert found.lines_from == "found"
@@ -118,7 +122,7 @@ def test_without_a_path_the_lines_are_those_found(street: Street) -> None:
     assert any("No path was asked for" in note for note in found.notes)
 
 
-def test_blank_frames_show_no_path(street: Street) -> None:
+def test_blank_frames_show_no_path(street: Drive) -> None:
     frames = np.full_like(street.frames, 90)
     found = evaluate(street, frames, street.trajectory)
     assert found.path is None
@@ -128,7 +132,7 @@ def test_blank_frames_show_no_path(street: Street) -> None:
     assert any("too little to follow" in note for note in found.notes)
 
 
-def test_what_cannot_be_measured_is_refused(street: Street) -> None:
+def test_what_cannot_be_measured_is_refused(street: Drive) -> None:
     with pytest.raises(InputError, match="got 1 frames; expected at least two"):
         evaluate(street, street.frames[:1], None)
     with pytest.raises(InputError, match="has 10 poses but the video has 6 frames"):
