@@ -28,7 +28,7 @@ def generate(
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    representation: Literal["static", "deformable", "hybrid"] = "hybrid",
+    representation: Literal["static", "deformable", "hexplane", "vibration", "hybrid"] = "hybrid",
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
