@@ -17,8 +17,8 @@ from dreamdrive.scene.vibration import Vibration, VibrationConfig
 MotionConfig = DeformationConfig | HexPlaneConfig | VibrationConfig
 """Its type says which representation is fitted."""
 
-# Share of the Gaussians that lie beyond each side of a hexplane's box: a few are at the far end of the street,
-# and nodes that reach out to them are missing nearby.
+# Share of the Gaussians beyond each side of a hexplane's box: a few are at the far end of the street, and
+# nodes that reach out to them are missing nearby.
 OUTSIDE = 0.01
 
 

@@ -45,8 +45,8 @@ class FitOptions:
         shape_ratio: Elongation that is free.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
-        plane_rate: Adam's step for feature planes, decayed to a tenth (4D-GS, S3Gaussian: ten times that of the
-            network); they wait for ``warm_up`` too.
+        plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times that of
+            the network, as in 4D-GS and S3Gaussian.
         track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth.
         exposure_rate: Adam's step for the exposure network.
     """

@@ -5,6 +5,7 @@ and what it moves those of S3Gaussian (Huang et al. 2024), which extends 4D-GS (
 """
 
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 import torch
@@ -26,8 +27,8 @@ class HexPlaneConfig:
         width: Units of the decoder's layers (S3Gaussian and 4D-GS: 64).
         features: Channels of each plane (4D-GS on DyNeRF: 16; S3Gaussian: 32).
         resolution: Nodes along each axis of space of the coarsest level (both: 64).
-        levels: Levels, each twice as fine in space as the one before, all alike in time (4D-GS: 2; S3Gaussian:
-            4, whose finest level alone has 25 million numbers).
+        levels: Levels, each twice as fine in space as the one before, all alike in time (4D-GS: 2; S3Gaussian
+            4, the finest of which alone has 25 million numbers).
         times: Nodes along time; a fit puts half the number of frames (4D-GS's advice; S3Gaussian: 25 for 50).
         coefficients: Spherical-harmonic coefficients a channel of the Gaussians; a fit puts theirs.
         plane_weight: Weight of the total variation of the planes without time (both: 1e-4).
@@ -128,8 +129,9 @@ class HexPlaneField(Motion):
         lines = torch.stack([place.T, torch.zeros_like(place.T)], dim=-1)
         levels: list[Tensor] = []
         for space, time in zip(self.space, self.time, strict=True):
-            both = torch.cat([_sample(space, pairs), _sample(self._slice(time, t_s), lines)])
-            levels.append(both.prod(0))
+            six = (*_sample(space, pairs), *_sample(self._slice(time, t_s), lines))
+            # The gradient of prod() asks each factor whether it is 0, which takes longer than all products.
+            levels.append(reduce(torch.mul, six))
         return torch.cat(levels).T
 
     def _slice(self, planes: Float[Tensor, "3 c t r"], t_s: float) -> Float[Tensor, "3 c 1 r"]:
@@ -141,11 +143,13 @@ class HexPlaneField(Motion):
         return torch.lerp(planes[:, :, before], planes[:, :, before + 1], node - before)[:, :, None]
 
     def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
-        """The Gaussians as they are at ``t_s``: moved and recoloured; differentiable.
+        """The Gaussians as they are at ``t_s``: moved and recoloured, their life spans untouched.
 
         Raises:
             ValueError: They have another number of colour coefficients than the field.
         """
+        if len(gaussians) == 0:
+            return gaussians
         if gaussians.sh.shape[1] != self.config.coefficients:
             raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
         hidden = self.trunk(self.features(gaussians.means, t_s))

@@ -46,8 +46,7 @@ class Vibration(Motion):
     """Each Gaussian swings through its place with a velocity of its own, at the time it is seen best.
 
     With velocity v, life peak tau and life span beta of its own, and the length l of a cycle that all share,
-    mean(t) = mean + l / (2 pi) sin(2 pi (t - tau) / l) v and opacity(t) = opacity exp(-(t - tau)^2 / (2 beta^2)).
-    Velocity and life span are fields of ``Gaussians``; nothing else is learned.
+    mean(t) = mean + l / (2 pi) sin(2 pi (t - tau) / l) v, opacity(t) = opacity exp(-(t - tau)^2 / 2 beta^2).
 
     Attributes:
         config: What all Gaussians share.
