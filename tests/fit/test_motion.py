@@ -15,7 +15,7 @@ from dreamdrive.scene.hexplane import HexPlaneConfig, HexPlaneField
 from dreamdrive.scene.vibration import Vibration, VibrationConfig
 from dreamdrive.splat.scene_view import render_scene
 
-PLANES = HexPlaneConfig(width=32, features=4, resolution=32, levels=2)
+PLANES = HexPlaneConfig(width=32, features=8, resolution=32, levels=2)
 STEPS = 200
 
 
@@ -70,15 +70,11 @@ def test_moving_things_are_shown_better_than_by_static_gaussians(
 
 @pytest.mark.parametrize("config", [PLANES, VibrationConfig()])
 def test_gaussians_of_the_moving_car_move_most(stages, config: Any) -> None:
-    clip, _, start = stages
-    scene = fitted(stages, config)
-    # Densification leaves no rows to compare: those that were seeded on the car still say so.
-    assert scene.dynamic.features is not None
-    on_car = scene.dynamic.features[:, 0] > 0.5
+    clip, scene = stages[0], fitted(stages, config)
+    on_car = scene.dynamic.features[:, 0] > 0.5  # moving evidence of the seeds, which their children keep
     ends = [scene.deformation.apply_at(scene.dynamic, float(clip.times_s[i])).means for i in (2, 6)]
     moved_m = torch.linalg.vector_norm(ends[1] - ends[0], dim=1)
-    near = scene.dynamic.means[:, 2] < start.gaussians.means[:, 2].median() * 2
-    assert moved_m[on_car].mean() > 2 * moved_m[near & ~on_car].mean()
+    assert moved_m[on_car].mean() > 2 * moved_m[~on_car].median()
 
 
 @pytest.mark.parametrize("config", [None, DeformationConfig(), PLANES, VibrationConfig()])
