@@ -56,7 +56,7 @@ class Quality:
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
 QUALITIES: dict[QualityName, Quality] = {
-    "draft": Quality(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300)),
+    "draft": Quality(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300, plane_rate=5e-2)),
     "standard": Quality(FitOptions(steps=400), ScoreOptions(), FitOptions(steps=1600)),
     "high": Quality(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
 }

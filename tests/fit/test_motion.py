@@ -37,7 +37,7 @@ def fitted(stages, config: Any, steps: int = STEPS, counted: list[int] | None = 
     none = start.gaussians.select(torch.zeros(0, dtype=torch.int64))
     static = config is None
     parts = Parts(start.gaussians, none, None, ()) if static else Parts(none, start.gaussians, None, ())
-    options = FitOptions(steps=steps, warm_up=0.05)
+    options = FitOptions(steps=steps, warm_up=0.05, plane_rate=5e-2)
 
     def progress(done: int, total: int) -> None:
         if counted is not None:
