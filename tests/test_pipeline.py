@@ -77,6 +77,7 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
     assert report["seed"] == 1
     assert report["options"]["quality"] == "draft"
     assert set(STAGES) <= set(report["stages"])
+    assert report["steps"] == {"static": 6, "fit": 8, "score": 6}
     for record in report["stages"].values():
         assert set(record) == {"seconds", "peak_rss_mb", "cached"}
         assert record["peak_rss_mb"] > 50
@@ -139,11 +140,14 @@ def test_from_recomputes_and_gives_the_same_bytes(finished: Path, tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("representation", ["static", "deformable"])
+@pytest.mark.parametrize("representation", ["static", "deformable", "hexplane", "vibration"])
 def test_the_baselines_come_from_the_same_code(tmp_path: Path, representation: str) -> None:
-    make(tmp_path, representation=representation)
+    taken: dict[str, int] = {}
+    make(tmp_path, representation=representation, progress=lambda stage, done, _: taken.update({stage: done}))
+    steps = json.loads((tmp_path / "report.json").read_text())["steps"]
+    assert steps == {"static": taken["static"], "fit": taken["fit"]} == {"static": 6, "fit": 8}
     scene = load_scene(tmp_path / "scene")
-    assert (len(scene.static) == 0) == (representation == "deformable")
+    assert (len(scene.static) == 0) == (representation != "static")
     assert (len(scene.dynamic) == 0) == (representation == "static")
     assert (scene.deformation is None) == (representation == "static")
 

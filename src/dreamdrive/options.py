@@ -5,8 +5,10 @@ from typing import Literal
 
 from dreamdrive.decompose import GroupOptions, ScoreOptions
 from dreamdrive.decompose.actors import ActorOptions
-from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
+from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
 from dreamdrive.scene.deformation import DeformationConfig
+from dreamdrive.scene.hexplane import HexPlaneConfig
+from dreamdrive.scene.vibration import VibrationConfig
 
 QualityName = Literal["draft", "standard", "high"]
 
@@ -23,7 +25,7 @@ class Quality:
         group: The vote.
         cast: The actors' tracks.
         densify: Growing and pruning in the joint fit.
-        network: Size of the deformation field.
+        network: Size of the deformation field; its width is that of every representation.
     """
 
     static: FitOptions
@@ -35,10 +37,26 @@ class Quality:
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
 
+    def motion(self, representation: Representation) -> MotionConfig:
+        """What the joint fit learns motion by; all networks have the same width."""
+        if representation == "hexplane":
+            return HexPlaneConfig(width=self.network.width)
+        if representation == "vibration":
+            return VibrationConfig()
+        return self.network
+
+    def steps(self, representation: Representation) -> dict[str, int]:
+        """Optimisation steps of each stage: those on Gaussians are the same for all representations.
+
+        ``score`` trains the classifier of the decomposition, which hybrid alone has, and changes no Gaussian.
+        """
+        fits = {"static": self.static.steps, "fit": self.fit.steps}
+        return {**fits, "score": self.score.steps} if representation == "hybrid" else fits
+
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
 QUALITIES: dict[QualityName, Quality] = {
-    "draft": Quality(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300)),
+    "draft": Quality(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300, plane_rate=5e-2)),
     "standard": Quality(FitOptions(steps=400), ScoreOptions(), FitOptions(steps=1600)),
     "high": Quality(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
 }

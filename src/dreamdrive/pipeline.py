@@ -141,8 +141,8 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
     scene = stages.run(
         "fit",
         ("static", "group") if scored else ("static",),
-        [mode, quality.fit, quality.cast, quality.network, quality.densify, seed["fit"]],
-        lambda tell: _fitted(control, clip, geometry, parts, static, quality, seed["fit"], tell),
+        [mode, quality.fit, quality.cast, quality.motion(mode), quality.densify, seed["fit"]],
+        lambda tell: _fitted(control, clip, geometry, parts, static, quality, mode, seed["fit"], tell),
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
     )
     return _Made(clip, geometry, scene, scored)
@@ -173,7 +173,7 @@ def _decompose(
     nothing = torch.zeros(0, dtype=torch.int64)
     if representation == "static":
         return None, Parts(static.gaussians, static.gaussians.select(nothing), None, ())
-    if representation == "deformable":
+    if representation != "hybrid":
         return None, Parts(seeds.select(nothing), static.gaussians, None, ())
     scores = stages.run(
         "score",
@@ -207,11 +207,13 @@ def _fitted(
     parts: Parts,
     start: StaticFit,
     quality: Quality,
+    representation: Representation,
     seed: int,
     progress: Progress,
 ) -> Scene:
     """The joint fit (eq. 11-14), with what a scene remembers of its making."""
-    scene = fit(clip, geometry, parts, start, quality.fit, quality.network, quality.densify, seed, progress)
+    motion = quality.motion(representation)
+    scene = fit(clip, geometry, parts, start, quality.fit, motion, quality.densify, seed, progress)
     about = {
         "input": None if control.path is None else control.path.name,
         "source_index": clip.source_index.tolist(),
@@ -225,6 +227,7 @@ def _fitted(
 def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made) -> None:
     """Put scene, videos, withheld frames and report into the output folder, all at once."""
     staging, clip, scene = workspace.fresh_staging(), made.clip, made.scene
+    chosen = workspace.request["options"]
 
     def show(progress: Progress) -> None:
         save_scene(scene, staging / "scene")
@@ -239,6 +242,7 @@ def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made
         scene,
         {**workspace.request, "input": None if control.path is None else str(control.path)},
         stages.records,
+        QUALITIES[chosen["quality"]].steps(chosen["representation"]),
         score_scene(clip, made.geometry, scene),
         score_baselines(clip, made.geometry),
     )

@@ -25,6 +25,7 @@ def describe(
     scene: Scene,
     request: dict[str, Any],
     records: dict[str, StageRecord],
+    steps: dict[str, int],
     held_out: dict[int, Likeness],
     baselines: dict[str, dict[int, Likeness]],
 ) -> dict[str, Any]:
@@ -36,6 +37,7 @@ def describe(
         scene: The result.
         request: Input and options.
         records: Cost of each stage.
+        steps: Optimisation steps of those that optimise.
         held_out: Likeness of the withheld frames, by index in the clip.
         baselines: The same of predictions that need no scene.
     """
@@ -46,6 +48,7 @@ def describe(
         "options": request["options"],
         "seed": request["seed"],
         "stages": {name: asdict(record) for name, record in records.items()},
+        "steps": steps,
         "frames": {"count": len(clip), "size": list(clip.size), "source_index": clip.source_index.tolist()},
         "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
         "actors": [

@@ -8,24 +8,29 @@ import av
 import numpy as np
 import pytest
 from tests.cli.conftest import Run
-from tests.scene.scenes import make_scene
+from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.drive import MANOEUVRES
 from dreamdrive.export import read_ply
 from dreamdrive.scene.folder import save_scene
+from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 
 
 @pytest.fixture
 def out(tmp_path: Path) -> Path:
     """An output folder with a scene that drives 1 m ahead a frame."""
-    scene = make_scene()
+    save_scene(driving(make_scene()), tmp_path / "out" / "scene")
+    return tmp_path / "out"
+
+
+def driving(scene: Scene) -> Scene:
+    """The scene seen from cameras that drive 1 m ahead a frame."""
     poses = np.tile(np.eye(4), (3, 1, 1))
     poses[:, 2, 3] = np.arange(3) - 6
     cameras = tuple(c.at(pose) for c, pose in zip(scene.cameras, poses, strict=True))
-    save_scene(replace(scene, cameras=cameras, provenance={}), tmp_path / "out" / "scene")
-    return tmp_path / "out"
+    return replace(scene, cameras=cameras, provenance={})
 
 
 def frames(path: Path) -> tuple[int, float]:
@@ -83,6 +88,17 @@ def test_export_writes_a_file_or_a_sequence(run: Run, out: Path, tmp_path: Path)
     assert run("export", out, "--to", "ply", "-o", tmp_path / "sequence").code == 0
     assert len(read_ply(tmp_path / "sequence" / "static.ply")) == 7
     assert len(list((tmp_path / "sequence" / "frames").iterdir())) == 3
+
+
+@pytest.mark.parametrize("kind", ["hexplane", "vibration"])
+def test_scenes_that_move_otherwise_are_rendered_and_exported(run: Run, tmp_path: Path, kind: str) -> None:
+    save_scene(driving(make_baseline(kind)), tmp_path / "out" / "scene")
+    assert run("render", tmp_path / "out", "--trajectory", "forward").code == 0
+    assert frames(tmp_path / "out" / "video" / "forward.mp4")[0] == 5
+    assert run("export", tmp_path / "out", "--to", "ply", "-o", tmp_path / "sequence").code == 0
+    first, last = (read_ply(tmp_path / "sequence" / "frames" / f"{i:04d}.ply") for i in (0, 2))
+    assert len(first) == 4
+    assert not np.allclose(first.means, last.means)
 
 
 def test_the_doctor_says_what_is_there(run: Run) -> None:

@@ -50,6 +50,18 @@ def expect(run: Run, out: Path, *arguments: object, message: str) -> None:
     assert (sorted(out.rglob("*")) if out.exists() else None) == before
 
 
+@pytest.mark.parametrize("name", ["static", "deformable", "hexplane", "vibration", "hybrid"])
+def test_representations_are_known_by_name(run: Run, tmp_path: Path, name: str) -> None:
+    missing = tmp_path / "none.mp4"
+    expect(run, tmp_path / "out", missing, "--representation", name, message=f"{missing} does not exist")
+
+
+def test_a_representation_of_another_name_is_refused(run: Run, tmp_path: Path) -> None:
+    result = run("generate", tmp_path / "none.mp4", "-o", tmp_path / "out", "--representation", "mesh")
+    assert result.code == 2
+    assert "hexplane" in result.err
+
+
 def test_inputs_that_are_no_clip(run: Run, tmp_path: Path) -> None:
     out, file = tmp_path / "out", tmp_path / "clip.mp4"
     expect(run, out, file, message="does not exist; expected a video or a folder of images")

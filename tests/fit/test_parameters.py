@@ -1,3 +1,6 @@
+from dataclasses import replace
+
+import pytest
 import torch
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
@@ -95,6 +98,54 @@ def test_children_inherit_all_but_the_changes_and_start_with_fresh_moments():
     assert (p.moments["offsets"].mean[-2:] == 0).all()
     assert (p.moments["offsets"].mean[:12] != 0).any()
     one_step(p)
+
+
+def swinging() -> Parameters:
+    """Gaussians with velocities, of frames 0.25 s apart."""
+    gaussians = replace(some_gaussians(), velocity=torch.linspace(-2, 2, 36).view(12, 3))
+    return Parameters(gaussians, torch.full((12,), 0.1), LearningRates(interval_s=0.25))
+
+
+def test_velocities_and_life_spans_are_learned_in_steps_of_their_own():
+    p = swinging()
+    before = p.frozen()
+    torch.testing.assert_close(before.lifespan, some_gaussians().lifespan)
+    torch.testing.assert_close(before.velocity, torch.linspace(-2, 2, 36).view(12, 3))
+    now = p.gaussians()
+    (now.velocity.sum() + now.lifespan.sum()).backward()
+    p.step()
+    after, rates = p.frozen(), LearningRates()
+    step = 0.1 * rates.swings / 0.25
+    torch.testing.assert_close(before.velocity - after.velocity, torch.full((12, 3), step), rtol=1e-3, atol=0)
+    (peak_s, span_s), (new_peak_s, new_span_s) = before.lifespan.T, after.lifespan.T
+    torch.testing.assert_close(peak_s - new_peak_s, torch.full((12,), rates.peak * 0.25), rtol=1e-3, atol=0)
+    torch.testing.assert_close(
+        (span_s / new_span_s).log(), torch.full((12,), rates.log_span), rtol=1e-3, atol=0
+    )
+
+
+def test_only_gaussians_with_velocities_learn_life_spans():
+    assert set(swinging().moments) - set(parameters().moments) == {"swings", "peak_s", "log_span"}
+    with pytest.raises(ValueError, match="life spans"):
+        Parameters(replace(swinging().frozen(), lifespan=None), torch.ones(12), LearningRates())
+
+
+def test_surgery_carries_velocities_and_life_spans_along():
+    p = swinging()
+    one_step(p)
+    p.append_children(torch.tensor([3, 7]), {})
+    p.keep(torch.arange(14) % 7 != 0)
+    now, kept = p.frozen(), [i for i in range(12) if i % 7]
+    expected = swinging().frozen()
+    for name in ("velocity", "lifespan"):
+        torch.testing.assert_close(getattr(now, name)[:-2], getattr(expected, name)[kept])
+        torch.testing.assert_close(getattr(now, name)[-2:], getattr(expected, name)[[3, 7]])
+    assert p.moments["swings"].mean.shape == (12, 3)
+    assert p.moments["log_span"].square.shape == (12,)
+    now = p.gaussians()
+    (now.velocity.square().sum() + now.lifespan.sum()).backward()
+    p.step()
+    assert not torch.equal(p.frozen().velocity, expected.velocity)
 
 
 def densified(gradient: float, log_scale: float, **changes: float) -> Parameters:

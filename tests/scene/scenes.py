@@ -1,5 +1,7 @@
 """A small scene with everything in it."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
@@ -8,8 +10,11 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.hexplane import Bounds, HexPlaneConfig, HexPlaneField
+from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.vibration import Vibration, VibrationConfig
 
 
 def gaussians(count: int, seed: int, **more: torch.Tensor) -> Gaussians:
@@ -51,3 +56,23 @@ def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
         held_out=np.array([False, True, False]),
         provenance={"seed": 1, "per_frame": {10: "a", 2: "b"}},
     )
+
+
+def make_baseline(kind: str) -> Scene:
+    """The scene with all of it moved by a hexplane or a vibration that does something."""
+    scene = make_scene()
+    dynamic, motion = _moved_by(kind, replace(scene.dynamic, lifespan=None, actor=None))
+    return replace(scene, static=gaussians(0, 1), dynamic=dynamic, deformation=motion, actors=())
+
+
+def _moved_by(kind: str, dynamic: Gaussians) -> tuple[Gaussians, Motion]:
+    if kind == "hexplane":
+        config = HexPlaneConfig(width=8, features=2, resolution=4, levels=2, times=3)
+        made = HexPlaneField(config, Bounds(-np.ones(3), np.ones(3), 0.0, 1.0))
+        torch.nn.init.constant_(made.head_mean[-1].weight, 0.1)
+        torch.nn.init.uniform_(made.time[0], generator=torch.Generator().manual_seed(2))
+        return dynamic, made.requires_grad_(False)
+    count = len(dynamic)
+    lifespan = torch.stack([torch.linspace(0.2, 0.6, count), torch.full((count,), 0.5)], dim=1)
+    swinging = replace(dynamic, velocity=torch.ones(count, 3), lifespan=lifespan)
+    return swinging, Vibration(VibrationConfig(interval_s=0.25))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
+from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.folder import load_scene, save_scene
@@ -32,6 +32,37 @@ def test_round_trip(tmp_path: Path, dynamic: int, full: bool) -> None:
     assert [a.name for a in loaded.actors] == [a.name for a in scene.actors]
     assert (loaded.sky is None) == (scene.sky is None)
     assert (loaded.exposure is None) == (scene.exposure is None)
+
+
+@pytest.mark.parametrize("kind", ["hexplane", "vibration"])
+def test_round_trip_of_the_other_motions(tmp_path: Path, kind: str) -> None:
+    scene = make_baseline(kind)
+    save_scene(scene, tmp_path / "a")
+    loaded = load_scene(tmp_path / "a")
+    assert loaded.deformation.config == scene.deformation.config
+    for t_s in (0.1, 0.4):
+        before, after = scene.at(t_s).tensors(), loaded.at(t_s).tensors()
+        assert before.keys() == after.keys()
+        assert all(torch.equal(before[name], after[name]) for name in before)
+    assert not torch.equal(loaded.at(0.1).means, loaded.at(0.4).means)
+    save_scene(loaded, tmp_path / "b")
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_only_what_the_first_format_cannot_hold_is_of_the_second(tmp_path: Path) -> None:
+    versions = {}
+    for name, scene in (("old", make_scene()), ("new", make_baseline("vibration"))):
+        save_scene(scene, tmp_path / name)
+        versions[name] = json.loads((tmp_path / name / "scene.json").read_text())["version"]
+    assert versions == {"old": 1, "new": 2}
+
+
+def test_a_motion_of_another_kind_is_refused(tmp_path: Path) -> None:
+    scene = make_baseline("vibration")
+    scene.deformation.kind = "wobble"
+    save_scene(scene, tmp_path / "s")
+    with pytest.raises(InputError, match="wobble"):
+        load_scene(tmp_path / "s")
 
 
 def test_equal_scenes_give_equal_bytes(tmp_path: Path) -> None:

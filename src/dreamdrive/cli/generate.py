@@ -29,7 +29,7 @@ def generate(
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    representation: Literal["static", "deformable", "hybrid"] = "hybrid",
+    representation: Literal["static", "deformable", "hexplane", "vibration", "hybrid"] = "hybrid",
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
@@ -55,7 +55,8 @@ def generate(
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         hold_out: Withhold every N-th frame to measure how well it is predicted.
-        representation: hybrid tells static from moving; the others are its baselines.
+        representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
+            deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
         seed: Seed of everything random.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.

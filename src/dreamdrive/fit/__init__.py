@@ -4,6 +4,7 @@ from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier
 from dreamdrive.fit.hybrid import Parts, Representation, fit
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
+from dreamdrive.fit.motion import MotionConfig
 from dreamdrive.fit.static import StaticFit, fit_static
 from dreamdrive.fit.trainer import FitOptions, Progress
 
@@ -13,6 +14,7 @@ __all__ = [
     "FitOptions",
     "GradientDensifier",
     "LossName",
+    "MotionConfig",
     "NoDensifier",
     "Parts",
     "Progress",

@@ -1,25 +1,26 @@
-"""The joint fit of static and dynamic Gaussians (eq. 11-14), and its two baselines."""
+"""The joint fit of static and dynamic Gaussians (eq. 11-14), and its baselines."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
 import torch
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.motion import MotionConfig, start_motion
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
 from dreamdrive.fit.views import training_views
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
+from dreamdrive.scene.deformation import Tracks
 from dreamdrive.scene.exposure import ExposureNetwork
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.vibration import Vibration
 
-Representation = Literal["static", "deformable", "hybrid"]
+Representation = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Parts:
 
     Attributes:
         static: Gaussians free of time; may be empty.
-        dynamic: Gaussians that go through the deformation field; may be empty.
+        dynamic: Gaussians that move; may be empty.
         tracks: Motion of the actors, or None.
         actors: The actors.
     """
@@ -45,12 +46,14 @@ def fit(
     parts: Parts,
     start: StaticFit,
     options: FitOptions,
-    network: DeformationConfig,
+    motion: MotionConfig,
     densify: DensifySettings,
     seed: int,
     progress: Progress,
 ) -> Scene:
-    """Optimise Gaussians, deformation, sky and exposure jointly (eq. 13-14).
+    """Optimise Gaussians, motion and exposure jointly (eq. 13-14).
+
+    All motions take ``options.steps`` steps from the same static fit.
 
     Args:
         clip: References; held-out frames are not read, their exposure is interpolated.
@@ -58,17 +61,22 @@ def fit(
         parts: Static and dynamic Gaussians; with no dynamic ones the result is a static scene.
         start: The static fit, whose sky is kept.
         options: Length, rates and weights.
-        network: Size of F_deform.
+        motion: Which representation of motion, and its size; the paper's is F_deform.
         densify: When and what to grow and prune.
         seed: Order of the frames, weights, places of split Gaussians.
         progress: Called with steps done and steps in all.
     """
     views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
-    field = _field(clip, geometry, parts, network, seed) if len(parts.dynamic) else None
+    moving, dynamic = None, parts.dynamic
+    if len(dynamic):
+        moving, dynamic = start_motion(clip, geometry, dynamic, parts.tracks, motion, seed)
+    rates = LearningRates()
+    if isinstance(moving, Vibration):
+        rates = replace(rates, interval_s=moving.config.interval_s)
     model = Model(
-        static=_parameters(parts.static),
-        dynamic=_parameters(parts.dynamic),
-        deformation=field,
+        static=_parameters(parts.static, rates),
+        dynamic=_parameters(dynamic, rates),
+        deformation=moving,
         sky=start.sky,
         exposure=ExposureNetwork(len(clip), seed),
     )
@@ -80,7 +88,7 @@ def fit(
     return Scene(
         static=model.static.frozen() if model.static is not None else empty,
         dynamic=dynamic,
-        deformation=None if field is None else field.requires_grad_(False),
+        deformation=None if moving is None else moving.requires_grad_(False),
         actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
         sky=start.sky,
         exposure=model.exposure.freeze(clip.times_s, ~clip.held_out),
@@ -90,24 +98,9 @@ def fit(
     )
 
 
-def _parameters(gaussians: Gaussians) -> Parameters | None:
-    return Parameters(gaussians, footprints(gaussians), LearningRates()) if len(gaussians) else None
+def _parameters(gaussians: Gaussians, rates: LearningRates) -> Parameters | None:
+    return Parameters(gaussians, footprints(gaussians), rates) if len(gaussians) else None
 
 
 def _members(gaussians: Gaussians, actor: int) -> int:
     return 0 if gaussians.actor is None else int((gaussians.actor == actor).sum())
-
-
-def _field(
-    clip: Clip, geometry: Geometry, parts: Parts, network: DeformationConfig, seed: int
-) -> DeformationField:
-    """F_deform over the space of the dynamic Gaussians and the time of the clip."""
-    means = parts.dynamic.means.numpy().astype(np.float64)
-    centre = np.median(means, axis=0)
-    radius = float(np.quantile(np.linalg.norm(means - centre, axis=1), 0.95))
-    up = geometry.ground.normal_world if geometry.ground is not None else np.array([0.0, -1.0, 0.0])
-    domain = Domain(centre, max(radius, 1e-3), float(clip.times_s[0]), float(clip.times_s[-1]), up)
-    tracks = parts.tracks
-    if tracks is not None:
-        network = replace(network, actors=len(tracks.pivot_m), track_times=len(tracks.times_s))
-    return DeformationField(network, domain, tracks, seed)

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 
 from dreamdrive.scene.compiled_deformation import network_residual, posed
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.motion import Motion
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ def alive_at(gaussians: Gaussians, t_s: float) -> Int[Tensor, " m"]:
     return torch.nonzero((t_s - centre_s).abs() <= reach * deviation_s).squeeze(1)
 
 
-class DeformationField(nn.Module):
+class DeformationField(Motion):
     """F_deform(x, t): offsets of mean, rotation and scale (eq. 11-12).
 
     A Gaussian of an actor follows the actor's rigid track; the network adds the residual. A Gaussian of no
@@ -167,6 +168,8 @@ class DeformationField(nn.Module):
         track_yaw_rad: Learned key frames (A, T).
     """
 
+    kind = "network"
+    config: DeformationConfig
     centre_m: Tensor
     radius_m: Tensor
     time_range_s: Tensor
@@ -296,6 +299,12 @@ class DeformationField(nn.Module):
             log_scales=gaussians.log_scales + offsets.log_scale,
         )
         return faded(moved, t_s)
+
+    def groups(self) -> dict[str, list[nn.Parameter]]:
+        """The network and the tracks, which learn at different rates."""
+        named = dict(self.named_parameters())
+        tracks = [named.pop(name) for name in ("track_translation", "track_yaw_rad")]
+        return {"network": list(named.values()), "tracks": tracks}
 
     def _compiled_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         if gaussians.lifespan is not None and gaussians.lifespan.requires_grad:

@@ -17,14 +17,15 @@ from dreamdrive.errors import InputError
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
+from dreamdrive.scene.deformation import DeformationField
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.stored_motion import described, rebuilt
 
 FORMAT = "dreamdrive scene"
-VERSION = 1
+VERSION = 2
 CONVENTIONS = (
     "World: the camera of the first frame, x right, y down, z forward, metres. Times in seconds. "
     "Cameras: pinholes, the centre of the top-left pixel at (0.5, 0.5). Quaternions wxyz, scales as natural "
@@ -48,7 +49,7 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     parts = {f"{_BLOCK}-{name}.safetensors": _encode(tensors) for name, tensors in _tensors(scene).items()}
     index = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": _version(scene),
         "conventions": CONVENTIONS,
         "provenance": scene.provenance,
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
@@ -83,6 +84,11 @@ def load_scene(path: Path) -> Scene:
         raise InputError(f"{path} is not a complete scene ({error}); generate it again") from error
 
 
+def _version(scene: Scene) -> int:
+    """The oldest format that holds the scene: version 1 knows deformation fields alone."""
+    return 1 if isinstance(scene.deformation, DeformationField | None) else VERSION
+
+
 def _encode(tensors: dict[str, Tensor]) -> bytes:
     return safetensors.torch.save({name: t.detach().cpu().contiguous() for name, t in tensors.items()})
 
@@ -112,7 +118,7 @@ def _values(scene: Scene) -> dict[str, Any]:
         "cameras": [{**asdict(c), "world_from_camera": c.world_from_camera.tolist()} for c in scene.cameras],
         "times_s": scene.times_s.tolist(),
         "held_out": scene.held_out.tolist(),
-        "deformation": None if scene.deformation is None else asdict(scene.deformation.config),
+        "deformation": None if scene.deformation is None else described(scene.deformation),
         "sky": None
         if scene.sky is None
         else {n: getattr(scene.sky, n) for n in ("azimuth_rad", "elevation_rad")},
@@ -138,9 +144,9 @@ def _read_index(path: Path) -> dict[str, Any]:
         ) from error
     if not isinstance(index, dict) or index.get("format") != FORMAT:
         raise InputError(f"{path / _INDEX} does not describe a scene; expected format {FORMAT!r}")
-    if index.get("version") != VERSION:
+    if index.get("version") not in range(1, VERSION + 1):
         raise InputError(
-            f"{path} has scene format version {index.get('version')}; this program reads version {VERSION}, "
+            f"{path} has scene format version {index.get('version')}; this program reads 1 to {VERSION}, "
             "use the program that wrote it or generate the scene again"
         )
     if index.get("sha256") != _checksum(index):
@@ -167,11 +173,11 @@ def _rebuild(index: dict[str, Any], part: Callable[[str], dict[str, Tensor] | No
     static, dynamic = part("static"), part("dynamic")
     if static is None or dynamic is None:
         raise KeyError("no static or no dynamic Gaussians")
-    sky, exposure = part("sky"), part("exposure")
+    sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
     return Scene(
         static=Gaussians(**static),
         dynamic=Gaussians(**dynamic),
-        deformation=_deformation(index["deformation"], part("deformation")),
+        deformation=None if motion is None else rebuilt(index["deformation"], motion),
         actors=tuple(Actor(**_arrays(a, "times_s", "positions_m")) for a in index["actors"]),
         sky=None if sky is None else Sky(sky["texture"], **{n: tuple(r) for n, r in index["sky"].items()}),
         exposure=None if exposure is None else Exposure(exposure["transforms"], exposure["times_s"].numpy()),
@@ -184,19 +190,3 @@ def _rebuild(index: dict[str, Any], part: Callable[[str], dict[str, Tensor] | No
 
 def _arrays(values: dict[str, Any], *names: str) -> dict[str, Any]:
     return {**values, **{name: np.array(values[name], dtype=np.float64) for name in names}}
-
-
-def _deformation(config: dict[str, Any] | None, state: dict[str, Tensor] | None) -> DeformationField | None:
-    if config is None or state is None:
-        return None
-    shape = DeformationConfig(**config)
-    # Any valid values: load_state_dict replaces them all.
-    domain = Domain(np.zeros(3), 1.0, 0.0, 1.0, np.array([0.0, -1.0, 0.0]))
-    actors, times = shape.actors, shape.track_times
-    tracks = None
-    if actors:
-        moves, turns = np.zeros((actors, times, 3)), np.zeros((actors, times))
-        tracks = Tracks(np.arange(times, dtype=np.float64), moves, turns, np.zeros((actors, 3)))
-    field = DeformationField(shape, domain, tracks)
-    field.load_state_dict(state)
-    return field.requires_grad_(False)

@@ -24,6 +24,7 @@ class Gaussians:
         lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None: always visible.
             Opacity is multiplied by exp(-(t - centre)^2 / (2 deviation^2)).
         actor: Index of the actor each belongs to (N,), or None.
+        velocity: Velocity of a ``Vibration`` at the centre of the life span in m/s (N, 3), or None.
     """
 
     means: Float[Tensor, "n 3"]
@@ -35,6 +36,7 @@ class Gaussians:
     features: Float[Tensor, "n c"] | None = None
     lifespan: Float[Tensor, "n 2"] | None = None
     actor: Int[Tensor, " n"] | None = None
+    velocity: Float[Tensor, "n 3"] | None = None
 
     def __post_init__(self) -> None:
         if self.sh.shape[1] not in (1, 4, 9, 16):

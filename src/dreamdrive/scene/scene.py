@@ -9,9 +9,10 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationField, alive_at, faded
+from dreamdrive.scene.deformation import alive_at, faded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -37,7 +38,7 @@ class Scene:
 
     static: Gaussians
     dynamic: Gaussians
-    deformation: DeformationField | None
+    deformation: Motion | None
     actors: tuple[Actor, ...]
     sky: Sky | None
     exposure: Exposure | None
