@@ -1,0 +1,201 @@
+"""What the street benchmark fits: seeded worlds, seen and understood in several ways."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from dreamdrive.data.corruption import corrupt, parse_corruption
+from dreamdrive.data.intrinsics import guess_camera
+from dreamdrive.data.select import held_out_mask
+from dreamdrive.data.world import Drive, make_street
+from dreamdrive.fit import StaticFit, fit_static, initialise
+from dreamdrive.geometry import reconstruct
+from dreamdrive.options import Quality
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.stages import Stages, stage_seed
+
+FRAMES, RATE_HZ, SIZE, HOLD_OUT = 24, 10.0, (320, 192), 8
+SHIFTS_M = (1.0, 2.0, 3.0)
+Poses = Literal["true", "estimated", "unknown_focal"]
+References = Literal["clean", "corrupted"]
+VIEWS = ("held_out", "shift_1", "shift_2", "shift_3", "raise_1", "yaw_10")
+NOVEL = VIEWS[1:]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One world, known in one way, seen in one way."""
+
+    seed: int
+    geometry: Poses
+    references: References
+
+    @property
+    def name(self) -> str:
+        """For files."""
+        return f"{self.seed}-{self.geometry}-{self.references}"
+
+
+@dataclass(frozen=True)
+class Start:
+    """What all representations of a case begin with."""
+
+    clip: Clip
+    geometry: Geometry
+    seeds: Gaussians
+    static: StaticFit
+
+
+@lru_cache(maxsize=2)
+def world_of(seed: int) -> Drive:
+    """The drive of a seed."""
+    return make_street(seed, FRAMES, RATE_HZ, SIZE)
+
+
+def clip_of(case: Case) -> Clip:
+    """The frames as a prior would hand them over."""
+    made = world_of(case.seed)
+    frames = made.frames
+    if case.references == "corrupted":
+        frames = corrupt(frames, parse_corruption("generated", case.seed), made.depth_m)
+    pinhole = made.cameras[0].at(np.eye(4))
+    if case.geometry == "unknown_focal":
+        pinhole = guess_camera(SIZE).camera
+    poses = made.trajectory.world_from_camera if case.geometry == "true" else None
+    clip = Clip(
+        frames=frames,
+        times_s=made.times_s,
+        camera=np.zeros(FRAMES, dtype=np.int64),
+        rig=(pinhole,),
+        valid=np.ones(frames.shape[:3], dtype=bool),
+        held_out=held_out_mask(FRAMES, HOLD_OUT),
+        source_index=np.arange(FRAMES),
+        known=Known(poses, intrinsics=case.geometry != "unknown_focal"),
+    )
+    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+def start(case: Case, quality: Quality, folder: Path) -> Start:
+    """Geometry, seeds and static fit of a case, kept in the folder."""
+    stages = Stages(folder / case.name, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
+    made = world_of(case.seed)
+    about = [case.name, FRAMES, SIZE, made.frames[0].mean().item()]
+    clip = stages.run("prior", (), about, lambda _: clip_of(case))
+    seed = stage_seed(0, "geometry")
+    geometry = stages.run("geometry", ("prior",), seed, lambda _: reconstruct(clip, seed=seed))
+    seeds = stages.run(
+        "initialise",
+        ("prior", "geometry"),
+        quality.seeds,
+        lambda _: initialise(clip, geometry, quality.seeds),
+    )
+    number = stage_seed(0, "static")
+    static = stages.run(
+        "static",
+        ("initialise",),
+        [quality.static, number],
+        lambda tell: fit_static(clip, geometry, seeds, quality.static, number, tell),
+    )
+    return Start(clip, geometry, seeds, static)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """A similarity from the world of a scene to the true one: x -> scale R x + shift."""
+
+    scale: float
+    rotation: Float[np.ndarray, "3 3"]
+    shift_m: Float[np.ndarray, "3"]
+
+    def back(self, camera: Camera) -> Camera:
+        """A camera of the true world, in that of the scene; what it sees is the same."""
+        pose = np.eye(4)
+        pose[:3, :3] = self.rotation.T @ camera.world_from_camera[:3, :3]
+        pose[:3, 3] = self.rotation.T @ (camera.world_from_camera[:3, 3] - self.shift_m) / self.scale
+        return camera.at(pose)
+
+
+def align(found: Float[np.ndarray, "f 4 4"], true: Float[np.ndarray, "f 4 4"]) -> Alignment:
+    """Best rotation of the orientations, then best scale and shift of the positions.
+
+    On a straight drive the positions alone leave the rotation about the drive open.
+    """
+    turns = true[:, :3, :3] @ found[:, :3, :3].transpose(0, 2, 1)
+    left, _, right = np.linalg.svd(turns.sum(axis=0))
+    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    turned = found[:, :3, 3] @ rotation.T
+    here, there = turned - turned.mean(axis=0), true[:, :3, 3] - true[:, :3, 3].mean(axis=0)
+    scale = float((here * there).sum() / max(float((here * here).sum()), 1e-12))
+    return Alignment(scale, rotation, true[:, :3, 3].mean(axis=0) - scale * turned.mean(axis=0))
+
+
+def true_cameras(seed: int, view: str) -> list[Camera]:
+    """The cameras of a view in the true world, one a frame.
+
+    Shifts go to the side on which the boxes are further away: to the left or to the right.
+    """
+    made = world_of(seed)
+    if view.startswith("shift"):
+        metres = float(view[-1])
+        offset = np.array([metres * _free_side(made, metres), 0.0, 0.0])
+        return [_moved(camera, offset) for camera in made.cameras]
+    if view == "raise_1":
+        return [_moved(camera, np.array([0.0, -1.0, 0.0])) for camera in made.cameras]
+    if view == "yaw_10":
+        cos, sin = np.cos(np.deg2rad(10)), np.sin(np.deg2rad(10))
+        turn = np.eye(4)
+        turn[:3, :3] = [[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]
+        return [camera.at(camera.world_from_camera @ turn) for camera in made.cameras]
+    return list(made.cameras)
+
+
+def _moved(camera: Camera, offset_m: np.ndarray) -> Camera:
+    pose = camera.world_from_camera.copy()
+    pose[:3, 3] += pose[:3, :3] @ offset_m
+    return camera.at(pose)
+
+
+def _free_side(made: Drive, metres: float) -> int:
+    """1 for right, -1 for left."""
+    clearance = {}
+    for side in (-1, 1):
+        centres = [_moved(c, np.array([side * metres, 0.0, 0.0])).world_from_camera[:3, 3] for c in made.cameras]
+        clearance[side] = min(
+            (
+                float(np.hypot(*np.maximum(np.abs(_local(box.world_from_box[k], centre))[:2] - box.size_m[:2] / 2, 0)))
+                for box in made.boxes
+                for k, centre in enumerate(centres)
+            ),
+            default=np.inf,
+        )
+    return 1 if clearance[1] > clearance[-1] else -1
+
+
+def _local(pose: np.ndarray, point: np.ndarray) -> np.ndarray:
+    return pose[:3, :3].T @ (point - pose[:3, 3])
+
+
+def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 3"]:
+    """What those cameras see, kept in the folder; of the recorded path the frames themselves."""
+    made = world_of(seed)
+    if view == "held_out":
+        return made.frames
+    path = folder / f"truth-{seed}-{view}.npz"
+    if path.exists():
+        with np.load(path) as kept:
+            if kept["first"] == made.frames[0].astype(np.int64).sum():
+                return kept["frames"]
+    seen = made.views(true_cameras(seed, view), made.times_s.tolist())
+    frames = np.stack([v.frame for v in seen])
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, frames=frames, first=made.frames[0].astype(np.int64).sum())
+    return frames
+
