@@ -1,0 +1,1 @@
+"""How good results are: figures with their sample counts, floors and intervals."""
