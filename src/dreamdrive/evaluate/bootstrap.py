@@ -84,7 +84,7 @@ def frechet_with_interval(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> DistanceFigure:
-    """Fréchet distance of two sets of clips with its floor and its interval; see ``distance_with_interval``."""
+    """Fréchet distance of two sets of clips with floor and interval; see ``distance_with_interval``."""
     distance = partial(frechet_distance, covariance=covariance)
     return distance_with_interval(real, fake, distance, paired=paired, seed=seed, resamples=resamples)
 

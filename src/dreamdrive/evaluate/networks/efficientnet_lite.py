@@ -1,4 +1,4 @@
-"""EfficientNet-Lite0, trained on ImageNet, whose weights come in a small package; a stand-in for Inception."""
+"""EfficientNet-Lite0, trained on ImageNet; its weights come in a package, so it stands in for Inception."""
 
 import torch
 from jaxtyping import Float, UInt8
@@ -88,7 +88,7 @@ def load_efficientnet_lite0() -> EfficientNetLite0:
     """The network with the weights of the installed package; its classifier is not used.
 
     Raises:
-        NotAvailable: The package is not installed.
+        MissingWeightsError: The package is not installed.
     """
     return load_network(EfficientNetLite0, FILE.locate(), FILE.path, ignored=("_fc.",))
 

@@ -8,7 +8,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks.checkpoint import sha256
 
 
-class NotAvailable(InputError):
+class MissingWeightsError(InputError):
     """Optional weights are not installed, or are others than those that figures are defined by."""
 
 
@@ -32,14 +32,14 @@ class PackagedFile:
         """Where the file is.
 
         Raises:
-            NotAvailable: The package is not installed, or its file is another.
+            MissingWeightsError: The package is not installed, or its file is another.
         """
         try:
             found = Path(str(metadata.distribution(self.package).locate_file(self.path)))
         except metadata.PackageNotFoundError:
-            raise NotAvailable(f"{self.package} is not installed: {self.install}") from None
+            raise MissingWeightsError(f"{self.package} is not installed: {self.install}") from None
         if not found.is_file():
-            raise NotAvailable(f"{found} of {self.package} is missing: {self.install}")
+            raise MissingWeightsError(f"{found} of {self.package} is missing: {self.install}")
         if sha256(found) != self.sha256:
-            raise NotAvailable(f"{found} is not the file this figure is defined by: {self.install}")
+            raise MissingWeightsError(f"{found} is not the file this figure is defined by: {self.install}")
         return found

@@ -77,7 +77,7 @@ def load_stlpips(kind: str) -> PerceptualDistance:
         kind: ``alex`` or ``vgg``.
 
     Raises:
-        NotAvailable: The package is not installed.
+        MissingWeightsError: The package is not installed.
     """
     path = FILES[kind].locate()
     trunk: dict[str, Tensor] = {}

@@ -1,4 +1,4 @@
-"""TransNetV2 (Soucek and Lokoc 2020), a network for shot boundaries, as a small video network for features."""
+"""TransNetV2 (Soucek and Lokoc 2020), made to find shot boundaries, as a small network for video features."""
 
 from pathlib import Path
 
@@ -138,7 +138,7 @@ def load_transnet(path: Path | None = None) -> TransNet:
         path: The weights; without it those of the installed package.
 
     Raises:
-        NotAvailable: The package is not installed.
+        MissingWeightsError: The package is not installed.
         InputError: The file is not that of the network.
     """
     found = FILE.locate() if path is None else path
