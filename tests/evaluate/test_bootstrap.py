@@ -97,6 +97,11 @@ def test_few_samples_make_a_floor_that_only_halves_can_be_compared_with() -> Non
     assert frechet_ratio(real, good, bad, resamples=0).a > plain.floor
 
 
+def test_sets_too_small_for_a_floor() -> None:
+    with pytest.raises(InputError, match="a set has 3 samples"):
+        frechet_with_interval([np.eye(5)], [np.eye(3, 5)])
+
+
 def test_sets_that_do_not_pair() -> None:
     real = places(0)
     with pytest.raises(InputError, match="got 12 real and 11 fake"):

@@ -10,12 +10,13 @@ from rich.logging import RichHandler
 
 import dreamdrive
 from dreamdrive.cli.doctor import doctor
+from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.render import render
 from dreamdrive.errors import InputError
 
-COMMANDS = {"generate": generate, "render": render, "export": export, "doctor": doctor}
+COMMANDS = {"generate": generate, "render": render, "export": export, "evaluate": evaluate, "doctor": doctor}
 _USER_ERROR, _INTERRUPTED = 2, 130
 # What the machine may refuse without anything being wrong with the program.
 _REFUSALS = {

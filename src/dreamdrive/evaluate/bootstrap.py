@@ -14,6 +14,8 @@ SPLITS = 10
 """Random halvings that a floor is the mean of."""
 RESAMPLES = 200
 """Resamples of the clips behind an interval."""
+MIN_SAMPLES = 4
+"""Samples of a set whose halves still have a distance."""
 LEVEL = 0.95
 """What share of the resamples an interval holds."""
 
@@ -209,6 +211,12 @@ def _half_distances(
 
     Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
     """
+    for features in (real, *fakes):
+        if len(features) < MIN_SAMPLES:
+            raise InputError(
+                f"a set has {len(features)} samples; a distance with its floor needs {MIN_SAMPLES} or more: "
+                "give more frames or clips"
+            )
     floors, others = np.zeros(splits), np.zeros((splits, len(fakes)))
     for split in range(splits):
         order = rng.permutation(len(real))

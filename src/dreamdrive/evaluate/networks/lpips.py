@@ -16,7 +16,7 @@ HEADS_FILE = (
 _SHIFT = (-0.030, -0.088, -0.188)
 _SCALE = (0.458, 0.448, 0.450)
 _EPS = 1e-10
-_PAIRS = 4
+_PAIRS = 1
 
 
 class Trunk(nn.Module):
