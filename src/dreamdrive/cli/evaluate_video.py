@@ -76,8 +76,8 @@ def show(console: Console, report: "VideoReport") -> None:
     if report.distances:
         print_table(
             console,
-            "distance of the sets",
-            ("", "value", "95 % over clips", "floor", "of halves", "N real", "N fake", "clips"),
+            "distance of the sets (N and clips: real / fake)",
+            ("", "value", "95 % over clips", "floor", "of halves", "N", "clips"),
             [
                 (
                     name,
@@ -85,15 +85,14 @@ def show(console: Console, report: "VideoReport") -> None:
                     interval(figure.low, figure.high),
                     number(figure.floor),
                     number(figure.half),
-                    str(figure.real_samples),
-                    str(figure.fake_samples),
+                    f"{figure.real_samples} / {figure.fake_samples}",
                     f"{figure.real_clips} / {figure.fake_clips}",
                 )
                 for name, figure in report.distances.items()
             ],
         )
         console.print(
-            "floor: one half of the real set to the other; compare it with 'of halves', not 'value'"
+            "floor: one half of the real set to the other; compare with 'of halves'", soft_wrap=True
         )
     if report.likenesses:
         print_table(

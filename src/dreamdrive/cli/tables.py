@@ -7,30 +7,31 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from dreamdrive.scene.atomic import new_file
 
+_UNLIMITED = 1000
+"""Characters that no table is wide."""
+
 
 def print_table(console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table of texts, the first column to the left, the others to the right.
-
-    Where the output is no terminal nothing is folded or cut to a width.
-    """
+    """A table of texts, the first column to the left, the others to the right; nothing is cut to a width."""
     table = Table(*columns, title=title, title_justify="left", box=None, pad_edge=False)
-    for column in table.columns[1:]:
-        column.justify = "right"
-    for column in table.columns:
+    for position, column in enumerate(table.columns):
+        column.justify = "right" if position else "left"
         column.no_wrap = True
+    wide = console.options.update(max_width=_UNLIMITED)
     for row in rows:
         table.add_row(*row)
-    width = console.width if console.is_terminal else max(console.width, console.measure(table).maximum)
-    console.print(table, width=width)
+    width = max(console.width, Measurement.get(console, wide, table).maximum)
+    Console(file=console.file, width=width, highlight=False).print(table)
 
 
 def number(value: float | None) -> str:
-    """Four significant digits; ``-`` for what is not there."""
-    return "-" if value is None else f"{value:.4g}"
+    """Four significant digits, at most five behind the point; ``-`` for what is not there."""
+    return "-" if value is None else f"{round(value, 5) + 0.0:.4g}"
 
 
 def interval(low: float | None, high: float | None) -> str:

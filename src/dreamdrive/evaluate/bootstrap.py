@@ -188,11 +188,16 @@ def frechet_ratio(
 def mean_with_interval(
     values: Sequence[Float[np.ndarray, " _"]], *, seed: int = 0, resamples: int = RESAMPLES
 ) -> tuple[float, float | None, float | None]:
-    """Mean over all frames of all clips, and its 95 % interval over clips (``None`` with one clip)."""
+    """Mean over all frames of all clips, and its 95 % interval over clips.
+
+    The interval is ``None`` with one clip, and of an infinite mean.
+    """
     rng = np.random.default_rng(seed)
     sums = np.array([clip.sum() for clip in values])
     counts = np.array([len(clip) for clip in values])
     mean = float(sums.sum() / counts.sum())
+    if not np.isfinite(mean):
+        return mean, None, None
 
     def resampled(chosen: Int[np.ndarray, " c"]) -> float:
         return float(sums[chosen].sum() / counts[chosen].sum())
