@@ -70,7 +70,7 @@ def test_the_floor_is_what_a_perfect_set_gets() -> None:
 def test_a_ratio_compares_what_exceeds_the_floor() -> None:
     real = places(0)
     good, bad = disturbed(real, 0.2, seed=1), disturbed(real, 0.4, seed=2)
-    figure = frechet_ratio(real, good, bad)
+    figure = frechet_ratio(real, good, bad, resamples=50)
     # Shifts of 0.2 and 0.4 give squared distances of 1 to 4.
     assert figure.value == pytest.approx(0.25, abs=0.05)
     assert figure.low is not None
