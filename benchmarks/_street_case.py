@@ -85,7 +85,9 @@ def clip_of(case: Case) -> Clip:
 
 def start(case: Case, quality: Quality, folder: Path) -> Start:
     """Geometry, seeds and static fit of a case, kept in the folder."""
-    stages = Stages(folder / case.name, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
+    stages = Stages(
+        folder / case.name, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True)
+    )
     made = world_of(case.seed)
     about = [case.name, FRAMES, SIZE, made.frames[0].mean().item()]
     clip = stages.run("prior", (), about, lambda _: clip_of(case))
@@ -167,10 +169,16 @@ def _free_side(made: Drive, metres: float) -> int:
     """1 for right, -1 for left."""
     clearance = {}
     for side in (-1, 1):
-        centres = [_moved(c, np.array([side * metres, 0.0, 0.0])).world_from_camera[:3, 3] for c in made.cameras]
+        centres = [
+            _moved(c, np.array([side * metres, 0.0, 0.0])).world_from_camera[:3, 3] for c in made.cameras
+        ]
         clearance[side] = min(
             (
-                float(np.hypot(*np.maximum(np.abs(_local(box.world_from_box[k], centre))[:2] - box.size_m[:2] / 2, 0)))
+                float(
+                    np.hypot(
+                        *np.maximum(np.abs(_local(box.world_from_box[k], centre))[:2] - box.size_m[:2] / 2, 0)
+                    )
+                )
                 for box in made.boxes
                 for k, centre in enumerate(centres)
             ),
@@ -198,4 +206,3 @@ def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 
     folder.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(path, frames=frames, first=made.frames[0].astype(np.int64).sum())
     return frames
-

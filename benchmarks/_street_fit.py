@@ -105,7 +105,10 @@ def measure(
         truth, shown = true_frames(case.seed, view, folder), frames_of(fitted.scene, case.seed, view)
         chosen = np.flatnonzero(fitted.scene.held_out) if view == "held_out" else np.arange(len(truth))
         found = [likeness(shown[k].astype(np.float32) / 255, truth[k], whole) for k in chosen]
-        views[view] = {"psnr": float(np.mean([f.psnr for f in found])), "ssim": float(np.mean([f.ssim for f in found]))}
+        views[view] = {
+            "psnr": float(np.mean([f.psnr for f in found])),
+            "ssim": float(np.mean([f.ssim for f in found])),
+        }
         if view != "held_out":
             features |= {f"{name}/{view}": rows for name, rows in features_of(shown, extractors).items()}
         if view == "shift_2":

@@ -17,7 +17,9 @@ Key = tuple[str, str, str]  # geometry, references, budget
 AllFeatures = dict[tuple[Case, str, str], Features]
 
 
-def summary(records: list[dict[str, Any]], features: AllFeatures, truth: dict[int, Features]) -> dict[str, Any]:
+def summary(
+    records: list[dict[str, Any]], features: AllFeatures, truth: dict[int, Features]
+) -> dict[str, Any]:
     """Everything the tables show, as plain values."""
     groups: dict[Key, list[dict[str, Any]]] = defaultdict(list)
     for record in records:
@@ -25,7 +27,9 @@ def summary(records: list[dict[str, Any]], features: AllFeatures, truth: dict[in
     tables: list[dict[str, Any]] = []
     for (geometry, references, budget), found in groups.items():
         # What ours reached with its own steps stands in every table.
-        ours = [r for r in groups.get((geometry, references, "equal_steps"), []) if r["representation"] == OURS]
+        ours = [
+            r for r in groups.get((geometry, references, "equal_steps"), []) if r["representation"] == OURS
+        ]
         found = found if budget == "equal_steps" else ours + found
         tables.append(
             {
@@ -70,7 +74,9 @@ def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
     rng = np.random.default_rng(0)
     for view in (*VIEWS, "novel"):
         shown = NOVEL if view == "novel" else (view,)
-        worlds = sorted(set.intersection(*(set(w) for w in by.values()))) if OURS in by and len(by) > 1 else []
+        worlds = (
+            sorted(set.intersection(*(set(w) for w in by.values()))) if OURS in by and len(by) > 1 else []
+        )
         if not worlds:
             continue
         values = {
@@ -142,12 +148,22 @@ def markdown(report: dict[str, Any]) -> str:
     """The tables as text."""
     parts: list[str] = []
     for table in report["tables"]:
-        parts.append(f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n")
+        parts.append(
+            f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n"
+        )
         head = ["representation", "worlds", "steps", "s", *VIEWS]
         lines = [head, ["---"] * len(head)]
         for row in sorted(table["means"], key=lambda r: -r["held_out_psnr"]):
             cells = [f"{row[f'{view}_psnr']:.2f} / {row[f'{view}_ssim']:.3f}" for view in VIEWS]
-            lines.append([row["representation"], str(row["worlds"]), f"{row['steps']:.0f}", f"{row['seconds']:.1f}", *cells])
+            lines.append(
+                [
+                    row["representation"],
+                    str(row["worlds"]),
+                    f"{row['steps']:.0f}",
+                    f"{row['seconds']:.1f}",
+                    *cells,
+                ]
+            )
         parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n")
         gains = [
             f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}) over {gain['best_other']}"
@@ -171,7 +187,15 @@ def _distance_lines(rows: list[dict[str, Any]]) -> str:
             ratio = f"{row['ours_over_this']:.2f}"
             if low is not None:
                 ratio += f" ({low:.2f} to {high:.2f})" + (", undecided" if low <= 1 <= high else "")
-        cells = [row["network"], row["representation"], f"{row['distance']:.4g}", span, f"{row['floor']:.3g}", str(row["samples"]), ratio]
+        cells = [
+            row["network"],
+            row["representation"],
+            f"{row['distance']:.4g}",
+            span,
+            f"{row['floor']:.3g}",
+            str(row["samples"]),
+            ratio,
+        ]
         lines.append(cells)
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 

@@ -23,7 +23,17 @@ from pathlib import Path
 from typing import Any, get_args
 
 from _street_case import FRAMES, NOVEL, VIEWS, Case, Poses, References, start, true_frames
-from _street_fit import Features, features_of, fit_case, keep_picture, load, load_features, measure, save, with_steps
+from _street_fit import (
+    Features,
+    features_of,
+    fit_case,
+    keep_picture,
+    load,
+    load_features,
+    measure,
+    save,
+    with_steps,
+)
 from _street_table import markdown, picture, summary
 
 from dreamdrive.cli.machine import use_all_cores
@@ -139,7 +149,9 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     options.seeds = options.seeds or (list(SEEDS[:2]) if options.quick else list(SEEDS))
     options.geometry = options.geometry or (["true"] if options.quick else list(get_args(Poses)))
-    options.representations = options.representations or list(REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS)
+    options.representations = options.representations or list(
+        REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS
+    )
     options.budgets = options.budgets or (["equal_steps"] if options.quick else list(BUDGETS))
     return options
 
@@ -175,7 +187,11 @@ def main() -> None:
         "weights": toolbox.weights,
         "missing": toolbox.missing,
         "rows": [
-            {**{key: value for key, value in record.items() if key != "views"}, "view": view, **record["views"][view]}
+            {
+                **{key: value for key, value in record.items() if key != "views"},
+                "view": view,
+                **record["views"][view],
+            }
             for record in records
             for view in VIEWS
         ],

@@ -10,13 +10,21 @@ from rich.logging import RichHandler
 
 import dreamdrive
 from dreamdrive.cli.doctor import doctor
+from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.render import render
 from dreamdrive.cli.world import world
 from dreamdrive.errors import InputError
 
-COMMANDS = {"generate": generate, "render": render, "export": export, "world": world, "doctor": doctor}
+COMMANDS = {
+    "generate": generate,
+    "render": render,
+    "export": export,
+    "evaluate": evaluate,
+    "world": world,
+    "doctor": doctor,
+}
 _USER_ERROR, _INTERRUPTED = 2, 130
 # What the machine may refuse without anything being wrong with the program.
 _REFUSALS = {

@@ -1,1 +1,1 @@
-"""Measures of a result: how well it holds together, and how far it is from the truth."""
+"""How good results are: figures with their sample counts, floors and intervals."""

@@ -1,0 +1,263 @@
+"""What a distance between sets of clips would be by chance: floors of split halves, intervals over clips."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.errors import InputError
+from dreamdrive.evaluate.frechet import Covariance, frechet_distance
+
+SPLITS = 10
+"""Random halvings that a floor is the mean of."""
+RESAMPLES = 200
+"""Resamples of the clips behind an interval."""
+MIN_SAMPLES = 4
+"""Samples of a set whose halves still have a distance."""
+LEVEL = 0.95
+"""What share of the resamples an interval holds."""
+
+Features = Sequence[Float[np.ndarray, "_ _"]]
+"""Features (samples, d) of each clip of a set."""
+Distance = Callable[[Float[np.ndarray, "n d"], Float[np.ndarray, "m d"]], float]
+
+
+@dataclass(frozen=True)
+class DistanceFigure:
+    """A distance between two sets, with what is needed to read it.
+
+    Attributes:
+        value: The distance of all samples.
+        low: Lower end of its 95 % interval over clips; ``None`` where a set has one clip only.
+        high: Upper end.
+        floor: Mean distance of two random halves of the real set: what a perfect fake set of that size gets.
+        half: Mean distance of a half of the fake set to a half of the real one: comparable with ``floor``,
+            as ``value`` is not, because distances shrink as samples are added.
+        real_samples: Number of real feature vectors.
+        fake_samples: Number of fake ones.
+        real_clips: Number of clips they come from.
+        fake_clips: The same of the fake ones.
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    floor: float
+    half: float
+    real_samples: int
+    fake_samples: int
+    real_clips: int
+    fake_clips: int
+
+
+@dataclass(frozen=True)
+class RatioFigure:
+    """Excess of one distance over the floor as a share of another's.
+
+    Attributes:
+        value: (a - floor) / (b - floor).
+        low: Lower end of its 95 % interval over clips; ``None`` with one clip only.
+        high: Upper end.
+        a: Distance of the first set.
+        b: Distance of the second set, which the first is measured by.
+        floor: Distance of two halves of the real set.
+        samples: Number of real feature vectors.
+        clips: Number of clips.
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    a: float
+    b: float
+    floor: float
+    samples: int
+    clips: int
+
+
+def frechet_with_interval(
+    real: Features,
+    fake: Features,
+    *,
+    covariance: Covariance = "sample",
+    paired: bool = False,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> DistanceFigure:
+    """Fréchet distance of two sets of clips with floor and interval; see ``distance_with_interval``."""
+    distance = partial(frechet_distance, covariance=covariance)
+    return distance_with_interval(real, fake, distance, paired=paired, seed=seed, resamples=resamples)
+
+
+def distance_with_interval(
+    real: Features,
+    fake: Features,
+    distance: Distance,
+    *,
+    paired: bool = False,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> DistanceFigure:
+    """A distance of two sets of clips with its floor and its interval.
+
+    Clips are drawn with replacement, because the frames of one clip are not independent. Duplicates raise a
+    distance: the quantiles are therefore shifted by what the resamples exceed the value by on average, and
+    the interval tells how much the value would scatter for other clips, of the same number.
+
+    Args:
+        real: Features (samples, d) of each real clip.
+        fake: The same of each fake clip.
+        distance: Of two arrays of features.
+        paired: Clip i of both sets shows the same place: they are drawn together.
+        seed: Of halves and resamples.
+        resamples: How many; 0 leaves the interval out.
+
+    Raises:
+        InputError: Too few samples, or paired sets of different length.
+    """
+    if paired:
+        _check_paired(real, fake)
+    rng = np.random.default_rng(seed)
+    all_real, all_fake = np.concatenate(real), np.concatenate(fake)
+    value = distance(all_real, all_fake)
+    floor, (half,) = _half_distances(all_real, (all_fake,), distance, rng)
+
+    def resampled(chosen: Int[np.ndarray, " c"]) -> float:
+        other = chosen if paired else rng.integers(0, len(fake), len(fake))
+        return distance(_gathered(real, chosen), _gathered(fake, other))
+
+    enough = min(len(real), len(fake)) > 1
+    low, high = _interval(value, len(real) if enough else 1, resampled, rng, resamples)
+    counts = (len(all_real), len(all_fake), len(real), len(fake))
+    return DistanceFigure(value, low, high, floor, half, *counts)
+
+
+def frechet_ratio(
+    real: Features,
+    a: Features,
+    b: Features,
+    *,
+    covariance: Covariance = "sample",
+    match_counts: bool = True,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+    splits: int = SPLITS,
+) -> RatioFigure:
+    """How far set ``a`` is above the floor as a share of how far set ``b`` is: below 1, ``a`` is better.
+
+    Clip i of all three sets shows the same place; a resample takes the same clips of each, with new halves,
+    so that what the clips have in common cancels.
+
+    Args:
+        real: Features (samples, d) of each real clip.
+        a: Features of the fake clips to judge.
+        b: Features of the fake clips to compare with.
+        covariance: The normaliser.
+        match_counts: Measure ``a`` and ``b`` by halves too, as the floor is. Otherwise they are measured by
+            all samples; with few of them the floor of halves may then exceed both, and the ratio means
+            nothing.
+        seed: Of halves and resamples.
+        resamples: How many; 0 leaves the interval out.
+        splits: Random halvings behind the value and behind each resample.
+
+    Raises:
+        InputError: Too few samples, or sets of different numbers of clips.
+    """
+    _check_paired(real, a)
+    _check_paired(real, b)
+    rng = np.random.default_rng(seed)
+    distance = partial(frechet_distance, covariance=covariance)
+
+    def terms(chosen: Int[np.ndarray, " c"]) -> tuple[float, float, float]:
+        truth, first, second = (_gathered(features, chosen) for features in (real, a, b))
+        floor, halves = _half_distances(truth, (first, second), distance, rng, splits)
+        if match_counts:
+            return halves[0], halves[1], floor
+        return distance(truth, first), distance(truth, second), floor
+
+    def ratio(chosen: Int[np.ndarray, " c"]) -> float:
+        of_a, of_b, floor = terms(chosen)
+        return (of_a - floor) / (of_b - floor)
+
+    of_a, of_b, floor = terms(np.arange(len(real)))
+    value = (of_a - floor) / (of_b - floor)
+    low, high = _interval(value, len(real), ratio, rng, resamples)
+    return RatioFigure(value, low, high, of_a, of_b, floor, sum(map(len, real)), len(real))
+
+
+def mean_with_interval(
+    values: Sequence[Float[np.ndarray, " _"]], *, seed: int = 0, resamples: int = RESAMPLES
+) -> tuple[float, float | None, float | None]:
+    """Mean over all frames of all clips, and its 95 % interval over clips.
+
+    The interval is ``None`` with one clip, and of an infinite mean.
+    """
+    rng = np.random.default_rng(seed)
+    sums = np.array([clip.sum() for clip in values])
+    counts = np.array([len(clip) for clip in values])
+    mean = float(sums.sum() / counts.sum())
+    if not np.isfinite(mean):
+        return mean, None, None
+
+    def resampled(chosen: Int[np.ndarray, " c"]) -> float:
+        return float(sums[chosen].sum() / counts[chosen].sum())
+
+    return mean, *_interval(mean, len(values), resampled, rng, resamples)
+
+
+def _half_distances(
+    real: Float[np.ndarray, "n d"],
+    fakes: tuple[Float[np.ndarray, "_ d"], ...],
+    distance: Distance,
+    rng: np.random.Generator,
+    splits: int = SPLITS,
+) -> tuple[float, tuple[float, ...]]:
+    """Mean distances of a random half of the real samples to the other half, and to a half of each fake set.
+
+    Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
+    """
+    for features in (real, *fakes):
+        if len(features) < MIN_SAMPLES:
+            raise InputError(
+                f"a set has {len(features)} samples; a distance with its floor needs {MIN_SAMPLES} or more: "
+                "give more frames or clips"
+            )
+    floors, others = np.zeros(splits), np.zeros((splits, len(fakes)))
+    for split in range(splits):
+        order = rng.permutation(len(real))
+        middle = len(real) // 2
+        first = real[order[:middle]]
+        floors[split] = distance(first, real[order[middle:]])
+        for number, fake in enumerate(fakes):
+            same = order if len(fake) == len(real) else rng.permutation(len(fake))
+            others[split, number] = distance(first, fake[same[len(fake) // 2 :]])
+    return float(floors.mean()), tuple(others.mean(axis=0).tolist())
+
+
+def _interval(
+    value: float,
+    clips: int,
+    statistic: Callable[[Int[np.ndarray, " c"]], float],
+    rng: np.random.Generator,
+    resamples: int,
+) -> tuple[float | None, float | None]:
+    """Quantiles of the statistic of resampled clips, moved so that their mean is the value."""
+    if clips < 2 or resamples == 0:
+        return None, None
+    values = np.array([statistic(rng.integers(0, clips, clips)) for _ in range(resamples)])
+    low, high = np.quantile(values - values.mean(), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(value + low), float(value + high)
+
+
+def _gathered(features: Features, chosen: Int[np.ndarray, " c"]) -> Float[np.ndarray, "n d"]:
+    return np.concatenate([features[clip] for clip in chosen])
+
+
+def _check_paired(real: Features, fake: Features) -> None:
+    if len(real) != len(fake):
+        raise InputError(
+            f"paired sets need the same clips, got {len(real)} real and {len(fake)} fake ones; give both the "
+            "same, or compare them unpaired"
+        )

@@ -1,0 +1,1 @@
+"""Networks whose features figures are made of; weights are files that the user has."""

@@ -1,0 +1,125 @@
+"""Weights from a file into a network, or a message that says what is wrong with the file."""
+
+import hashlib
+import pickle
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from dreamdrive.errors import InputError
+
+Network = TypeVar("Network", bound=nn.Module)
+_SHOWN = 4
+
+
+def load_network(
+    make: Callable[[], Network],
+    path: Path,
+    expected: str,
+    *,
+    ignored: tuple[str, ...] = (),
+) -> Network:
+    """Build a network and fill it from a state dict on disk, for inference.
+
+    Args:
+        make: Builds the network.
+        path: A file with a state dict of the network's own keys; nothing else in it is ever executed.
+        expected: Which file is expected, for messages.
+        ignored: Beginnings of keys of parts that are not used.
+
+    Raises:
+        InputError: The file is missing, unreadable or holds something else.
+    """
+    state = {k: v for k, v in read_state(path, expected).items() if not k.startswith(ignored or ("\0",))}
+    return fill_network(make, state, str(path), expected)
+
+
+def fill_network(
+    make: Callable[[], Network], state: dict[str, Tensor], source: str, expected: str
+) -> Network:
+    """Build a network from a state dict of its keys, for inference in float32.
+
+    Args:
+        make: Builds the network.
+        state: Tensors by key; counters of batches may be missing.
+        source: Where the tensors come from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: Keys are missing or left over, or shapes differ.
+    """
+    with torch.device("meta"):
+        network = make()
+    wanted = network.state_dict()
+    counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
+    state = counters | state
+    _check_keys(wanted, state, source, expected)
+    values = {key: value.float() if value.is_floating_point() else value for key, value in state.items()}
+    network.load_state_dict(values, assign=True)
+    return network.eval().requires_grad_(False)
+
+
+def read_state(path: Path, expected: str) -> dict[str, Tensor]:
+    """The tensors of a state dict on disk.
+
+    Raises:
+        InputError: The file is missing, unreadable or holds something else.
+    """
+    if not path.is_file():
+        raise InputError(f"{path} does not exist or is no file; expected {expected}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
+            state: Any = torch.load(path, map_location="cpu", weights_only=True)
+    except (
+        RuntimeError,
+        pickle.UnpicklingError,
+        zipfile.BadZipFile,
+        EOFError,
+        OSError,
+        ValueError,
+        KeyError,
+    ):
+        raise InputError(
+            f"{path} cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled "
+            f"object); expected {expected}"
+        ) from None
+    if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):  # pyright: ignore[reportUnknownVariableType]
+        raise InputError(f"{path} holds no table of tensors; expected {expected}")
+    return {str(key): value for key, value in state.items()}  # pyright: ignore[reportUnknownVariableType]
+
+
+def sha256(path: Path) -> str:
+    """Digest of a file.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _check_keys(wanted: dict[str, Tensor], state: dict[str, Tensor], source: str, expected: str) -> None:
+    missing = sorted(set(wanted) - set(state))
+    extra = sorted(set(state) - set(wanted))
+    wrong = [
+        f"{key} is {tuple(state[key].shape)}, not {tuple(wanted[key].shape)}"
+        for key in sorted(set(wanted) & set(state))
+        if state[key].shape != wanted[key].shape
+    ]
+    found = [("missing", missing), ("unknown", extra), ("of a wrong shape", wrong)]
+    trouble = [f"{len(keys)} {what}: {_some(keys)}" for what, keys in found if keys]
+    if trouble:
+        raise InputError(f"{source} does not fit ({'; '.join(trouble)}); expected {expected}")
+
+
+def _some(keys: list[str]) -> str:
+    return ", ".join(keys[:_SHOWN]) + (", ..." if len(keys) > _SHOWN else "")

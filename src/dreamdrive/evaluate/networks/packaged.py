@@ -1,0 +1,45 @@
+"""Weights that come inside packages: only their files are used, none of their code is imported."""
+
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.evaluate.networks.checkpoint import sha256
+
+
+class MissingWeightsError(InputError):
+    """Optional weights are not installed, or are others than those that figures are defined by."""
+
+
+@dataclass(frozen=True)
+class PackagedFile:
+    """A file of an installed package.
+
+    Attributes:
+        package: Name under which it is installed.
+        path: Of the file inside.
+        sha256: Its digest: with other weights a figure would be another.
+        install: How to get it.
+    """
+
+    package: str
+    path: str
+    sha256: str
+    install: str
+
+    def locate(self) -> Path:
+        """Where the file is.
+
+        Raises:
+            MissingWeightsError: The package is not installed, or its file is another.
+        """
+        try:
+            found = Path(str(metadata.distribution(self.package).locate_file(self.path)))
+        except metadata.PackageNotFoundError:
+            raise MissingWeightsError(f"{self.package} is not installed: {self.install}") from None
+        if not found.is_file():
+            raise MissingWeightsError(f"{found} of {self.package} is missing: {self.install}")
+        if sha256(found) != self.sha256:
+            raise MissingWeightsError(f"{found} is not the file this figure is defined by: {self.install}")
+        return found

@@ -1,0 +1,41 @@
+"""The ways in which programs bring images to the size of a network; each gives another FID."""
+
+from typing import Literal
+
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+from torch.nn import functional
+
+Resize = Literal["tf1", "torch", "antialias", "clean"]
+"""tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);
+antialias: the same with antialiasing (torchmetrics); clean: antialiased bicubic (clean-fid)."""
+
+
+def resize(
+    images: UInt8[Tensor, "n h w 3"], height: int, width: int, method: Resize
+) -> Float[Tensor, "n 3 {height} {width}"]:
+    """Images of another size with values in [0, 255], not rounded; the aspect ratio is not kept."""
+    planes = images.permute(0, 3, 1, 2).float()
+    size = (height, width)
+    if method == "tf1":
+        return _from_corner(_from_corner(planes, height, 2), width, 3)
+    if method == "torch":
+        return functional.interpolate(planes, size, mode="bilinear", align_corners=False)
+    if method == "antialias":
+        return functional.interpolate(planes, size, mode="bilinear", align_corners=False, antialias=True)
+    if method == "clean":
+        wide = functional.interpolate(planes, size, mode="bicubic", align_corners=False, antialias=True)
+        return wide.clamp(0, 255)
+    raise ValueError(f"resize method {method!r}: expected tf1, torch, antialias or clean")
+
+
+def _from_corner(planes: Float[Tensor, "n 3 _ _"], size: int, axis: int) -> Float[Tensor, "n 3 _ _"]:
+    """Linear interpolation along an axis at index * old / new, the last pixel repeated."""
+    old = planes.shape[axis]
+    position = torch.arange(size, dtype=torch.float32) * (old / size)
+    below = position.floor().long().clamp(max=old - 1)
+    above = (below + 1).clamp(max=old - 1)
+    share = (position - below).reshape([-1 if i == axis else 1 for i in range(4)])
+    first = planes.index_select(axis, below)
+    return first + (planes.index_select(axis, above) - first) * share

@@ -1,0 +1,94 @@
+"""Shift-tolerant LPIPS (Ghildyal and Liu 2022): strides are replaced by blurred subsampling."""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn import functional
+
+from dreamdrive.evaluate.networks.checkpoint import fill_network, read_state
+from dreamdrive.evaluate.networks.lpips import CHANNELS, Heads, PerceptualDistance, Trunk
+from dreamdrive.evaluate.networks.packaged import PackagedFile
+
+_INSTALL = "pip install stlpips-pytorch==0.0.2"
+FILES = {
+    "alex": PackagedFile(
+        "stlpips-pytorch",
+        "stlpips_pytorch/weights/vST0.0/alex_shift_tolerant.pth",
+        "b356b382f96010f77d085ee8343ecd9fd322d0a56e8de2b2d0549fafcad8b9ee",
+        _INSTALL,
+    ),
+    "vgg": PackagedFile(
+        "stlpips-pytorch",
+        "stlpips_pytorch/weights/vST0.0/vgg_shift_tolerant.pth",
+        "44597da68f49c1837c100ff52299050f274d102eb102e5837178c79be6f0e250",
+        _INSTALL,
+    ),
+}
+
+
+class BlurPool(nn.Module):
+    """Every second pixel of the blurred image, with two pixels reflected around it.
+
+    The kernel, (1, 2, 1) / 4 along both axes, is part of the weights.
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.register_buffer("filt", torch.empty(channels, 1, 3, 3))
+
+    def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
+        """Halve both sides, roughly."""
+        weight = self.get_buffer("filt")
+        return functional.conv2d(
+            functional.pad(x, [2] * 4, mode="reflect"), weight, stride=2, groups=x.shape[1]
+        )
+
+
+def vgg() -> Trunk:
+    """VGG16 whose pools have stride 1 and a blurred subsampling behind."""
+    layers: list[nn.Module] = []
+    channels = 3
+    for stage, (out, convolutions) in enumerate(((64, 2), (128, 2), (256, 3), (512, 3), (512, 3))):
+        if stage:
+            layers += [nn.MaxPool2d(2, 1), BlurPool(channels)]
+        for _ in range(convolutions):
+            layers += [nn.Conv2d(channels, out, 3, padding=1), nn.ReLU()]
+            channels = out
+    return Trunk(layers, (3, 9, 17, 25, 33))
+
+
+def alex() -> Trunk:
+    """AlexNet without strides; the first convolution's 4 becomes 2 by blurred subsampling."""
+    layers: list[nn.Module] = [nn.Conv2d(3, 64, 11, padding=2), BlurPool(64), nn.ReLU()]
+    layers += [nn.MaxPool2d(3, 1), BlurPool(64), nn.Conv2d(64, 192, 5, padding=2), nn.ReLU()]
+    layers += [nn.MaxPool2d(3, 1), BlurPool(192)]
+    for channels, out in ((192, 384), (384, 256), (256, 256)):
+        layers += [nn.Conv2d(channels, out, 3, padding=1), nn.ReLU()]
+    return Trunk(layers, (2, 6, 10, 12, 14))
+
+
+TRUNKS = {"alex": alex, "vgg": vgg}
+
+
+def load_stlpips(kind: str) -> PerceptualDistance:
+    """The distance with the weights of the installed package; it takes images in [-1, 1].
+
+    Args:
+        kind: ``alex`` or ``vgg``.
+
+    Raises:
+        MissingWeightsError: The package is not installed.
+    """
+    path = FILES[kind].locate()
+    trunk: dict[str, Tensor] = {}
+    heads: dict[str, Tensor] = {}
+    for key, value in read_state(path, FILES[kind].path).items():
+        if key.startswith("net."):
+            trunk["features." + key.split(".", 2)[2]] = value
+        elif key.startswith("lin"):
+            heads[key] = value
+    return PerceptualDistance(
+        kind,
+        fill_network(TRUNKS[kind], trunk, str(path), FILES[kind].path),
+        fill_network(lambda: Heads(CHANNELS[kind]), heads, str(path), FILES[kind].path),
+    )

@@ -1,0 +1,47 @@
+"""Golden numbers of evaluation, and the seeded weights they were made with."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+
+class Golden:
+    """A JSON file and the arrays beside it."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        self.values: dict[str, Any] = json.loads((folder / "eval" / f"{name}.json").read_text())
+        self.arrays = np.load(folder / "eval" / f"{name}.npz")
+
+    def tensor(self, name: str) -> Tensor:
+        return torch.from_numpy(self.arrays[name])
+
+
+def seeded_state(shapes: dict[str, list[int]], seed: int) -> dict[str, Tensor]:
+    """Weights by the rule of the README: normal, scaled by what each entry is, in the order of the keys."""
+    rng = np.random.RandomState(seed)
+    state: dict[str, Tensor] = {}
+    for key in sorted(shapes):
+        if key.endswith("num_batches_tracked"):
+            continue
+        shape = shapes[key]
+        x = rng.standard_normal(int(np.prod(shape))).astype(np.float32).reshape(shape)
+        parent, kind = key.split(".")[-2:]
+        if kind == "running_var":
+            x = 0.5 * np.abs(x) + 0.5
+        elif kind == "running_mean":
+            x = 0.1 * x
+        elif x.ndim == 1:
+            x = (1 + 0.1 * x) if kind == "weight" and "bn" in parent else 0.1 * x
+        else:
+            x = x * np.sqrt(2 / np.prod(shape[1:]))
+        state[key] = torch.from_numpy(x.astype(np.float32))
+    return state
+
+
+def relative(value: Tensor, expected: Tensor) -> float:
+    """Largest difference as a share of the largest expected value."""
+    return float((value - expected).abs().max() / expected.abs().max())

@@ -1,0 +1,76 @@
+"""What is wrong with a file of weights is said by name."""
+
+from pathlib import Path
+
+import pytest
+import torch
+from torch import nn
+
+from dreamdrive.errors import InputError
+from dreamdrive.evaluate.networks.checkpoint import load_network
+
+
+class Small(nn.Module):
+    def __init__(self) -> None:
+        super().__init__()
+        self.layer = nn.Linear(2, 3)
+        self.bn = nn.BatchNorm1d(3)
+
+
+def saved(folder: Path, **changes: object) -> Path:
+    state = {k: v for k, v in Small().state_dict().items() if not k.endswith("tracked")}
+    state |= changes  # type: ignore[arg-type]
+    torch.save({k.replace("__", "."): v for k, v in state.items() if v is not None}, folder / "w.pth")
+    return folder / "w.pth"
+
+
+def load(path: Path) -> Small:
+    return load_network(Small, path, "small.pth", ignored=("classifier.",))
+
+
+def test_good_weights_arrive_for_inference(tmp_path: Path) -> None:
+    weight = torch.arange(6, dtype=torch.float16).reshape(3, 2)
+    network = load(saved(tmp_path, **{"layer.weight": weight, "classifier.0": torch.zeros(7)}))
+    assert torch.equal(network.layer.weight, weight.float())
+    assert not network.training
+    assert not network.layer.weight.requires_grad
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"layer.bias": None}, "1 missing: layer.bias"),
+        ({"head.bias": torch.zeros(1)}, "1 unknown: head.bias"),
+        (
+            {"layer.weight": torch.zeros(3, 3)},
+            r"1 of a wrong shape: layer.weight is \(3, 3\), not \(3, 2\)",
+        ),
+        ({"layer.weight": 3}, "holds no table of tensors"),
+    ],
+)
+def test_other_weights_are_named(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message + r".*expected small.pth"):
+        load(saved(tmp_path, **changes))
+
+
+def test_files_that_hold_no_weights(tmp_path: Path) -> None:
+    path = tmp_path / "w.pth"
+    with pytest.raises(InputError, match=r"does not exist.*expected small.pth"):
+        load(path)
+    for content in (b"", b"not weights at all", saved(tmp_path).read_bytes()[:400]):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="cannot be read as plain weights"):
+            load(path)
+
+
+def test_nothing_in_a_file_is_executed(tmp_path: Path) -> None:
+    torch.save(Small(), tmp_path / "w.pth")
+    with pytest.raises(InputError, match="a whole pickled object"):
+        load(tmp_path / "w.pth")
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_torchscript_archive_is_told_apart(tmp_path: Path) -> None:
+    torch.jit.save(torch.jit.script(nn.Linear(2, 3)), str(tmp_path / "w.pth"))
+    with pytest.raises(InputError, match="a TorchScript archive"):
+        load(tmp_path / "w.pth")

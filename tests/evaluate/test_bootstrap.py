@@ -1,0 +1,120 @@
+"""Floors, intervals and ratios of distances between sets of clips."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from dreamdrive.errors import InputError
+from dreamdrive.evaluate.bootstrap import frechet_ratio, frechet_with_interval, mean_with_interval
+from dreamdrive.evaluate.frechet import frechet_distance
+
+Clips = Sequence[np.ndarray]
+
+
+def places(seed: int, clips: int = 12, samples: int = 20, d: int = 6) -> list[np.ndarray]:
+    """Features of clips that differ from each other more than their frames do."""
+    rng = np.random.default_rng(seed)
+    return [rng.normal(size=d) + 0.3 * rng.normal(size=(samples, d)) for _ in range(clips)]
+
+
+def disturbed(clips: Clips, amount: float, seed: int = 0) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [clip + amount + 0.1 * rng.normal(size=clip.shape) for clip in clips]
+
+
+def test_the_value_is_the_plain_distance_and_inside_its_interval() -> None:
+    real, fake = places(0), places(1, clips=9)
+    figure = frechet_with_interval(real, fake, covariance="population")
+    assert figure.value == frechet_distance(np.concatenate(real), np.concatenate(fake), "population")
+    assert figure.low is not None
+    assert figure.high is not None
+    assert figure.low < figure.value < figure.high
+    assert (figure.real_clips, figure.real_samples) == (12, 240)
+    assert (figure.fake_clips, figure.fake_samples) == (9, 180)
+
+
+def test_one_seed_gives_one_figure() -> None:
+    real, fake = places(0), places(1)
+    first, again = (frechet_with_interval(real, fake, resamples=20, seed=3) for _ in range(2))
+    assert first == again
+    assert first.low != frechet_with_interval(real, fake, resamples=20, seed=4).low
+
+
+def test_the_interval_is_as_wide_as_the_scatter_over_other_clips() -> None:
+    values = [
+        frechet_distance(np.concatenate(places(2 * i)), np.concatenate(places(2 * i + 1))) for i in range(60)
+    ]
+    figures = [frechet_with_interval(places(2 * i), places(2 * i + 1)) for i in range(5)]
+    widths = [f.high - f.low for f in figures if f.high is not None and f.low is not None]
+    assert 0.5 < np.mean(widths) / (np.quantile(values, 0.975) - np.quantile(values, 0.025)) < 2
+
+
+def test_pairs_are_known_better_than_strangers() -> None:
+    real = places(0)
+    fake = disturbed(real, 0.2)
+    paired = frechet_with_interval(real, fake, paired=True)
+    alone = frechet_with_interval(real, fake)
+    assert paired.value == alone.value
+    assert paired.high - paired.low < 0.5 * (alone.high - alone.low)  # type: ignore[operator]
+
+
+def test_the_floor_is_what_a_perfect_set_gets() -> None:
+    pool = np.random.default_rng(0).normal(size=(400, 8))
+    figure = frechet_with_interval([pool[:200]], [pool[200:]])
+    assert figure.half == pytest.approx(figure.floor, rel=0.25)
+    assert figure.value < figure.floor  # more samples, less distance
+    assert (figure.low, figure.high) == (None, None)
+
+
+def test_a_ratio_compares_what_exceeds_the_floor() -> None:
+    real = places(0)
+    good, bad = disturbed(real, 0.2, seed=1), disturbed(real, 0.4, seed=2)
+    figure = frechet_ratio(real, good, bad, resamples=50)
+    # Shifts of 0.2 and 0.4 give squared distances of 1 to 4.
+    assert figure.value == pytest.approx(0.25, abs=0.05)
+    assert figure.low is not None
+    assert figure.high is not None
+    assert figure.low < figure.value < figure.high < 1
+    assert figure.value == pytest.approx((figure.a - figure.floor) / (figure.b - figure.floor))
+    assert frechet_ratio(real, bad, bad, resamples=0).value == 1
+
+
+def test_a_ratio_of_all_samples_is_of_the_plain_distances() -> None:
+    real = places(0)
+    good, bad = disturbed(real, 0.2, seed=1), disturbed(real, 0.4, seed=2)
+    figure = frechet_ratio(real, good, bad, match_counts=False, resamples=0)
+    assert figure.a == frechet_distance(np.concatenate(real), np.concatenate(good))
+    assert figure.low is None
+
+
+def test_few_samples_make_a_floor_that_only_halves_can_be_compared_with() -> None:
+    rng = np.random.default_rng(0)
+    real = [rng.normal(size=(6, 64)) for _ in range(4)]
+    good, bad = disturbed(real, 0.1), disturbed(real, 0.4)
+    plain = frechet_ratio(real, good, bad, match_counts=False, resamples=0)
+    assert plain.a < plain.floor
+    assert frechet_ratio(real, good, bad, resamples=0).a > plain.floor
+
+
+def test_sets_too_small_for_a_floor() -> None:
+    with pytest.raises(InputError, match="a set has 3 samples"):
+        frechet_with_interval([np.eye(5)], [np.eye(3, 5)])
+
+
+def test_sets_that_do_not_pair() -> None:
+    real = places(0)
+    with pytest.raises(InputError, match="got 12 real and 11 fake"):
+        frechet_with_interval(real, real[:11], paired=True)
+    with pytest.raises(InputError, match="got 12 real and 11 fake"):
+        frechet_ratio(real, real, real[:11])
+
+
+def test_a_mean_is_over_frames_and_its_interval_over_clips() -> None:
+    values = [np.array([1.0, 1.0, 1.0]), np.array([5.0])]
+    mean, low, high = mean_with_interval(values)
+    assert mean == 2
+    assert low is not None
+    assert high is not None
+    assert low < 2 < high
+    assert mean_with_interval(values[:1]) == (1, None, None)
