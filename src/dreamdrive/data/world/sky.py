@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data.world.paint import noise
+from dreamdrive.data.world.textures import sampled
 from dreamdrive.scene.layout import Light
 
 _SHAPE = (128, 512)
@@ -41,14 +41,8 @@ class Sky:
         turn = np.arctan2(directions[:, 1], directions[:, 0]) / (2 * np.pi) % 1.0
         up = np.arctan2(directions[:, 2], np.hypot(directions[:, 0], directions[:, 1])) / (np.pi / 2)
         height, width = self.panorama.shape[:2]
-        x = (turn * (width - 1)).astype(np.float32)
-        y = ((1 - np.clip(up, 0, 1)) * (height - 1)).astype(np.float32)
-        rows = -(-len(x) // 4096)
-        maps = np.zeros((2, rows * 4096), dtype=np.float32)
-        maps[:, : len(x)] = x, y
-        across, down = maps.reshape(2, rows, 4096)
-        picked = cv2.remap(self.panorama, across, down, cv2.INTER_LINEAR)
-        return picked.reshape(-1, 3)[: len(x)]
+        place = np.stack([turn * (width - 1), (1 - np.clip(up, 0, 1)) * (height - 1)], axis=-1)
+        return sampled(self.panorama, place)
 
 
 def make_sky(light: Light, seed: int) -> Sky:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int, Shaped, UInt8
 
 _TAPS = 4
 _ROW = 4096  # OpenCV limits a row of its sampling maps to 32767 entries
@@ -53,7 +53,7 @@ class Textures:
             at = uv + np.float32((2 * tap + 1) / _TAPS - 1) * along
             at = np.where(repeats, at - np.floor(at), np.clip(at, 0, 1))
             tile = index * self._most + level
-            total += _sample(atlas, self._corner[tile] + at * self._size[tile] - np.float32(0.5))
+            total += sampled(atlas, self._corner[tile] + at * self._size[tile] - np.float32(0.5))
         return total / np.float32(_TAPS)
 
     def _packed(self) -> np.ndarray:
@@ -87,13 +87,13 @@ class Textures:
         return atlas
 
 
-def _sample(atlas: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Texels at places (N, 2), columns and rows."""
-    rows = -(-len(place) // _ROW)
+def sampled(image: Shaped[np.ndarray, "h w c"], place: Float[np.ndarray, "n 2"]) -> Shaped[np.ndarray, "n c"]:
+    """Colours between texels at places (N, 2): column and row, counted from the first texel's centre."""
+    rows = max(1, -(-len(place) // _ROW))
     maps = np.zeros((2, rows * _ROW), dtype=np.float32)
     maps[:, : len(place)] = place.T
     across, down = maps.reshape(2, rows, _ROW)
-    return cv2.remap(atlas, across, down, cv2.INTER_LINEAR).reshape(-1, 3)[: len(place)]
+    return cv2.remap(image, across, down, cv2.INTER_LINEAR).reshape(-1, image.shape[2])[: len(place)]
 
 
 def _levels(image: np.ndarray) -> list[np.ndarray]:

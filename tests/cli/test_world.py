@@ -1,0 +1,53 @@
+"""``dreamdrive world make``."""
+
+import json
+from pathlib import Path
+
+import cv2
+from tests.cli.conftest import Run
+
+from dreamdrive.data.layout_file import write_layout
+from dreamdrive.data.world import MOUNTS, draw_street
+
+
+def test_a_world_is_written_with_all_truth(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "w"
+    result = run("world", "make", "--seed", 4, "--frames", 2, "--size", "96x64", "-o", out)
+    assert result.code == 0, result
+    assert "2 frames in" in result.out
+    for name in ("frames", "instances", "semantics", "moving", "sky"):
+        assert cv2.imread(str(out / name / "0001.png"), cv2.IMREAD_UNCHANGED).shape[:2] == (64, 96)
+    names = {path.name for path in out.iterdir()}
+    assert {
+        "depth.npz",
+        "flow.npz",
+        "meta.json",
+        "poses.json",
+        "boxes.json",
+        "layout.json",
+        "layout.png",
+    } <= names
+    assert json.loads((out / "classes.json").read_text())["road"] == 1
+
+
+def test_a_given_layout_is_drawn_by_all_cameras(run: Run, tmp_path: Path) -> None:
+    write_layout(draw_street(1), tmp_path / "street.json")
+    out = tmp_path / "w"
+    made = ["world", "make", "--layout", tmp_path / "street.json", "--frames", 1, "--size", "64x48"]
+    result = run(*made, "--cameras", "surround", "--one-ray", "-o", out)
+    assert result.code == 0, result
+    assert {mount for mount in MOUNTS if (out / mount / "frames" / "0000.png").is_file()} == set(MOUNTS)
+    again = run(*made, "-o", out)
+    assert again.code == 2
+    assert "exists already" in again.err
+
+
+def test_mistakes_are_told(run: Run, tmp_path: Path) -> None:
+    for wrong in (["--frames", 0], ["--fps", "-1"], ["--size", "8x8"], ["--seed", "-3"]):
+        result = run("world", "make", *wrong, "-o", tmp_path / "w")
+        assert result.code == 2
+        assert "expected at least one frame" in result.err
+    (tmp_path / "bad.json").write_text('{"ego": {"track": 3}}')
+    result = run("world", "make", "--layout", tmp_path / "bad.json", "-o", tmp_path / "w")
+    assert result.code == 2
+    assert "$.ego.track" in result.err
