@@ -20,7 +20,7 @@ class Sight:
 
     Attributes:
         share: Share of each pixel that the Gaussians in question fill (H, W).
-        weighted_m: The sum of their centres, each times its share of the pixel, in the scene's world (H, W, 3).
+        weighted_m: Sum of their centres, each times its share of the pixel, in the scene's world (H, W, 3).
     """
 
     share: Float[np.ndarray, "h w"]

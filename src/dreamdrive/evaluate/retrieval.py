@@ -16,7 +16,7 @@ class Retrieval:
         iou: Both true and found, over either; None when nothing is true or found.
         precision: True among the found; None when nothing is found.
         recall: Found among the true; None when nothing is true.
-        average_precision: Mean of the precision over the recall, at all thresholds; None when nothing is true.
+        average_precision: Mean precision over the recall, at all thresholds; None when nothing is true.
     """
 
     true: int

@@ -29,12 +29,12 @@ def true_labels(
 ) -> tuple[Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
     """Whether each Gaussian, the static ones first, stands for something that moves.
 
-    A Gaussian is judged in the frame it was seeded from, where it is at that frame's time. It is moving if its
-    centre falls on a pixel of a moving road user and does not lie behind it, by more than a tenth of the true
-    depth. What lies nearer counts: the pixel shows nothing nearer than the road user, so that this is the
-    road user itself at a wrong depth. One that has left the picture of its frame, or that names none, is judged
-    in the frame where its depth is nearest to the true one. One that is in no picture, or before the sky
-    only, is not judged.
+    A Gaussian is judged in the frame it was seeded from, where it is at that frame's time. It is moving if
+    its centre falls on a pixel of a moving road user and does not lie behind it, by more than a tenth of the
+    true depth. What lies nearer counts: the pixel shows nothing nearer than the road user, so that this is
+    the road user itself at a wrong depth. One that has left the picture of its frame, or that names none, is
+    judged in the frame where its depth is nearest to the true one. One that is in no picture, or before the
+    sky only, is not judged.
 
     Args:
         scene: The scene.

@@ -69,8 +69,8 @@ def views_of(scene: Scene, truth: Truth) -> tuple[Camera, ...]:
     # A size is a whole number of pixels: half a pixel either way is the same shape.
     if abs(first.width_px * height - first.height_px * width) > 0.5 * max(first.width_px, width):
         raise InputError(
-            f"the scene's frames are {first.width_px}x{first.height_px}, those of the world {width}x{height}; "
-            "expected the same shape: give the world that the scene was made from, or generate the scene with "
-            f"--size {width}x{height}"
+            f"the scene's frames are {first.width_px}x{first.height_px}, those of the world {width}x"
+            f"{height}; expected the same shape: give the world that the scene was made from, or generate "
+            f"the scene with --size {width}x{height}"
         )
     return tuple(camera.resized(width, height) for camera in scene.cameras)
