@@ -1,4 +1,4 @@
-"""A scene made from the truth is right, one with its labels exchanged is wrong, known errors have their size."""
+"""A scene made of the truth is right, one with its labels exchanged wrong, known errors have their size."""
 
 import json
 import math
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
+from tests.streets import street_clip, true_geometry
 
 from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
@@ -24,7 +25,6 @@ from dreamdrive.scene.deformation import (
 )
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from tests.streets import street_clip, true_geometry
 
 FRAMES, SIZE = 6, (160, 96)
 
