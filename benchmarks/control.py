@@ -25,7 +25,7 @@ from _markdown import columns
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
-from dreamdrive.evaluate.actor_places import Sight, offset_m
+from dreamdrive.evaluate.actor_places import offset_m
 from dreamdrive.evaluate.similarity import Similarity, fit_similarity
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.pipeline import generate
@@ -198,22 +198,20 @@ def shift(
     length = float(np.linalg.norm(wanted_m))
     for frame in range(len(before.views)):
         errors = [
-            offset_m(sight(made, frame, dynamic), made.truth, frame, instance, brought(made))
+            offset_m(
+                made.scene,
+                made.views[frame],
+                made.truth,
+                frame,
+                instance,
+                brought(made),
+                moving=dynamic,
+            )
             for made in (before, after)
         ]
         if errors[0] is not None and errors[1] is not None:
             along.append(length + float((errors[1] - errors[0]) @ wanted_m) / length)
     return (float(np.median(along)) if along else None), len(along)
-
-
-def sight(made: Made, frame: int, dynamic: bool) -> Sight:
-    """What all Gaussians, or the dynamic ones, show in a frame."""
-    t_s = float(made.scene.times_s[frame])
-    means = made.scene.at(t_s).means.clone()
-    if dynamic:
-        means[: len(made.scene.static)] = 0
-    view = render_scene(made.scene, made.views[frame], t_s, channels=means)
-    return Sight((view.dynamic_share if dynamic else view.alpha).numpy(), view.channels.numpy())
 
 
 def compare(before: Made, after: Made, instance: int | None) -> tuple[float, float, float]:

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
-from torch import Tensor
 
-from dreamdrive.evaluate.actor_places import ActorError, Sight, actor_error
+from dreamdrive.evaluate.actor_places import ActorError, actor_error
 from dreamdrive.evaluate.retrieval import Retrieval, retrieval
 from dreamdrive.evaluate.similarity import fit_similarity
 from dreamdrive.evaluate.true_labels import places, true_labels
@@ -18,7 +17,7 @@ from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.deformation import alive_at
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat.scene_view import SceneView, render_scene
+from dreamdrive.splat.scene_view import render_scene
 
 EDGE_SHARE = 1 / 64
 """Width of the rim around moving things, over that of the picture, which counts as no static surface."""
@@ -86,7 +85,7 @@ def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
     views = views_of(scene, truth)
     similarity = fit_similarity(views, truth.cameras)
     seen = _look(scene, views)
-    share = np.stack([s.sight.share for s in seen])
+    share = np.stack([s.dynamic for s in seen])
     moving, judged = true_labels(scene, views, truth, similarity.scale)
     labels = np.repeat([0.0, 1.0], [len(scene.static), len(scene.dynamic)])
     found, asked = (np.stack([c.world_from_camera[:3, 3] for c in cs]) for cs in (views, truth.cameras))
@@ -99,7 +98,7 @@ def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
         mask=retrieval(truth.moving, share),
         labels=retrieval(moving[judged], labels[judged]),
         fake=_fake_motion(seen, _static_surface(truth), similarity.scale),
-        actors=actor_error([s.sight for s in seen], truth, similarity),
+        actors=actor_error(scene, views, truth, similarity),
     )
 
 
@@ -108,18 +107,18 @@ class _Seen:
     """One frame of a scene: what moves in it, and how far.
 
     Attributes:
-        sight: The dynamic Gaussians.
+        dynamic: Share of the pixel that dynamic Gaussians fill (H, W).
         alpha: Share of the pixel covered by any (H, W).
         moves: Distance to the other times, composited (H, W), in metres of the scene.
     """
 
-    sight: Sight
+    dynamic: Float[np.ndarray, "h w"]
     alpha: Float[np.ndarray, "h w"]
     moves: Float[np.ndarray, "h w"]
 
 
 def _look(scene: Scene, views: Sequence[Camera]) -> list[_Seen]:
-    """Every frame with the centres of the dynamic Gaussians and their ways as further channels."""
+    """Every frame, with the ways of the dynamic Gaussians as a further channel."""
     times_s = scene.times_s.tolist()
     centres = np.stack([places(scene, t_s)[len(scene.static) :] for t_s in times_s])
     lives = _lives(scene)
@@ -127,17 +126,10 @@ def _look(scene: Scene, views: Sequence[Camera]) -> list[_Seen]:
     for frame, (camera, t_s) in enumerate(zip(views, times_s, strict=True)):
         living = alive_at(scene.dynamic, t_s).numpy()
         moves = _moves(centres[:, living], lives[:, living], frame)
-        values = np.column_stack([centres[frame, living], moves])
-        still = torch.zeros(len(scene.static), values.shape[1])
-        channels = torch.cat([still, torch.from_numpy(values.astype(np.float32))])
-        seen.append(_seen(render_scene(scene, camera, t_s, channels=channels)))
+        channel = torch.cat([torch.zeros(len(scene.static)), torch.from_numpy(moves.astype(np.float32))])
+        view = render_scene(scene, camera, t_s, channels=channel[:, None])
+        seen.append(_Seen(view.dynamic_share.numpy(), view.alpha.numpy(), view.channels[..., 0].numpy()))
     return seen
-
-
-def _seen(view: SceneView) -> _Seen:
-    channels: Tensor = view.channels
-    sight = Sight(view.dynamic_share.numpy(), channels[..., :3].numpy())
-    return _Seen(sight, view.alpha.numpy(), channels[..., 3].numpy())
 
 
 def _lives(scene: Scene) -> Float[np.ndarray, "f n"]:

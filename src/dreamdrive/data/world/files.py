@@ -17,6 +17,7 @@ from dreamdrive.data.world.world import World
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.layout import Layout
 
 
 def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = False) -> None:
@@ -71,12 +72,12 @@ def read_world(path: Path, camera: str = "front") -> Drive:
     if not folder.is_dir():
         raise InputError(f"{path} holds neither frames nor a camera {camera!r}; make the world again")
     try:
-        return _read_camera(folder, World(layout))
+        return _read_camera(folder, layout)
     except (OSError, KeyError, TypeError, ValueError, BadZipFile) as error:
         raise InputError(f"{folder} is not a complete world ({error}); make it again") from error
 
 
-def _read_camera(folder: Path, world: World) -> Drive:
+def _read_camera(folder: Path, layout: Layout) -> Drive:
     pinhole = _pinhole(json.loads((folder / "meta.json").read_text(encoding="utf-8")))
     path = json.loads((folder / "poses.json").read_text(encoding="utf-8"))
     hulls = json.loads((folder / "boxes.json").read_text(encoding="utf-8"))
@@ -94,7 +95,7 @@ def _read_camera(folder: Path, world: World) -> Drive:
         flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
         boxes=tuple(_box(values, len(times_s)) for values in hulls["boxes"]),
         ground=road_plane(world_from_map),
-        world=world,
+        world=World(layout),
         world_from_map=world_from_map,
     )
 
