@@ -89,8 +89,9 @@ def main() -> None:
     use_all_cores()
     rows: list[Row] = []
     for seed in options.seeds:
-        rows += measure(seed, options)
-        print(table(rows[-3:] if seed % 3 == 0 else rows[-2:]), flush=True)
+        found = measure(seed, options)
+        rows += found
+        print(table(found), flush=True)
         if options.json:
             options.json.parent.mkdir(parents=True, exist_ok=True)
             settings = {
