@@ -144,6 +144,7 @@ class PlainTrainer:
             loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
         loss.backward()
         moving = 0.1**done if done >= options.warm_up else 0.0
+        self.shared.param_groups[0]["lr"] = options.exposure_rate * 0.1**done
         self.shared.param_groups[1]["lr"] = options.deformation_rate * moving
         self.shared.param_groups[2]["lr"] = options.track_rate * 0.1**done
         for part in (self.static, self.dynamic):

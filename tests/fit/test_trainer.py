@@ -13,7 +13,7 @@ from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.static import footprints
-from dreamdrive.fit.trainer import FitOptions, Model, Trainer
+from dreamdrive.fit.trainer import FitOptions, Model, Trainer, optimise
 from dreamdrive.fit.views import View, training_views
 from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.scene.exposure import ExposureNetwork
@@ -118,3 +118,26 @@ def test_thread_count_changes_no_bit_of_three_steps(parts) -> None:
     for other in results[1:]:
         for name, value in results[0].items():
             assert torch.equal(value, other[name]), name
+
+
+class Greedy:
+    """A densifier that changes nothing and draws a given number of random numbers after each step."""
+
+    def __init__(self, draws: int) -> None:
+        self.draws = draws
+
+    def observe(self, rows, gradient_px, visible) -> None:
+        """Nothing is collected."""
+
+    def update(self, parameters, step, steps, generator) -> None:
+        torch.randn(self.draws, generator=generator)
+
+
+def test_what_is_drawn_for_splits_leaves_the_order_of_the_frames(parts) -> None:
+    views = {1: parts[0], 2: parts[0]}
+    ends = []
+    for draws in (0, 3):
+        model = model_of(parts)
+        optimise(model, views, [Greedy(draws), Greedy(draws)], OPTIONS, 0, lambda done, total: None)
+        ends.append(state(model))
+    assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])

@@ -8,9 +8,14 @@ from typing import Annotated, Any
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Suppress, subcommand
 
 from dreamdrive.cli.evaluate_consistency import consistency
+from dreamdrive.cli.evaluate_decomposition import decomposition
 from dreamdrive.cli.evaluate_video import evaluate_video
 
-EVALUATIONS: dict[str, Callable[..., None]] = {"video": evaluate_video, "consistency": consistency}
+EVALUATIONS: dict[str, Callable[..., None]] = {
+    "video": evaluate_video,
+    "consistency": consistency,
+    "decomposition": decomposition,
+}
 
 # As tyro does for the commands themselves; a union needs a second member where there is one command only.
 _Choices = [Annotated[Any, subcommand(name, constructor=call)] for name, call in EVALUATIONS.items()]

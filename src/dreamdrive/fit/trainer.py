@@ -123,7 +123,7 @@ class Trainer:
         model: What changes.
         densifiers: One for each of ``model.parts()``.
         options: Length, rates and weights.
-        generator: Source of the order of the frames and of the places of split Gaussians.
+        generator: Source of the places of split Gaussians.
     """
 
     def __init__(
@@ -203,15 +203,17 @@ def optimise(
         progress: Called with steps done and steps in all.
     """
     _native.keep_freed_memory()
-    generator = torch.Generator().manual_seed(seed)
-    trainer = Trainer(model, densifiers, options, generator)
+    # Of their own, so that how many Gaussians are split leaves the order of the frames as it is: with one for
+    # both, a change of one thing in the input changed everything else in the scene.
+    frame_order = torch.Generator().manual_seed(seed)
+    trainer = Trainer(model, densifiers, options, torch.Generator().manual_seed(seed))
     skies = {
         shrink: [model.sky.colour(v.camera).contiguous() for v in shrunk] for shrink, shrunk in views.items()
     }
     order: list[int] = []
     for step in range(options.steps):
         if not order:
-            order = torch.randperm(len(views[1]), generator=generator).tolist()
+            order = torch.randperm(len(views[1]), generator=frame_order).tolist()
         shrink = 2 if step / options.steps < options.half_size_share else 1
         which = order.pop()
         trainer.step(step, views[shrink][which], skies[shrink][which], shrink)
@@ -276,6 +278,8 @@ def _decay(model: Model, optimiser: torch.optim.Adam, options: FitOptions, done:
         if group["name"] in RATES:
             waits = group["name"] != "tracks" and done < options.warm_up
             group["lr"] = 0.0 if waits else getattr(options, RATES[group["name"]]) * 0.1**done
+        elif group["name"] == "exposure":
+            group["lr"] = options.exposure_rate * 0.1**done
 
 
 def _step(model: Model, optimiser: torch.optim.Adam) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.world import Drive, make_street
-from dreamdrive.data.world.files import write_world
+from dreamdrive.data.world.files import read_world, write_world
 from dreamdrive.errors import InputError
 
 
@@ -49,3 +49,49 @@ def test_writing_twice_gives_equal_bytes_and_replaces_only_when_told(street: Dri
     with pytest.raises(InputError, match="exists already"):
         write_world({"front": street}, tmp_path / "a")
     write_world({"front": street}, tmp_path / "a", replace=True)
+
+
+def test_a_drive_is_read_back_whole(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "w")
+    found = read_world(tmp_path / "w")
+    for name in (
+        "frames",
+        "times_s",
+        "depth_m",
+        "instance",
+        "semantic",
+        "moving",
+        "flow_px",
+        "world_from_map",
+    ):
+        assert (getattr(found, name) == getattr(street, name)).all(), name
+    for mine, theirs in zip(found.cameras, street.cameras, strict=True):
+        assert (mine.matrix == theirs.matrix).all()
+        assert (mine.world_from_camera == theirs.world_from_camera).all()
+    assert [box.id for box in found.boxes] == [box.id for box in street.boxes]
+    assert (found.boxes[0].world_from_box == street.boxes[0].world_from_box).all()
+    assert found.ground.offset_m == street.ground.offset_m
+    assert found.world.layout == street.world.layout
+
+
+def test_one_of_several_cameras_is_read(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street, "back": street}, tmp_path / "w")
+    assert (read_world(tmp_path / "w", "back").depth_m == street.depth_m).all()
+    with pytest.raises(InputError, match="neither frames nor a camera 'left'"):
+        read_world(tmp_path / "w", "left")
+
+
+def test_a_damaged_world_is_refused(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "w")
+    (tmp_path / "w" / "moving" / "0001.png").write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"0001\.png of moving holds nothing readable"):
+        read_world(tmp_path / "w")
+    (tmp_path / "w" / "moving" / "0001.png").unlink()
+    with pytest.raises(InputError, match="is not a complete world"):
+        read_world(tmp_path / "w")
+    (tmp_path / "w" / "depth.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match="is not a complete world"):
+        read_world(tmp_path / "w")
+    (tmp_path / "w" / "layout.json").unlink()
+    with pytest.raises(InputError, match=r"layout\.json is missing"):
+        read_world(tmp_path / "w")

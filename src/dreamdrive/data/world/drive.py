@@ -170,7 +170,6 @@ def drive(
     world_from_map = np.linalg.inv(poses[0])
     # The product of the first pose with its inverse is the identity only up to rounding; say it exactly.
     cameras = [pinhole, *(pinhole.at(world_from_map @ pose) for pose in poses[1:-1])]
-    up = world_from_map[:3, 2]
     return Drive(
         frames=np.stack([v.frame for v in seen]),
         times_s=times[:-1],
@@ -181,7 +180,7 @@ def drive(
         moving=np.stack([v.moving for v in seen]),
         flow_px=np.stack([v.flow_px for v in seen]),
         boxes=_boxes(world, times[:-1], world_from_map),
-        ground=Ground(up, float(-up @ world_from_map[:3, 3])),
+        ground=road_plane(world_from_map),
         world=world,
         world_from_map=world_from_map,
     )
@@ -201,6 +200,12 @@ def make_street(
     """Draw a street and drive through it; None leaves a choice to the seed."""
     options = StreetOptions(frames / fps, speed_m_s, movers, parked, camera_height_m)
     return drive(draw_street(seed, options), frames, fps, size)
+
+
+def road_plane(world_from_map: Float[np.ndarray, "4 4"]) -> Ground:
+    """The plane z = 0 of the map in the world."""
+    up = world_from_map[:3, 2]
+    return Ground(up, float(-up @ world_from_map[:3, 3]))
 
 
 def _looks(

@@ -4,15 +4,20 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
 
-from dreamdrive.data.layout_file import write_layout
+from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
-from dreamdrive.data.world.drive import Drive
+from dreamdrive.data.world.drive import Drive, WorldBox, road_plane
 from dreamdrive.data.world.materials import Semantic
+from dreamdrive.data.world.world import World
+from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.layout import Layout
 
 
 def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = False) -> None:
@@ -46,6 +51,87 @@ def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = Fals
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)
             _write_camera(drive, place)
+
+
+def read_world(path: Path, camera: str = "front") -> Drive:
+    """Read one camera's drive from a world folder.
+
+    Args:
+        path: The folder that :func:`write_world` wrote.
+        camera: Which of several cameras; a folder of one camera holds that one alone.
+
+    Raises:
+        InputError: It is no world folder, or a part of it is missing, damaged or of another size.
+    """
+    if not (path / "layout.json").is_file():
+        raise InputError(
+            f"{path} is no world: layout.json is missing; expected a folder of dreamdrive world make"
+        )
+    layout = read_layout(path / "layout.json")
+    folder = path if (path / "frames").is_dir() else path / camera
+    if not folder.is_dir():
+        raise InputError(f"{path} holds neither frames nor a camera {camera!r}; make the world again")
+    try:
+        return _read_camera(folder, layout)
+    except (OSError, KeyError, TypeError, ValueError, BadZipFile) as error:
+        raise InputError(f"{folder} is not a complete world ({error}); make it again") from error
+
+
+def _read_camera(folder: Path, layout: Layout) -> Drive:
+    pinhole = _pinhole(json.loads((folder / "meta.json").read_text(encoding="utf-8")))
+    path = json.loads((folder / "poses.json").read_text(encoding="utf-8"))
+    hulls = json.loads((folder / "boxes.json").read_text(encoding="utf-8"))
+    times_s = np.array(path["times_s"], dtype=np.float64)
+    shape = len(times_s), pinhole.height_px, pinhole.width_px
+    world_from_map = np.array(hulls["world_from_map"], dtype=np.float64)
+    return Drive(
+        frames=_images(folder / "frames", (*shape, 3))[..., ::-1].copy(),
+        times_s=times_s,
+        cameras=tuple(pinhole.at(np.array(pose)) for pose in path["world_from_camera"]),
+        depth_m=_array(folder / "depth.npz", "depth_m", shape),
+        instance=_images(folder / "instances", shape).astype(np.int32),
+        semantic=_images(folder / "semantics", shape),
+        moving=_images(folder / "moving", shape) > 0,
+        flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
+        boxes=tuple(_box(values, len(times_s)) for values in hulls["boxes"]),
+        ground=road_plane(world_from_map),
+        world=World(layout),
+        world_from_map=world_from_map,
+    )
+
+
+def _pinhole(meta: dict[str, Any]) -> Camera:
+    k = meta["intrinsics"]
+    return Camera(k["fx"], k["fy"], k["cx"] + 0.5, k["cy"] + 0.5, meta["width"], meta["height"])
+
+
+def _images(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
+    images = np.zeros(shape, dtype=np.uint8)
+    for i in range(len(images)):
+        path = folder / f"{i:04d}.png"
+        image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
+        images[i] = _of_shape(path, image, shape[1:])
+    return images
+
+
+def _array(path: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    with np.load(path) as stored:
+        return _of_shape(path, stored[name], shape)
+
+
+def _of_shape(path: Path, values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+    if values is None or values.shape != shape:
+        got = "nothing readable" if values is None else f"shape {values.shape}"
+        raise ValueError(f"{path.name} of {path.parent.name} holds {got}, expected {shape}")
+    return values
+
+
+def _box(values: dict[str, Any], frames: int) -> WorldBox:
+    poses = np.array(values["world_from_box"], dtype=np.float64)
+    if poses.shape != (frames, 4, 4):
+        raise ValueError(f"box {values['id']} has poses of shape {poses.shape} for {frames} frames")
+    size_m = np.array(values["size_m"], dtype=np.float64)
+    return WorldBox(values["instance"], values["id"], values["kind"], values["moving"], size_m, poses)
 
 
 def _write_camera(drive: Drive, folder: Path) -> None:

@@ -1,0 +1,109 @@
+"""``dreamdrive evaluate decomposition``: how well a scene tells what moves, against the world it is of."""
+
+import json as json_format
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import Positional, arg
+
+from dreamdrive.cli.machine import use_all_cores
+from dreamdrive.cli.scene import open_scene
+from dreamdrive.errors import InputError
+
+if TYPE_CHECKING:
+    from dreamdrive.evaluate.decomposition import Decomposition
+    from dreamdrive.evaluate.truth import Truth
+    from dreamdrive.scene.scene import Scene
+
+
+def decomposition(
+    out: Annotated[Positional[Path], arg(metavar="OUT")],
+    world: Annotated[Positional[Path], arg(metavar="WORLD")],
+    *,
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+) -> None:
+    """Measure how well a scene tells static from moving, against the simulated world that it is of.
+
+    Args:
+        out: The folder that generate wrote.
+        world: The folder that world make wrote, or a layout, which is drawn again as the scene saw it.
+        json: Write the figures to this file as well.
+    """
+    use_all_cores()
+    from dreamdrive.evaluate.decomposition import evaluate_decomposition
+
+    scene = open_scene(out)
+    console = Console()
+    with console.status("drawing the truth and looking at the scene"):
+        figures = evaluate_decomposition(scene, _truth(scene, world))
+    console.print(_table(figures))
+    if json is not None:
+        _write(json, figures)
+        console.print(f"{json}", soft_wrap=True)
+
+
+def _truth(scene: "Scene", world: Path) -> "Truth":
+    """The truth of the scene's frames."""
+    from dreamdrive.data.layout_file import read_layout
+    from dreamdrive.data.world import drive
+    from dreamdrive.data.world.files import read_world
+    from dreamdrive.evaluate.truth import Truth
+
+    if not world.exists():
+        raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")
+    index = [int(i) for i in scene.provenance.get("source_index") or range(len(scene.cameras))]
+    if world.is_dir():
+        made = read_world(world)
+    else:
+        size = (scene.cameras[0].width_px, scene.cameras[0].height_px)
+        made = drive(read_layout(world), max(index) + 1, _rate_hz(scene, index), size)
+    if max(index) >= len(made.frames):
+        raise InputError(
+            f"{world} has {len(made.frames)} frames but the scene shows frame {max(index)}; "
+            "give the world that the scene was made from"
+        )
+    return Truth.of(made, index)
+
+
+def _rate_hz(scene: "Scene", index: list[int]) -> float:
+    """Frames of the source in a second; of a single frame there is no other."""
+    span_s = float(scene.times_s[-1] - scene.times_s[0])
+    return (index[-1] - index[0]) / span_s if span_s > 0 else 10.0
+
+
+def _table(figures: "Decomposition") -> Table:
+    """The figures with their units, one a row; a dash for what has no meaning."""
+    table = Table("figure", "value", "unit", title=f"{figures.frames} frames, {figures.width_px} px wide")
+    table.columns[1].justify = "right"
+    for name, found, of in (
+        ("pixels", figures.mask, "moving ones"),
+        ("Gaussians", figures.labels, "moving ones"),
+    ):
+        table.add_row(f"{name}: IoU", _number(found.iou, 3), f"{found.true} of {found.count} are {of}")
+        table.add_row(f"{name}: precision", _number(found.precision, 3), "")
+        table.add_row(f"{name}: recall", _number(found.recall, 3), "")
+        table.add_row(f"{name}: average precision", _number(found.average_precision, 3), "")
+    fake, actors = figures.fake, figures.actors
+    table.add_row("static surface: fake motion", _number(fake and fake.mean_m, 4), "m")
+    table.add_row("static surface: share that moves", _number(fake and fake.moved_share, 2, 100), "%")
+    table.add_row("road users found", str(actors.found), f"of {actors.boxes} that move")
+    table.add_row("road users: place", _number(actors.offset_median_m, 2), "m, median")
+    table.add_row("road users: way gone", _number(actors.displacement_median_m, 2), "m, median error")
+    table.add_row("", _number(actors.displacement_90_m, 2), "m, 90 % below")
+    table.add_row("scale", _number(figures.scale, 4), "true m for a metre of the scene")
+    table.add_row("path", _number(figures.path_rms_m, 3), "m off, at this scale")
+    return table
+
+
+def _number(value: float | None, digits: int, factor: float = 1.0) -> str:
+    return "-" if value is None else f"{value * factor:.{digits}f}"
+
+
+def _write(path: Path, figures: "Decomposition") -> None:
+    from dreamdrive.scene.atomic import new_file
+
+    text = json_format.dumps(figures.to_json(), indent=1, allow_nan=False) + "\n"
+    with new_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")

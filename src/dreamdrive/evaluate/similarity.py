@@ -1,0 +1,64 @@
+"""The similarity that brings one recording's cameras onto those of another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.scene.camera import Camera
+
+_STANDING_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """From points x of one world to scale * rotation @ x + translation_m in another.
+
+    Attributes:
+        scale: Metres there for a unit of length here.
+        rotation: Right-handed (3, 3).
+        translation_m: In the other world (3,).
+    """
+
+    scale: float
+    rotation: Float[np.ndarray, "3 3"]
+    translation_m: Float[np.ndarray, "3"]
+
+    def points(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """The points (..., 3) in the other world."""
+        return self.scale * points @ self.rotation.T + self.translation_m
+
+
+def fit_similarity(found: Sequence[Camera], true: Sequence[Camera]) -> Similarity:
+    """The similarity that brings cameras nearest to the true ones, frame by frame.
+
+    Umeyama 1991 on the positions, with the attitudes as further directions to be brought together: a straight
+    drive leaves the roll about itself free, a standing camera the whole rotation. Positions, over their
+    spread, and attitudes weigh alike. A camera that stands still shows no scale: it stays 1.
+
+    Args:
+        found: One camera a frame.
+        true: The same frames in the other world.
+
+    Raises:
+        ValueError: The numbers of frames differ, or there is none.
+    """
+    if len(found) != len(true) or not found:
+        raise ValueError(f"similarity: {len(found)} cameras against {len(true)}; expected one pair a frame")
+    here, there = (np.stack([c.world_from_camera for c in cameras]) for cameras in (found, true))
+    middle, target = here[:, :3, 3].mean(axis=0), there[:, :3, 3].mean(axis=0)
+    x, y = here[:, :3, 3] - middle, there[:, :3, 3] - target
+    spread = float(np.sqrt(np.square(x).sum())), float(np.sqrt(np.square(y).sum()))
+    moves = min(spread) > _STANDING_M
+    together = np.einsum("fij,fkj->ik", there[:, :3, :3], here[:, :3, :3]) / (3 * len(here))
+    if moves:
+        together += y.T @ x / (spread[0] * spread[1])
+    rotation = _nearest_rotation(together)
+    scale = float((y * (x @ rotation.T)).sum() / spread[0] ** 2) if moves else 1.0
+    return Similarity(scale, rotation, target - scale * rotation @ middle)
+
+
+def _nearest_rotation(matrix: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    left, _, right = np.linalg.svd(matrix)
+    return (left * [1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
