@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 
 from dreamdrive.data.corruption import corrupt, parse_corruption
 from dreamdrive.data.intrinsics import guess_camera
 from dreamdrive.data.select import held_out_mask
-from dreamdrive.data.world import Drive, make_street
+from dreamdrive.data.world import Drive, WorldBox, make_street
+from dreamdrive.evaluate.similarity import Similarity
 from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
@@ -109,34 +110,13 @@ def start(case: Case, quality: Quality, folder: Path) -> Start:
     return Start(clip, geometry, seeds, static)
 
 
-@dataclass(frozen=True)
-class Alignment:
-    """A similarity from the world of a scene to the true one: x -> scale R x + shift."""
-
-    scale: float
-    rotation: Float[np.ndarray, "3 3"]
-    shift_m: Float[np.ndarray, "3"]
-
-    def back(self, camera: Camera) -> Camera:
-        """A camera of the true world, in that of the scene; what it sees is the same."""
-        pose = np.eye(4)
-        pose[:3, :3] = self.rotation.T @ camera.world_from_camera[:3, :3]
-        pose[:3, 3] = self.rotation.T @ (camera.world_from_camera[:3, 3] - self.shift_m) / self.scale
-        return camera.at(pose)
-
-
-def align(found: Float[np.ndarray, "f 4 4"], true: Float[np.ndarray, "f 4 4"]) -> Alignment:
-    """Best rotation of the orientations, then best scale and shift of the positions.
-
-    On a straight drive the positions alone leave the rotation about the drive open.
-    """
-    turns = true[:, :3, :3] @ found[:, :3, :3].transpose(0, 2, 1)
-    left, _, right = np.linalg.svd(turns.sum(axis=0))
-    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    turned = found[:, :3, 3] @ rotation.T
-    here, there = turned - turned.mean(axis=0), true[:, :3, 3] - true[:, :3, 3].mean(axis=0)
-    scale = float((here * there).sum() / max(float((here * here).sum()), 1e-12))
-    return Alignment(scale, rotation, true[:, :3, 3].mean(axis=0) - scale * turned.mean(axis=0))
+def to_scene(camera: Camera, similarity: Similarity) -> Camera:
+    """A camera of the true world in that of a scene; what it sees is the same."""
+    pose = np.eye(4)
+    pose[:3, :3] = similarity.rotation.T @ camera.world_from_camera[:3, :3]
+    away = camera.world_from_camera[:3, 3] - similarity.translation_m
+    pose[:3, 3] = similarity.rotation.T @ away / similarity.scale
+    return camera.at(pose)
 
 
 def true_cameras(seed: int, view: str) -> list[Camera]:
@@ -166,25 +146,21 @@ def _moved(camera: Camera, offset_m: np.ndarray) -> Camera:
 
 
 def _free_side(made: Drive, metres: float) -> int:
-    """1 for right, -1 for left."""
-    clearance = {}
-    for side in (-1, 1):
-        centres = [
-            _moved(c, np.array([side * metres, 0.0, 0.0])).world_from_camera[:3, 3] for c in made.cameras
-        ]
-        clearance[side] = min(
-            (
-                float(
-                    np.hypot(
-                        *np.maximum(np.abs(_local(box.world_from_box[k], centre))[:2] - box.size_m[:2] / 2, 0)
-                    )
-                )
-                for box in made.boxes
-                for k, centre in enumerate(centres)
-            ),
-            default=np.inf,
-        )
-    return 1 if clearance[1] > clearance[-1] else -1
+    """1 for right, -1 for left: where the nearest box is further away."""
+
+    def clearance_m(side: int) -> float:
+        offset = np.array([side * metres, 0.0, 0.0])
+        centres = [_moved(camera, offset).world_from_camera[:3, 3] for camera in made.cameras]
+        gaps = [_gap_m(box, k, centre) for box in made.boxes for k, centre in enumerate(centres)]
+        return min(gaps, default=np.inf)
+
+    return 1 if clearance_m(1) > clearance_m(-1) else -1
+
+
+def _gap_m(box: WorldBox, frame: int, point: np.ndarray) -> float:
+    """Distance on the ground of a point from a box."""
+    local = _local(box.world_from_box[frame], point)[:2]
+    return float(np.hypot(*np.maximum(np.abs(local) - box.size_m[:2] / 2, 0)))
 
 
 def _local(pose: np.ndarray, point: np.ndarray) -> np.ndarray:

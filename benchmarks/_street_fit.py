@@ -9,11 +9,14 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from _street_case import VIEWS, Case, Start, align, true_cameras, true_frames, world_of
+from _street_case import VIEWS, Case, Start, to_scene, true_cameras, true_frames, world_of
 from jaxtyping import Float, UInt8
 
 from dreamdrive.decompose import cast, error_maps, group, score
+from dreamdrive.evaluate.decomposition import evaluate_decomposition
 from dreamdrive.evaluate.extractors import Extractor
+from dreamdrive.evaluate.similarity import fit_similarity
+from dreamdrive.evaluate.truth import Truth
 from dreamdrive.evaluate.video import windows
 from dreamdrive.fit import Parts, Representation, fit
 from dreamdrive.held_out import likeness
@@ -80,14 +83,12 @@ def _parts(begin: Start, representation: Representation, quality: Quality) -> Pa
 
 
 def frames_of(scene: Scene, seed: int, view: str) -> UInt8[np.ndarray, "f h w 3"]:
-    """What a scene shows where the true cameras of a view are; held-out frames from the scene's own cameras."""
-    found = np.stack([camera.world_from_camera for camera in scene.cameras])
-    true = world_of(seed).trajectory.world_from_camera
-    to_true = align(found, true)
+    """What a scene shows where a view's true cameras are; of held-out frames from its own cameras."""
+    similarity = fit_similarity(scene.cameras, world_of(seed).cameras)
     pictures: list[np.ndarray] = []
     for own, camera, t_s in zip(scene.cameras, true_cameras(seed, view), scene.times_s, strict=True):
         # The focal length is the scene's own: with another one the same pixels would show other things.
-        wanted = own if view == "held_out" else own.at(to_true.back(camera).world_from_camera)
+        wanted = own if view == "held_out" else own.at(to_scene(camera, similarity).world_from_camera)
         colour = render_scene(scene, wanted, float(t_s)).colour
         pictures.append((colour.clamp(0, 1) * 255).round().to(torch.uint8).numpy())
     return np.stack(pictures)
@@ -132,6 +133,18 @@ def with_steps(quality: Quality, steps: int, static_steps: int | None = None) ->
     """The same with other numbers of steps."""
     static = quality.static if static_steps is None else replace(quality.static, steps=static_steps)
     return replace(quality, fit=replace(quality.fit, steps=steps), static=static)
+
+
+def told_apart(fitted: Fitted, case: Case) -> dict[str, Any]:
+    """How well static and moving are told apart, and how much the static street moves."""
+    found = evaluate_decomposition(fitted.scene, Truth.of(world_of(case.seed)))
+    return {
+        "mask_iou": found.mask.iou,
+        "label_iou": found.labels.iou,
+        "fake_m": None if found.fake is None else found.fake.mean_m,
+        "path_rms_m": found.path_rms_m,
+        "scale": found.scale,
+    }
 
 
 def keep_picture(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:

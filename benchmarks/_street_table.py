@@ -1,4 +1,4 @@
-"""Tables of the street benchmark: means over worlds, paired differences with intervals, ratios of distances."""
+"""Tables of the street benchmark: means over worlds, paired differences, ratios of distances."""
 
 from collections import defaultdict
 from pathlib import Path
@@ -60,6 +60,9 @@ def _means(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
         for view in VIEWS:
             for figure in ("psnr", "ssim"):
                 row[f"{view}_{figure}"] = float(np.mean([r["views"][view][figure] for r in worlds.values()]))
+        for figure in ("mask_iou", "fake_m"):
+            known = [r[figure] for r in worlds.values() if r[figure] is not None]
+            row[figure] = float(np.mean(known)) if known else None
         rows.append(row)
     return rows
 
@@ -67,8 +70,8 @@ def _means(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
     """PSNR of ours less that of the best other, world by world, with a bootstrap interval over worlds.
 
-    The best other of a view is the one with the highest mean over worlds. ``novel`` is the mean over all views
-    but the withheld frames.
+    The best other of a view is the one with the highest mean over worlds. ``novel`` is the mean over all
+    views but the withheld frames.
     """
     by, result = _seeds(found), {}
     rng = np.random.default_rng(0)
@@ -151,26 +154,21 @@ def markdown(report: dict[str, Any]) -> str:
         parts.append(
             f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n"
         )
-        head = ["representation", "worlds", "steps", "s", *VIEWS]
+        head = ["representation", "worlds", "steps", "s", *VIEWS, "mask IoU", "fake motion, m"]
         lines = [head, ["---"] * len(head)]
         for row in sorted(table["means"], key=lambda r: -r["held_out_psnr"]):
             cells = [f"{row[f'{view}_psnr']:.2f} / {row[f'{view}_ssim']:.3f}" for view in VIEWS]
-            lines.append(
-                [
-                    row["representation"],
-                    str(row["worlds"]),
-                    f"{row['steps']:.0f}",
-                    f"{row['seconds']:.1f}",
-                    *cells,
-                ]
-            )
+            for figure, form in (("mask_iou", ".2f"), ("fake_m", ".3f")):
+                cells.append("-" if row[figure] is None else format(row[figure], form))
+            counts = [str(row["worlds"]), f"{row['steps']:.0f}", f"{row['seconds']:.1f}"]
+            lines.append([row["representation"], *counts, *cells])
         parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n")
         gains = [
-            f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}) over {gain['best_other']}"
+            f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}), {gain['best_other']}"
             for view, gain in table["against_best_other"].items()
         ]
         if gains:
-            parts.append("hybrid: " + "; ".join(gains) + ".\n")
+            parts.append("hybrid less the best other: " + "; ".join(gains) + ".\n")
         if table["distances"]:
             parts.append(_distance_lines(table["distances"]))
     return "\n".join(parts)

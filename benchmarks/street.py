@@ -5,10 +5,10 @@
 
 Seeded worlds of 24 frames are reconstructed with five representations of motion: static (3D-GS), deformable
 (all Gaussians through F_deform, as Deformable-GS and MagicDrive3D), hexplane (as S3Gaussian), vibration (as
-PVG) and hybrid (ours). All take the same optimiser steps from the same points and the same static fit; a second
-table gives all the seconds of hybrid, and a third gives the others five times the steps. Geometry is estimated
-with the true poses, with true intrinsics alone, or with nothing known; references are clean, or corrupted as
-generated video is. Every view is compared with the clean truth at the same pose and time.
+PVG) and hybrid (ours). All take the same optimiser steps from the same points and the same static fit; a
+second table gives all the seconds of hybrid, a third gives the others five times the steps. Depth and motion
+are found by the classical geometry, with true poses, with true intrinsics alone, or with nothing known;
+references are clean, or corrupted as generated video is. Every view is compared with the clean truth.
 
 Each fit is a file below ``--runs``; with ``--resume`` those that are there count.
 """
@@ -32,6 +32,7 @@ from _street_fit import (
     load_features,
     measure,
     save,
+    told_apart,
     with_steps,
 )
 from _street_table import markdown, picture, summary
@@ -109,6 +110,7 @@ def run(job: Job, runs: Path, toolbox: Toolbox) -> None:
         "step_s": fitted.step_s,
         "gaussians": {"static": len(fitted.scene.static), "dynamic": len(fitted.scene.dynamic)},
         "views": views,
+        **told_apart(fitted, job.case),
     }
     keep_picture(runs / "shown" / f"{job.path(runs).stem}.png", middle)
     save(job.path(runs), record, features)
