@@ -1,5 +1,6 @@
 """Changes of one thing in a layout: a box elsewhere, a wider road."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import msgspec
@@ -32,12 +33,12 @@ class BoxEdit:
     moved_m: np.ndarray
 
 
-def move_box(seen: Drive, moving: bool, metres: float) -> BoxEdit:
-    """Move the vehicle that fills most pixels and has room, all of its track alike."""
+def move_box(seen: Drive, moving: bool, metres: float, preferred: Collection[str] = ()) -> BoxEdit:
+    """Move the vehicle that fills most pixels and has room, all of its track alike; preferred ones first."""
     layout = seen.world.layout
     pixels = {box.id: int((seen.instance == box.instance).sum()) for box in seen.boxes}
     fitting = [b for b in layout.boxes if b.kind in VEHICLES and is_moving(b.track) == moving]
-    for box in sorted(fitting, key=lambda b: -pixels[b.id]):
+    for box in sorted(fitting, key=lambda b: (b.id not in preferred, -pixels[b.id])):
         for way, turn in WAYS.items():
             yaw = box.track[0].yaw_rad + turn
             moved_m = metres * np.array([np.cos(yaw), np.sin(yaw)])
@@ -59,11 +60,11 @@ def _has_room(layout: Layout, box: Box, times_s: np.ndarray) -> bool:
     """Whether a box touches no other, no house, nothing upright and not the recording car at any time."""
     houses = shapely.union_all([shapely.Polygon(house.polygon) for house in layout.buildings])
     props = shapely.MultiPoint([prop.at_m for prop in layout.props])
-    ego = shapely.LineString(track_function(layout.ego.track)(times_s)[:, :2])
+    ego = shapely.points(track_function(layout.ego.track)(times_s)[:, :2])
     others = [other for other in layout.boxes if other.id != box.id]
-    for t_s in times_s[:: max(1, len(times_s) // 6)]:
+    for t_s, car in zip(times_s, ego, strict=True):
         own = _footprint(box, t_s).buffer(_CLEAR_M)
-        if own.intersects(houses) or own.intersects(props) or own.distance(ego) < _EGO_CLEAR_M:
+        if own.intersects(houses) or own.intersects(props) or own.distance(car) < _EGO_CLEAR_M:
             return False
         if any(own.intersects(_footprint(other, t_s)) for other in others):
             return False
