@@ -61,7 +61,7 @@ def static_error(stages, street) -> float:
     return error_of_movers(fitted(stages, None), stages[0], street)
 
 
-@pytest.mark.parametrize(("config", "share"), [(PLANES, 0.95), (VibrationConfig(), 0.8)])
+@pytest.mark.parametrize(("config", "share"), [(PLANES, 0.98), (VibrationConfig(), 0.8)])
 def test_moving_things_are_shown_better_than_by_static_gaussians(
     stages, street, static_error: float, config: Any, share: float
 ) -> None:

@@ -1,12 +1,12 @@
 """``dreamdrive evaluate consistency``: whether a video keeps to its path and shows one and the same world."""
 
-import json as json_format
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
-from rich.table import Table
 from tyro.conf import Positional, arg
+
+from dreamdrive.cli.tables import fixed, print_table, write_json
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate.consistency import Consistency
@@ -42,40 +42,28 @@ def consistency(
         figures = evaluate_consistency(
             clip.frames, clip.times_s, clip.rig[0], asked, calibrated=known, valid=clip.valid
         )
-    console.print(_table(figures))
+    title = f"{figures.frames} frames, {figures.width_px} px wide"
+    print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     for note in figures.notes:
         console.print(note, soft_wrap=True, highlight=False)
     if json is not None:
-        _write(json, figures)
+        write_json(json, figures.to_json())
         console.print(f"{json}", soft_wrap=True)
 
 
-def _table(figures: "Consistency") -> Table:
+def _rows(figures: "Consistency") -> list[tuple[str, str, str]]:
     """The figures with their units, one a row; a dash for what was not measured."""
-    table = Table("figure", "value", "unit", title=f"{figures.frames} frames, {figures.width_px} px wide")
-    table.columns[1].justify = "right"
+    rows: list[tuple[str, str, str]] = []
     path = figures.path
-    table.add_row("path: distance (ATE)", _number(path and path.ate_percent, 2), "% of the path")
-    table.add_row("path: translation (RPE)", _number(path and path.translation_percent, 2), "% of a stretch")
-    table.add_row("path: rotation (RPE)", _number(path and path.rotation_deg_per_m, 4), "deg/m")
+    rows.append(("path: distance (ATE)", fixed(path and path.ate_percent, 2), "% of the path"))
+    rows.append(("path: translation (RPE)", fixed(path and path.translation_percent, 2), "% of a stretch"))
+    rows.append(("path: rotation (RPE)", fixed(path and path.rotation_deg_per_m, 4), "deg/m"))
     for at in figures.gaps:
         share = at.epipolar and at.epipolar.share
         within = f"% of {at.epipolar.matches} matches" if at.epipolar else "% of matches"
-        table.add_row(f"epipolar within 2 px, {at.gap} apart", _number(share, 1, 100), within)
+        rows.append((f"epipolar within 2 px, {at.gap} apart", fixed(share, 1, 100), within))
     for at in figures.gaps:
         level = at.warp and at.warp.grey_levels
         on = f"grey levels on {100 * at.warp.share:.0f} % of pixels" if at.warp else "grey levels"
-        table.add_row(f"warp error, {at.gap} apart", _number(level, 2), on)
-    return table
-
-
-def _number(value: float | None, digits: int, factor: float = 1.0) -> str:
-    return "-" if value is None else f"{value * factor:.{digits}f}"
-
-
-def _write(path: Path, figures: "Consistency") -> None:
-    from dreamdrive.scene.atomic import new_file
-
-    text = json_format.dumps(figures.to_json(), indent=1, allow_nan=False) + "\n"
-    with new_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+        rows.append((f"warp error, {at.gap} apart", fixed(level, 2), on))
+    return rows

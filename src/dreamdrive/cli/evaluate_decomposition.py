@@ -1,15 +1,14 @@
 """``dreamdrive evaluate decomposition``: how well a scene tells what moves, against the world it is of."""
 
-import json as json_format
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
-from rich.table import Table
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.tables import fixed, print_table, write_json
 from dreamdrive.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,9 +37,10 @@ def decomposition(
     console = Console()
     with console.status("drawing the truth and looking at the scene"):
         figures = evaluate_decomposition(scene, _truth(scene, world))
-    console.print(_table(figures))
+    title = f"{figures.frames} frames, {figures.width_px} px wide"
+    print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     if json is not None:
-        _write(json, figures)
+        write_json(json, figures.to_json())
         console.print(f"{json}", soft_wrap=True)
 
 
@@ -73,37 +73,24 @@ def _rate_hz(scene: "Scene", index: list[int]) -> float:
     return (index[-1] - index[0]) / span_s if span_s > 0 else 10.0
 
 
-def _table(figures: "Decomposition") -> Table:
+def _rows(figures: "Decomposition") -> list[tuple[str, str, str]]:
     """The figures with their units, one a row; a dash for what has no meaning."""
-    table = Table("figure", "value", "unit", title=f"{figures.frames} frames, {figures.width_px} px wide")
-    table.columns[1].justify = "right"
+    rows: list[tuple[str, str, str]] = []
     for name, found, of in (
         ("pixels", figures.mask, "moving ones"),
         ("Gaussians", figures.labels, "moving ones"),
     ):
-        table.add_row(f"{name}: IoU", _number(found.iou, 3), f"{found.true} of {found.count} are {of}")
-        table.add_row(f"{name}: precision", _number(found.precision, 3), "")
-        table.add_row(f"{name}: recall", _number(found.recall, 3), "")
-        table.add_row(f"{name}: average precision", _number(found.average_precision, 3), "")
+        rows.append((f"{name}: IoU", fixed(found.iou, 3), f"{found.true} of {found.count} are {of}"))
+        rows.append((f"{name}: precision", fixed(found.precision, 3), ""))
+        rows.append((f"{name}: recall", fixed(found.recall, 3), ""))
+        rows.append((f"{name}: average precision", fixed(found.average_precision, 3), ""))
     fake, actors = figures.fake, figures.actors
-    table.add_row("static surface: fake motion", _number(fake and fake.mean_m, 4), "m")
-    table.add_row("static surface: share that moves", _number(fake and fake.moved_share, 2, 100), "%")
-    table.add_row("road users found", str(actors.found), f"of {actors.boxes} that move")
-    table.add_row("road users: place", _number(actors.offset_median_m, 2), "m, median")
-    table.add_row("road users: way gone", _number(actors.displacement_median_m, 2), "m, median error")
-    table.add_row("", _number(actors.displacement_90_m, 2), "m, 90 % below")
-    table.add_row("scale", _number(figures.scale, 4), "true m for a metre of the scene")
-    table.add_row("path", _number(figures.path_rms_m, 3), "m off, at this scale")
-    return table
-
-
-def _number(value: float | None, digits: int, factor: float = 1.0) -> str:
-    return "-" if value is None else f"{value * factor:.{digits}f}"
-
-
-def _write(path: Path, figures: "Decomposition") -> None:
-    from dreamdrive.scene.atomic import new_file
-
-    text = json_format.dumps(figures.to_json(), indent=1, allow_nan=False) + "\n"
-    with new_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    rows.append(("static surface: fake motion", fixed(fake and fake.mean_m, 4), "m"))
+    rows.append(("static surface: share that moves", fixed(fake and fake.moved_share, 2, 100), "%"))
+    rows.append(("road users found", str(actors.found), f"of {actors.boxes} that move"))
+    rows.append(("road users: place", fixed(actors.offset_median_m, 2), "m, median"))
+    rows.append(("road users: way gone", fixed(actors.displacement_median_m, 2), "m, median error"))
+    rows.append(("", fixed(actors.displacement_90_m, 2), "m, 90 % below"))
+    rows.append(("scale", fixed(figures.scale, 4), "true m for a metre of the scene"))
+    rows.append(("path", fixed(figures.path_rms_m, 3), "m off, at this scale"))
+    return rows

@@ -34,6 +34,11 @@ def number(value: float | None) -> str:
     return "-" if value is None else f"{round(value, 5) + 0.0:.4g}"
 
 
+def fixed(value: float | None, digits: int, factor: float = 1.0) -> str:
+    """So many digits behind the point; ``-`` for what is not there."""
+    return "-" if value is None else f"{value * factor:.{digits}f}"
+
+
 def interval(low: float | None, high: float | None) -> str:
     """Both ends of an interval; ``-`` for one that is not there."""
     return "-" if low is None or high is None else f"{number(low)} to {number(high)}"

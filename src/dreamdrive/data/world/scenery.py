@@ -1,5 +1,7 @@
 """What stands beside the road: sidewalks, houses, trees, lamps, signs."""
 
+from collections.abc import Callable
+
 import numpy as np
 import shapely
 
@@ -64,11 +66,15 @@ def _prop(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) ->
 
 
 def _shared(
-    made: dict[tuple[str, int], int], key: tuple[str, int], make: object, materials: Materials, kind: Semantic
+    made: dict[tuple[str, int], int],
+    key: tuple[str, int],
+    make: Callable[[], paint.Image],
+    materials: Materials,
+    kind: Semantic,
 ) -> int:
     """A material that is painted once."""
     if key not in made:
-        made[key] = materials.add(make(), kind, repeats=True)  # pyright: ignore[reportCallIssue]
+        made[key] = materials.add(make(), kind, repeats=True)
     return made[key]
 
 
@@ -91,14 +97,19 @@ def _tree(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) ->
     return Mesh.joined(parts)
 
 
-def _lamp(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
-    steel = _shared(
+def _steel(materials: Materials, made: dict[tuple[str, int], int]) -> int:
+    grey = (98, 104, 106)
+    return _shared(
         made,
         ("steel", 0),
-        lambda: paint.plain(np.random.default_rng(8), 0.5, 2.0, (98, 104, 106)),
+        lambda: paint.plain(np.random.default_rng(8), 0.5, 2.0, grey),
         materials,
         Semantic.POLE,
     )
+
+
+def _lamp(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
+    steel = _steel(materials, made)
     top = prop.height_m
     return Mesh.joined(
         [
@@ -110,13 +121,7 @@ def _lamp(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) ->
 
 
 def _sign(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
-    steel = _shared(
-        made,
-        ("steel", 0),
-        lambda: paint.plain(np.random.default_rng(8), 0.5, 2.0, (98, 104, 106)),
-        materials,
-        Semantic.POLE,
-    )
+    steel = _steel(materials, made)
     face = _shared(
         made,
         ("sign", prop.look),

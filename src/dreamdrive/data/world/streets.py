@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from dreamdrive.data.world.road import LANE_M, PARKING_M, SIDEWALK_M, Road, RoadNet, bent_road, crossing_road
-from dreamdrive.data.world.traffic import Traffic
-from dreamdrive.scene.layout import Building, Ego, Layout, Light, Prop, TrackPoint
+from dreamdrive.data.world.road import LANE_M, SIDEWALK_M, Road, RoadNet, bent_road, crossing_road
+from dreamdrive.data.world.traffic import Traffic, to_track
+from dreamdrive.scene.layout import Building, Ego, Layout, Light, Prop
 
 _EGO_STEP_S = 0.1
 
@@ -91,18 +91,10 @@ def _ego(rng: np.random.Generator, road: Road, speed_m_s: float, options: Street
         velocity = np.gradient(way[:, :2], times, axis=0)
         way[:, 2] = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     return Ego(
-        track=points(times, way),
+        track=to_track(times, way),
         camera_height_m=options.camera_height_m,
         shake_rad=round(float(rng.uniform(0.002, 0.006)), 4),
     )
-
-
-def points(times_s: np.ndarray, way: np.ndarray) -> list[TrackPoint]:
-    """A track from x, y and yaw (T, 3) at times (T,), to the millimetre."""
-    return [
-        TrackPoint(round(float(t), 3), round(float(x), 3), round(float(y), 3), round(float(yaw), 4))
-        for t, (x, y, yaw) in zip(times_s, way, strict=True)
-    ]
 
 
 def _zebras(rng: np.random.Generator, net: RoadNet) -> list[shapely.Polygon]:
@@ -190,6 +182,3 @@ def _light(rng: np.random.Generator) -> Light:
         clouds=round(float(rng.uniform(0.1, 0.8)), 3),
         exposure_drift=round(float(rng.uniform(0.0, 0.08)), 3),
     )
-
-
-__all__ = ["PARKING_M", "StreetOptions", "draw_street", "points"]

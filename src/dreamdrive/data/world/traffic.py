@@ -113,7 +113,7 @@ class Traffic:
         way = road.at(stations, left_m)
         if speed_m_s < 0:
             way[:, 2] += np.pi
-        self._add(kind, self._size(kind), _track(t, way), int(self._rng.integers(10_000)))
+        self._add(kind, self._size(kind), to_track(t, way), int(self._rng.integers(10_000)))
 
     def _ahead(self) -> None:
         rng, road = self._rng, self._net.roads[0]
@@ -178,7 +178,7 @@ class Traffic:
     def _walk(self, start: np.ndarray, direction: np.ndarray, speed_m_s: float) -> None:
         place = start + speed_m_s * self._times[:, None] * direction
         yaw = np.full((len(place), 1), np.arctan2(direction[1], direction[0]))
-        track = _track(self._times, np.hstack([place, yaw]))
+        track = to_track(self._times, np.hstack([place, yaw]))
         self._add("pedestrian", self._size("pedestrian"), track, int(self._rng.integers(10_000)))
 
     def _cycling(self) -> None:
@@ -189,7 +189,8 @@ class Traffic:
         self._drive("bicycle", road, float(rng.uniform(8, 30)), left, -speed if against else speed)
 
 
-def _track(times_s: np.ndarray, way: np.ndarray) -> list[TrackPoint]:
+def to_track(times_s: np.ndarray, way: np.ndarray) -> list[TrackPoint]:
+    """A track from x, y and yaw (T, 3) at times (T,), to the millimetre."""
     return [
         TrackPoint(_round(t), _round(x), _round(y), _round(yaw, 4))
         for t, (x, y, yaw) in zip(times_s, way, strict=True)
