@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import shapely
@@ -39,14 +38,9 @@ def write_layout(layout: Layout, path: Path) -> None:
         partial.write_text(text + "\n", encoding="utf-8")
 
 
-def schema() -> dict[str, Any]:
-    """JSON Schema of a layout."""
-    return msgspec.json.schema(Layout)
-
-
 def schema_text() -> str:
-    """The schema as it is published."""
-    return json.dumps(schema(), indent=2, sort_keys=True) + "\n"
+    """JSON Schema of a layout, as it is published."""
+    return json.dumps(msgspec.json.schema(Layout), indent=2, sort_keys=True) + "\n"
 
 
 def problems(layout: Layout) -> list[str]:

@@ -3,9 +3,6 @@
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-import numpy as np
-from jaxtyping import Int, Shaped
-
 from dreamdrive.data.world.paint import Image
 from dreamdrive.data.world.textures import Textures
 
@@ -51,7 +48,3 @@ class Materials:
         self.semantic.append(int(semantic))
         self.gloss.append(gloss)
         return len(self.texture) - 1
-
-    def of(self, values: list[int] | list[float], index: Int[np.ndarray, " n"]) -> Shaped[np.ndarray, " n"]:
-        """One of the lists above for many materials at once."""
-        return np.array(values)[index]
