@@ -53,19 +53,22 @@ struct AdamTask {
 };
 constexpr int kMostColumns = 64;
 
-// A network of dense layers with ReLU on the positional encoding of a point and a time. Every point has a row of values:
-// its encoding, then the outputs of each hidden layer. Each of these stretches is padded with zeros.
-constexpr int kPad = 16;                        // floats
+// A network of dense layers with ReLU on the positional encoding of a point and a time, or on numbers given for a point.
+// While it is worked on, a point has a row of values: what the network reads, then the outputs of each hidden layer. Each
+// of these stretches is padded with zeros.
+constexpr int kPad = 16;                        // floats, and rows
 constexpr int kNetworkRows = 96;                // points that are worked on together
 constexpr int kMostOctaves = 32;
 static inline int padded(int count) { return (count + kPad - 1) / kPad * kPad; }
 struct NetworkShape {
-  int depth, width, outputs;                    // hidden layers, their units, numbers that come out
+  int depth, width, last, outputs;              // hidden layers, units of each, of the last, numbers that come out
   int position_octaves, time_code;              // of the encoding of a position; floats of the encoded time
   int skip;                                     // hidden layer that reads the encoding again, -1 for none
-  int encoded() const { return 3 * (1 + 2 * position_octaves) + time_code; }
-  int row() const { return padded(encoded()) + depth * padded(width); }
-  int scratch() const { return 2 * kNetworkRows * (padded(width) + padded(outputs)); }
+  int given;                                    // numbers of a point that are read instead of an encoding, 0 for none
+  int encoded() const { return given ? given : 3 * (1 + 2 * position_octaves) + time_code; }
+  int row() const { return padded(encoded()) + (depth - 1) * padded(width) + padded(last); }
+  int most() const { return row() + padded(outputs); }  // of any layer's outputs
+  int scratch() const { return kNetworkRows * (row() + 2 * most()); }
 };
 
 // A hidden layer, or for index = depth the heads side by side. Its packed weights are the matrices of its stretches
@@ -76,29 +79,62 @@ struct NetworkLayer {
   };
   int outputs, stretches;
   Stretch stretch[2];                           // the encoding, the values of the layer before, or both
+  Stretch near() const { return stretch[stretches - 1]; }  // what the layer before wrote
   int inputs() const { return stretch[0].inputs + (stretches > 1 ? stretch[1].inputs : 0); }
   int weights() const { return (inputs() + 1) * outputs; }
 };
 static inline NetworkLayer network_layer(const NetworkShape& shape, int index) {
   const int width = padded(shape.width), encoded = padded(shape.encoded());
-  NetworkLayer layer = {padded(index < shape.depth ? shape.width : shape.outputs), 0, {}};
+  const int outputs = index == shape.depth ? shape.outputs : index == shape.depth - 1 ? shape.last : shape.width;
+  NetworkLayer layer = {padded(outputs), 0, {}};
   if (index == 0 || index == shape.skip) layer.stretch[layer.stretches++] = {0, encoded};
-  if (index > 0) layer.stretch[layer.stretches++] = {encoded + (index - 1) * width, width};
+  const int before = index == shape.depth ? padded(shape.last) : width;
+  if (index > 0) layer.stretch[layer.stretches++] = {encoded + (index - 1) * width, before};
   return layer;
 }
 
 struct NetworkTask {
   NetworkShape shape;
-  const float *means, *centre, *time_code;      // (n, 3), (3), (time_code)
+  const float *means, *centre, *time_code;      // (n, 3), (3), (time_code): what is encoded,
   float radius;
+  const float* given;                           // or (n, given)
   const float* weights;                         // packed, layer by layer
-  int64_t first, last;                          // at most kNetworkRows points
-  float* values;                                // kNetworkRows rows, from point `first` on
+  const int64_t* points;                        // which of the n
+  int count;                                    // of them, at most kNetworkRows
   float* out;                                   // (n, outputs)
-  const float* transposed;                      // (outputs x width) of each layer but the first, padded
+  const float* transposed;                      // (outputs x inputs) of each layer from the last, see passes_on
   const float* d_out;                           // (n, outputs)
   float* d_weights;                             // packed; added to
+  float* d_given;                               // (n, given) or null
   float* scratch;                               // shape.scratch() floats
 };
+// Whether a layer hands gradients to what it reads: an encoding takes none.
+static inline bool passes_on(const NetworkShape& shape, int index) { return index > 0 || shape.given > 0; }
+
+// Eight neighbouring channels of one level of a hexplane at points [first, last): the product of what six planes hold.
+constexpr int kPlaneSlice = 8;                  // channels, side by side at each node
+struct PlanesTask {
+  const float *means, *low, *high;              // (n, 3) and the corners of the box (3)
+  int64_t first, last;
+  int nodes;                                    // along each axis of space
+  int channels;                                 // of the slice that are used
+  const float* space;                           // (3, nodes, nodes, kPlaneSlice): xy, xz, yz, the first named axis last
+  const float* lines;                           // (3, nodes, kPlaneSlice): xt, yt, zt at the time
+  int64_t row;                                  // floats from one point's features to the next one's
+  float* features;                              // of the slice
+  const float* d_features;
+  float *d_space, *d_lines;                     // added to
+};
+
+// The squared differences of neighbours in a square image of nodes, along both axes.
+struct SteepnessTask {
+  const float* image;                           // (nodes, nodes)
+  int nodes;
+  float by_sum;                                 // gradient of the result by the sum
+  float* d_image;                               // null if no gradient is wanted
+  double* sum;
+  float* scratch;                               // 3 steepness_row(nodes) zeros
+};
+static inline int steepness_row(int nodes) { return padded(nodes + 1); }
 
 }  // namespace dd

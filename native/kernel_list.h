@@ -23,6 +23,9 @@ void activate(const ActivationTask&);
 void activate_backward(const ActivationTask&);
 void network(const NetworkTask&);
 void network_backward(const NetworkTask&);
+void planes(const PlanesTask&);
+void planes_backward(const PlanesTask&);
+void steepness(const SteepnessTask&);
 
 extern const Kernels kTable;
 

@@ -189,4 +189,5 @@ NB_MODULE(_native, m) {
   m.def("threads", &dd::thread_count);
   m.def("isa", [] { return std::string(dd::kernels().isa); });
   bind_fit(m);
+  bind_motion(m);
 }

@@ -1,8 +1,6 @@
 // Python bindings of the kernels of a training step: like module.cpp, buffers in and buffers out.
 #include "module_fit.h"
 
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
@@ -18,51 +16,14 @@
 #include <utility>
 #include <vector>
 
-#include "network_run.h"
-#include "pose.h"
+#include "module_arrays.h"
 #include "threads.h"
 #include "types.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
 namespace {
 
-using In = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
-using Out = nb::ndarray<float, nb::c_contig, nb::device::cpu>;
 using Flags = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
-
-void expect_size(const char* name, size_t size, size_t expected) {
-  if (size != expected)
-    throw nb::value_error((std::string(name) + ": expected " + std::to_string(expected) + " numbers, got " +
-                           std::to_string(size)).c_str());
-}
-
-const float* pointer(const std::optional<In>& array) { return array ? array->data() : nullptr; }
-float* pointer(std::optional<Out>& array) { return array ? array->data() : nullptr; }
 const uint8_t* bytes(const Flags& flags) { return reinterpret_cast<const uint8_t*>(flags.data()); }
-
-// Calls run(first, last, part) for stretches of [0, count); which they are does not depend on the threads.
-template <class Run>
-void in_parts(int64_t count, int64_t part_size, const Run& run) {
-  dd::parallel_for((count + part_size - 1) / part_size, [&](int64_t part, int) {
-    run(part * part_size, std::min(count, (part + 1) * part_size), part);
-  });
-}
-
-// Sums of each part, added in order.
-template <size_t kCount>
-struct PartSums {
-  std::vector<std::array<double, kCount>> parts;
-  explicit PartSums(int64_t count) : parts(count) {}
-  double* of(int64_t part) { return parts[part].data(); }
-  std::array<double, kCount> total() const {
-    std::array<double, kCount> sum = {};
-    for (const auto& part : parts)
-      for (size_t k = 0; k < kCount; k++) sum[k] += part[k];
-    return sum;
-  }
-};
 
 // Structural similarity -----------------------------------------------------------------------------------------------
 
@@ -353,155 +314,6 @@ void adam(std::vector<Out> values, std::vector<In> gradients, std::vector<Out> m
   dd::parallel_for(int64_t(tasks.size()), [&](int64_t i, int) { dd::kernels().adam(tasks[i]); });
 }
 
-// Deformation ---------------------------------------------------------------------------------------------------------
-
-// A point's encoding and a network: weight and bias of each hidden layer, then of each head.
-struct Network {
-  std::vector<In> tensors;
-  dd::NetworkShape shape;
-  std::vector<dd::Dense> layers;
-};
-
-Network make_network(std::vector<In> tensors, int depth, int position_octaves, int time_code, int skip) {
-  Network network = {std::move(tensors), {}, {}};
-  auto& t = network.tensors;
-  if (depth < 1 || t.size() < size_t(2 * depth + 2) || t.size() % 2 || skip >= depth || skip == 0)
-    throw nb::value_error("expected hidden layers, then heads, weight and bias each");
-  if (position_octaves < 0 || position_octaves > dd::kMostOctaves || time_code < 0)
-    throw nb::value_error("position_octaves: expected 0 to 32");
-  dd::NetworkShape& shape = network.shape;
-  shape = {depth, int(t[0].shape(0)), 0, position_octaves, time_code, skip};
-  for (size_t d = 0; d < t.size() / 2; d++) {
-    const In &weight = t[2 * d], &bias = t[2 * d + 1];
-    const bool hidden = d < size_t(depth);
-    const int inputs = (d > 0 ? shape.width : 0) + (d == 0 || (hidden && int(d) == skip) ? shape.encoded() : 0);
-    const int outputs = hidden ? shape.width : int(bias.size());
-    expect_size("weight", weight.size(), size_t(inputs) * outputs);
-    expect_size("bias", bias.size(), outputs);
-    if (!hidden) shape.outputs += outputs;
-    network.layers.push_back({weight.data(), bias.data(), outputs, inputs});
-  }
-  return network;
-}
-
-dd::NetworkTask network_task(const Network& network, const In& means, const In& centre, float radius,
-                             const In& time_code) {
-  if (means.size() % 3) throw nb::value_error("means: expected (n, 3)");
-  expect_size("centre", centre.size(), 3);
-  expect_size("time_code", time_code.size(), network.shape.time_code);
-  dd::NetworkTask task = {};
-  task.means = means.data();
-  task.centre = centre.data();
-  task.time_code = time_code.data();
-  task.radius = radius;
-  return task;
-}
-
-int64_t network_values(const Network& network, int64_t n) { return dd::network_values(network.shape, n); }
-
-void network_forward(const Network& network, In means, In centre, float radius, In time_code, std::optional<Out> values,
-                     Out out) {
-  dd::NetworkTask task = network_task(network, means, centre, radius, time_code);
-  const int64_t n = int64_t(means.size() / 3);
-  expect_size("out", out.size(), n * network.shape.outputs);
-  if (values) expect_size("values", values->size(), dd::network_values(network.shape, n));
-  task.out = out.data();
-  float* kept = pointer(values);
-  nb::gil_scoped_release release;
-  dd::network_forward(network.shape, network.layers, task, n, kept);
-}
-
-void network_backward(const Network& network, In values, In d_out, std::vector<Out> gradients) {
-  const int64_t n = int64_t(d_out.size()) / network.shape.outputs;
-  expect_size("values", values.size(), dd::network_values(network.shape, n));
-  if (gradients.size() != network.tensors.size())
-    throw nb::value_error("gradients: expected one for each weight and bias");
-  std::vector<dd::DenseGradient> out;
-  for (size_t d = 0; d < network.layers.size(); d++) {
-    expect_size("gradient", gradients[2 * d].size(), network.tensors[2 * d].size());
-    expect_size("gradient", gradients[2 * d + 1].size(), network.tensors[2 * d + 1].size());
-    out.push_back({gradients[2 * d].data(), gradients[2 * d + 1].data()});
-  }
-  dd::NetworkTask task = {};
-  task.d_out = d_out.data();
-  nb::gil_scoped_release release;
-  dd::network_backward(network.shape, network.layers, task, n, values.data(), out);
-}
-
-using Index = nb::ndarray<const int64_t, nb::c_contig, nb::device::cpu>;
-
-// Canonical Gaussians, what the network adds, and the tracks of a time.
-struct Pose {
-  In means, quaternions, log_scales, logits, residual;
-  std::optional<In> lifespan;
-  std::optional<Index> actor;
-  In translation, yaw, pivot;
-  dd::PoseTask task;
-};
-
-Pose make_pose(In means, In quaternions, In log_scales, In logits, In residual, std::optional<In> lifespan,
-               std::optional<Index> actor, In translation, In yaw, In pivot, In up, float time_s) {
-  const size_t n = logits.size();
-  expect_size("means", means.size(), 3 * n);
-  expect_size("quaternions", quaternions.size(), 4 * n);
-  expect_size("log_scales", log_scales.size(), 3 * n);
-  expect_size("residual", residual.size(), 10 * n);
-  if (lifespan) expect_size("lifespan", lifespan->size(), 2 * n);
-  if (actor) expect_size("actor", actor->size(), n);
-  expect_size("translation", translation.size(), 3 * yaw.size());
-  expect_size("pivot", pivot.size(), 3 * yaw.size());
-  expect_size("up", up.size(), 3);
-  dd::PoseTask task = {};
-  task.n = int64_t(n);
-  task.means = means.data();
-  task.quaternions = quaternions.data();
-  task.log_scales = log_scales.data();
-  task.logits = logits.data();
-  task.residual = residual.data();
-  task.lifespan = pointer(lifespan);
-  task.actor = actor ? actor->data() : nullptr;
-  task.translation = translation.data();
-  task.yaw = yaw.data();
-  task.pivot = pivot.data();
-  task.actors = int64_t(yaw.size());
-  std::copy_n(up.data(), 3, task.up);
-  task.time_s = time_s;
-  for (size_t i = 0; actor && i < n; i++)
-    if (task.actor[i] >= task.actors) throw nb::value_error("actor: there is no such track");
-  return {means, quaternions, log_scales, logits, residual, lifespan, actor, translation, yaw, pivot, task};
-}
-
-void pose_forward(const Pose& pose, Out means, Out quaternions, Out log_scales, Out logits) {
-  const size_t n = size_t(pose.task.n);
-  expect_size("means", means.size(), 3 * n);
-  expect_size("quaternions", quaternions.size(), 4 * n);
-  expect_size("log_scales", log_scales.size(), 3 * n);
-  expect_size("logits", logits.size(), n);
-  const dd::Posed out = {means.data(), quaternions.data(), log_scales.data(), logits.data()};
-  nb::gil_scoped_release release;
-  dd::pose_forward(pose.task, out);
-}
-
-void pose_backward(const Pose& pose, In means, In quaternions, In log_scales, In logits, Out d_means, Out d_quaternions,
-                   Out d_logits, Out d_residual, Out d_translation, Out d_yaw) {
-  const size_t n = size_t(pose.task.n), actors = size_t(pose.task.actors);
-  expect_size("means", means.size(), 3 * n);
-  expect_size("quaternions", quaternions.size(), 4 * n);
-  expect_size("log_scales", log_scales.size(), 3 * n);
-  expect_size("logits", logits.size(), n);
-  expect_size("d_means", d_means.size(), 3 * n);
-  expect_size("d_quaternions", d_quaternions.size(), 4 * n);
-  expect_size("d_logits", d_logits.size(), n);
-  expect_size("d_residual", d_residual.size(), 10 * n);
-  expect_size("d_translation", d_translation.size(), 3 * actors);
-  expect_size("d_yaw", d_yaw.size(), actors);
-  const dd::PosedGradient upstream = {means.data(), quaternions.data(), log_scales.data(), logits.data()};
-  const dd::PoseGradient out = {d_means.data(),    d_quaternions.data(), d_logits.data(),
-                                d_residual.data(), d_translation.data(), d_yaw.data()};
-  nb::gil_scoped_release release;
-  dd::pose_backward(pose.task, upstream, out);
-}
-
 // A step frees and takes the same hundred megabytes again and again. By default glibc hands them back to the kernel in
 // between, which then has to clear every page anew: a tenth of a step.
 void keep_freed_memory() {
@@ -510,10 +322,6 @@ void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
 #endif
 }
-
-// Arrays are taken as they are: a converted copy of an output would be lost.
-auto array(const char* name) { return nb::arg(name).noconvert(); }
-auto maybe(const char* name) { return nb::arg(name).noconvert().none(); }
 
 }  // namespace
 
@@ -537,19 +345,5 @@ void bind_fit(nb::module_& m) {
         array("d_logits"));
   m.def("adam", &adam, array("values"), array("gradients"), array("means"), array("squares"), "rates"_a, "steps"_a,
         "beta1"_a, "beta2"_a, "epsilon"_a);
-  nb::class_<Network>(m, "Network");
-  m.def("network", &make_network, array("tensors"), "depth"_a, "position_octaves"_a, "time_code"_a, "skip"_a);
-  m.def("network_values", &network_values, "network"_a, "n"_a);
-  m.def("network_forward", &network_forward, "network"_a, array("means"), array("centre"), "radius"_a, array("time_code"),
-        maybe("values"), array("out"));
-  m.def("network_backward", &network_backward, "network"_a, array("values"), array("d_out"), array("gradients"));
-  nb::class_<Pose>(m, "Pose");
-  m.def("pose", &make_pose, array("means"), array("quaternions"), array("log_scales"), array("logits"), array("residual"),
-        maybe("lifespan"), maybe("actor"), array("translation"), array("yaw"), array("pivot"), array("up"), "time_s"_a);
-  m.def("pose_forward", &pose_forward, "pose"_a, array("means"), array("quaternions"), array("log_scales"),
-        array("logits"));
-  m.def("pose_backward", &pose_backward, "pose"_a, array("means"), array("quaternions"), array("log_scales"),
-        array("logits"), array("d_means"), array("d_quaternions"), array("d_logits"), array("d_residual"),
-        array("d_translation"), array("d_yaw"));
   m.def("keep_freed_memory", &keep_freed_memory);
 }

@@ -3,3 +3,4 @@
 #include <nanobind/nanobind.h>
 
 void bind_fit(nanobind::module_& m);
+void bind_motion(nanobind::module_& m);

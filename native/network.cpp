@@ -1,12 +1,11 @@
-// The deformation network on a block of points: positional encoding, dense layers with ReLU, and their gradients.
+// A network on a block of points: positional encoding, dense layers with ReLU, and their gradients.
 #include "kernel_list.h"
 #include "lanes.h"
 
 namespace dd::DD_ISA {
 namespace {
 
-constexpr int kRows = 4;  // of a tile of a product, whose sums stay in registers
-static_assert(kNetworkRows % kRows == 0 && kPad % kRows == 0 && kPad % kLanes == 0);
+static_assert(kNetworkRows % kPad == 0 && kPad % kLanes == 0);
 
 // Sine and cosine of angles up to 10^4: what is left after subtracting quarter turns (pi / 2 in three parts), then the
 // polynomials of Cephes' sinf and cosf. Further out the angle itself is known no better than to a thousandth.
@@ -34,8 +33,14 @@ struct Octaves {
   }
 };
 
-// The value, then sine and cosine of 2^0, 2^1, ... times it; then the time's code; then zeros up to the padding.
+// The value, then sine and cosine of 2^0, 2^1, ... times it; then the time's code; then zeros up to the padding. What is
+// given is taken as it is.
 void encode(const NetworkTask& task, const Octaves& octaves, int64_t point, float* row) {
+  if (const int given = task.shape.given) {
+    __builtin_memcpy(row, task.given + given * point, sizeof(float) * given);
+    __builtin_memset(row + given, 0, sizeof(float) * (padded(given) - given));
+    return;
+  }
   const int angles = 3 * task.shape.position_octaves;
   float again[3 + kPad];  // x, y, z, x, y, z, ...
   for (int k = 0; k < 3 + kPad; k++)
@@ -62,145 +67,169 @@ struct Right {
   int64_t step;  // columns lie side by side
 };
 
-template <int kColumns>
-static inline void add_product(V (&sum)[kRows][kColumns], Left a, Right b, int steps) {
-  for (int k = 0; k < steps; k++) {
-    V columns[kColumns];
-    for (int c = 0; c < kColumns; c++) columns[c] = load(b.at + k * b.step + c * kLanes);
-    for (int r = 0; r < kRows; r++) {
-      const V x = broadcast(a.at[r * a.row + k * a.step]);
-      for (int c = 0; c < kColumns; c++) sum[r][c] += x * columns[c];
+// A tile of a product, whose sums stay in registers; its sides divide kPad.
+template <int kTileRows, int kTileVectors>
+struct Tile {
+  static constexpr int rows = kTileRows, vectors = kTileVectors;
+  V sum[rows][vectors];
+
+  void add_product(Left a, Right b, int steps) {
+    for (int k = 0; k < steps; k++) {
+      V columns[vectors];
+      for (int c = 0; c < vectors; c++) columns[c] = load(b.at + k * b.step + c * kLanes);
+      for (int r = 0; r < rows; r++) {
+        const V x = broadcast(a.at[r * a.row + k * a.step]);
+        for (int c = 0; c < vectors; c++) sum[r][c] += x * columns[c];
+      }
     }
   }
+  // Calls visit(row, column, sum) for its parts.
+  template <class Visit>
+  void each(const Visit& visit) {
+    for (int r = 0; r < rows; r++)
+      for (int c = 0; c < vectors; c++) visit(r, c * kLanes, sum[r][c]);
+  }
+};
+
+// Calls run(row, column, tile) for all tiles. AVX-512 has registers for four rows of four vectors, AVX2 for four of three.
+constexpr int kWidest = DD_LANES == 16 ? 4 : 3;
+template <class Run>
+static inline void for_tiles(int rows, int columns, const Run& run) {
+  const auto strip = [&](int column, auto tile) {
+    for (int row = 0; row < rows; row += decltype(tile)::rows) run(row, column, tile);
+    return column + decltype(tile)::vectors * kLanes;
+  };
+  int column = 0;
+  while (column + kWidest * kLanes <= columns) column = strip(column, Tile<4, kWidest>());
+  while (column + 2 * kLanes <= columns) column = strip(column, Tile<4, 2>());
+  while (column < columns) column = strip(column, Tile<8, 1>());
 }
 
-// Calls tile(row, column, Width<k>) for all tiles of kRows rows and k vectors.
-template <int kVectors>
-struct Width {
-  static constexpr int vectors = kVectors;
+// What a block of points is worked on in.
+struct Block {
+  const NetworkTask& task;
+  const NetworkShape& shape;
+  int rows;                                     // points and padding
+  int64_t row_size;
+  float* values;                                // rows of values
+  explicit Block(const NetworkTask& t)
+      : task(t), shape(t.shape), rows(padded(t.count)), row_size(t.shape.row()), values(t.scratch) {}
+  float* work(int which) const { return values + kNetworkRows * (row_size + which * shape.most()); }
 };
-template <class Tile>
-static inline void for_tiles(int rows, int columns, const Tile& tile) {
-  int column = 0;
-  for (; column + 3 * kLanes <= columns; column += 3 * kLanes)
-    for (int row = 0; row < rows; row += kRows) tile(row, column, Width<3>());
-  for (; column + 2 * kLanes <= columns; column += 2 * kLanes)
-    for (int row = 0; row < rows; row += kRows) tile(row, column, Width<2>());
-  for (; column < columns; column += kLanes)
-    for (int row = 0; row < rows; row += kRows) tile(row, column, Width<1>());
-}
 
 // The layer's outputs for all rows of the block, to + row * step; hidden ones through ReLU.
 template <bool kHidden>
-void apply(const NetworkTask& task, const NetworkLayer& layer, const float* weights, float* to, int64_t step) {
-  const int64_t row_size = task.shape.row();
+void apply(const Block& block, const NetworkLayer& layer, const float* weights, float* to, int64_t step) {
   const float* bias = weights + layer.weights() - layer.outputs;
-  for_tiles(kNetworkRows, layer.outputs, [&](int row, int column, auto width) {
-    constexpr int kVectors = decltype(width)::vectors;
-    V sum[kRows][kVectors];
-    for (int r = 0; r < kRows; r++)
-      for (int c = 0; c < kVectors; c++) sum[r][c] = load(bias + column + c * kLanes);
+  for_tiles(block.rows, layer.outputs, [&](int row, int column, auto tile) {
+    tile.each([&](int, int c, V& sum) { sum = load(bias + column + c); });
     const float* matrix = weights + column;
     for (int s = 0; s < layer.stretches; s++) {
       const NetworkLayer::Stretch from = layer.stretch[s];
-      add_product<kVectors>(sum, {task.values + row * row_size + from.at, row_size, 1}, {matrix, layer.outputs},
-                            from.inputs);
+      tile.add_product({block.values + row * block.row_size + from.at, block.row_size, 1}, {matrix, layer.outputs},
+                       from.inputs);
       matrix += from.inputs * layer.outputs;
     }
-    for (int r = 0; r < kRows; r++)
-      for (int c = 0; c < kVectors; c++)
-        store(to + (row + r) * step + column + c * kLanes, kHidden ? vmax(V{}, sum[r][c]) : sum[r][c]);
+    tile.each([&](int r, int c, V& sum) {
+      store(to + (row + r) * step + column + c, kHidden ? vmax(V{}, sum) : sum);
+    });
   });
 }
 
+// The rows of values; returns the weights of the heads.
+const float* fill(const Block& block) {
+  const NetworkShape& shape = block.shape;
+  const Octaves octaves(shape.position_octaves);
+  for (int r = 0; r < block.rows; r++) {
+    float* row = block.values + r * block.row_size;
+    if (r < block.task.count)
+      encode(block.task, octaves, block.task.points[r], row);
+    else
+      __builtin_memset(row, 0, sizeof(float) * padded(shape.encoded()));
+  }
+  const float* weights = block.task.weights;
+  for (int i = 0; i < shape.depth; i++) {
+    const NetworkLayer layer = network_layer(shape, i);
+    apply<true>(block, layer, weights, block.values + network_layer(shape, i + 1).near().at, block.row_size);
+    weights += layer.weights();
+  }
+  return weights;
+}
+
 // Adds to d_weights, laid out as the weights, what the gradient of the layer's outputs (rows x outputs) makes of them.
-void add_weight_gradients(const NetworkTask& task, const NetworkLayer& layer, const float* d_outputs, float* d_weights) {
-  const int64_t row_size = task.shape.row();
+void add_weight_gradients(const Block& block, const NetworkLayer& layer, const float* d_outputs, float* d_weights) {
   float* matrix = d_weights;
   for (int s = 0; s < layer.stretches; s++) {
     const NetworkLayer::Stretch from = layer.stretch[s];
-    for_tiles(from.inputs, layer.outputs, [&](int input, int column, auto width) {
-      constexpr int kVectors = decltype(width)::vectors;
-      V sum[kRows][kVectors];
+    for_tiles(from.inputs, layer.outputs, [&](int input, int column, auto tile) {
       float* to = matrix + input * layer.outputs + column;
-      for (int r = 0; r < kRows; r++)
-        for (int c = 0; c < kVectors; c++) sum[r][c] = load(to + r * layer.outputs + c * kLanes);
-      add_product<kVectors>(sum, {task.values + from.at + input, 1, row_size}, {d_outputs + column, layer.outputs},
-                            kNetworkRows);
-      for (int r = 0; r < kRows; r++)
-        for (int c = 0; c < kVectors; c++) store(to + r * layer.outputs + c * kLanes, sum[r][c]);
+      tile.each([&](int r, int c, V& sum) { sum = load(to + r * layer.outputs + c); });
+      tile.add_product({block.values + from.at + input, 1, block.row_size}, {d_outputs + column, layer.outputs}, block.rows);
+      tile.each([&](int r, int c, V& sum) { store(to + r * layer.outputs + c, sum); });
     });
     matrix += from.inputs * layer.outputs;
   }
   for (int column = 0; column < layer.outputs; column += kLanes) {
     V sum = load(matrix + column);
-    for (int row = 0; row < kNetworkRows; row++) sum += load(d_outputs + row * layer.outputs + column);
+    for (int row = 0; row < block.rows; row++) sum += load(d_outputs + row * layer.outputs + column);
     store(matrix + column, sum);
   }
 }
 
-// Gradient of the hidden values that a layer reads, before their ReLU.
-void pass_back(const NetworkTask& task, const NetworkLayer& layer, const float* transposed, const float* d_outputs,
-               float* d_inputs) {
-  const int64_t row_size = task.shape.row();
-  const NetworkLayer::Stretch from = layer.stretch[layer.stretches - 1];
-  for_tiles(kNetworkRows, from.inputs, [&](int row, int column, auto width) {
-    constexpr int kVectors = decltype(width)::vectors;
-    V sum[kRows][kVectors] = {};
-    add_product<kVectors>(sum, {d_outputs + row * layer.outputs, layer.outputs, 1}, {transposed + column, from.inputs},
-                          layer.outputs);
-    for (int r = 0; r < kRows; r++)
-      for (int c = 0; c < kVectors; c++) {
-        const V value = load(task.values + (row + r) * row_size + from.at + column + c * kLanes);
-        store(d_inputs + (row + r) * from.inputs + column + c * kLanes, masked(value > V{}, sum[r][c]));
-      }
+// Gradient (rows x inputs) of the last stretch that a layer reads; of hidden values before their ReLU.
+void pass_back(const Block& block, const NetworkLayer& layer, bool hidden, const float* transposed,
+               const float* d_outputs, float* d_inputs) {
+  const NetworkLayer::Stretch from = layer.near();
+  for_tiles(block.rows, from.inputs, [&](int row, int column, auto tile) {
+    tile.each([](int, int, V& sum) { sum = V{}; });
+    tile.add_product({d_outputs + row * layer.outputs, layer.outputs, 1}, {transposed + column, from.inputs}, layer.outputs);
+    tile.each([&](int r, int c, V& sum) {
+      const V value = load(block.values + (row + r) * block.row_size + from.at + column + c);
+      store(d_inputs + (row + r) * from.inputs + column + c, hidden ? masked(value > V{}, sum) : sum);
+    });
   });
 }
 
 }  // namespace
 
 void network(const NetworkTask& task) {
+  const Block block(task);
   const NetworkShape& shape = task.shape;
-  const int64_t row_size = shape.row();
-  const int points = int(task.last - task.first);
-  const Octaves octaves(shape.position_octaves);
-  for (int r = 0; r < points; r++) encode(task, octaves, task.first + r, task.values + r * row_size);
-  for (int r = points; r < kNetworkRows; r++) __builtin_memset(task.values + r * row_size, 0, sizeof(float) * row_size);
-  const float* weights = task.weights;
-  for (int i = 0; i < shape.depth; i++) {
-    const NetworkLayer layer = network_layer(shape, i);
-    apply<true>(task, layer, weights, task.values + padded(shape.encoded()) + i * layer.outputs, row_size);
-    weights += layer.weights();
-  }
   const NetworkLayer heads = network_layer(shape, shape.depth);
-  apply<false>(task, heads, weights, task.scratch, heads.outputs);
-  for (int r = 0; r < points; r++)
-    __builtin_memcpy(task.out + (task.first + r) * shape.outputs, task.scratch + r * heads.outputs,
-                     sizeof(float) * shape.outputs);
+  float* out = block.work(0);
+  apply<false>(block, heads, fill(block), out, heads.outputs);
+  for (int r = 0; r < task.count; r++)
+    __builtin_memcpy(task.out + task.points[r] * shape.outputs, out + r * heads.outputs, sizeof(float) * shape.outputs);
 }
 
+// The values are computed anew: kept from the forward pass they would not fit in the cache, and took longer to fetch.
 void network_backward(const NetworkTask& task) {
+  const Block block(task);
   const NetworkShape& shape = task.shape;
-  const int points = int(task.last - task.first), most = kNetworkRows * (padded(shape.width) + padded(shape.outputs));
-  float *d_outputs = task.scratch, *d_inputs = task.scratch + most;
+  fill(block);
+  float *d_outputs = block.work(0), *d_inputs = block.work(1);
   const int outputs = padded(shape.outputs);
-  __builtin_memset(d_outputs, 0, sizeof(float) * kNetworkRows * outputs);
-  for (int r = 0; r < points; r++)
-    __builtin_memcpy(d_outputs + r * outputs, task.d_out + (task.first + r) * shape.outputs,
-                     sizeof(float) * shape.outputs);
-  const int width = padded(shape.width);
+  __builtin_memset(d_outputs, 0, sizeof(float) * block.rows * outputs);
+  for (int r = 0; r < task.count; r++)
+    __builtin_memcpy(d_outputs + r * outputs, task.d_out + task.points[r] * shape.outputs, sizeof(float) * shape.outputs);
+  const float* transposed = task.transposed;
   float* d_weights = task.d_weights;
   for (int i = 0; i <= shape.depth; i++) d_weights += network_layer(shape, i).weights();
   for (int i = shape.depth; i >= 0; i--) {
     const NetworkLayer layer = network_layer(shape, i);
     d_weights -= layer.weights();
-    add_weight_gradients(task, layer, d_outputs, d_weights);
-    if (i == 0) break;
-    pass_back(task, layer, task.transposed + (i - 1) * width * width, d_outputs, d_inputs);
+    add_weight_gradients(block, layer, d_outputs, d_weights);
+    if (!passes_on(shape, i)) return;
+    pass_back(block, layer, i > 0, transposed, d_outputs, d_inputs);
+    transposed += layer.outputs * layer.near().inputs;
     float* swapped = d_outputs;
     d_outputs = d_inputs;
     d_inputs = swapped;
   }
+  if (!task.d_given) return;
+  for (int r = 0; r < task.count; r++)
+    __builtin_memcpy(task.d_given + task.points[r] * shape.given, d_outputs + r * padded(shape.given),
+                     sizeof(float) * shape.given);
 }
 
 }  // namespace dd::DD_ISA

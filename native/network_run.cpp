@@ -1,15 +1,15 @@
 #include "network_run.h"
 
 #include <algorithm>
+#include <numeric>
 
+#include "buffer.h"
 #include "threads.h"
 
 namespace dd {
 namespace {
 
 constexpr int64_t kMostChunks = 32;  // whose weight gradients are kept apart, then added in order
-
-int64_t blocks_of(int64_t n) { return (n + kNetworkRows - 1) / kNetworkRows; }
 
 int64_t packed_size(const NetworkShape& shape) {
   int64_t size = 0;
@@ -39,67 +39,78 @@ void for_weights(const NetworkShape& shape, const std::vector<Dense>& layers, co
   }
 }
 
-std::vector<float> packed(const NetworkShape& shape, const std::vector<Dense>& layers) {
-  std::vector<float> weights(packed_size(shape), 0.0f);
+Floats packed(const NetworkShape& shape, const std::vector<Dense>& layers) {
+  Floats weights(packed_size(shape), 0.0f);
   for_weights(shape, layers, [&](size_t d, int64_t from, bool bias, int64_t to) {
     weights[to] = (bias ? layers[d].bias : layers[d].weight)[from];
   });
   return weights;
 }
 
-// The matrices that pass gradients on to the layer before, (outputs x width) each.
-std::vector<float> transposed(const NetworkShape& shape, const std::vector<float>& weights) {
-  const int width = padded(shape.width);
-  std::vector<float> out;
-  int64_t begin = network_layer(shape, 0).weights();
-  for (int i = 1; i <= shape.depth; i++) {
+// The matrices that pass gradients on, (outputs x inputs) each, from the last layer.
+Floats transposed(const NetworkShape& shape, const Floats& weights) {
+  Floats out;
+  const float* end = weights.data() + weights.size();
+  for (int i = shape.depth; i >= 0 && passes_on(shape, i); i--) {
     const NetworkLayer layer = network_layer(shape, i);
-    const float* matrix = weights.data() + begin + int64_t(layer.inputs() - width) * layer.outputs;
+    const int inputs = layer.near().inputs;
+    const float* matrix = end - int64_t(inputs + 1) * layer.outputs;
     for (int o = 0; o < layer.outputs; o++)
-      for (int k = 0; k < width; k++) out.push_back(matrix[int64_t(k) * layer.outputs + o]);
-    begin += layer.weights();
+      for (int k = 0; k < inputs; k++) out.push_back(matrix[int64_t(k) * layer.outputs + o]);
+    end -= layer.weights();
   }
   return out;
 }
 
+// Points [first, last) that some gradient arrives at: the others change no weight.
+std::vector<int64_t> reached(const NetworkTask& task, int64_t first, int64_t last) {
+  std::vector<int64_t> points;
+  const int outputs = task.shape.outputs;
+  for (int64_t i = first; i < last; i++) {
+    const float* row = task.d_out + i * outputs;
+    if (std::any_of(row, row + outputs, [](float x) { return x != 0.0f; })) points.push_back(i);
+  }
+  return points;
+}
+
 }  // namespace
 
-int64_t network_values(const NetworkShape& shape, int64_t n) { return blocks_of(n) * kNetworkRows * shape.row(); }
-
-void network_forward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask whole, int64_t n,
-                     float* values) {
-  const std::vector<float> weights = packed(shape, layers);
-  const int64_t block_size = int64_t(kNetworkRows) * shape.row();
-  std::vector<float> work(thread_count() * (shape.scratch() + (values ? 0 : block_size)));
+void network_forward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask whole, int64_t n) {
+  const Floats weights = packed(shape, layers);
+  Floats work(thread_count() * shape.scratch());
   whole.shape = shape;
   whole.weights = weights.data();
-  parallel_for(blocks_of(n), [&](int64_t block, int worker) {
+  parallel_for((n + kNetworkRows - 1) / kNetworkRows, [&](int64_t block, int worker) {
+    const int64_t first = block * kNetworkRows;
+    int64_t points[kNetworkRows];
+    std::iota(points, points + kNetworkRows, first);
     NetworkTask task = whole;
-    task.first = block * kNetworkRows;
-    task.last = std::min(n, task.first + kNetworkRows);
-    task.scratch = work.data() + worker * (work.size() / thread_count());
-    task.values = values ? values + block * block_size : task.scratch + shape.scratch();
+    task.points = points;
+    task.count = int(std::min<int64_t>(n - first, kNetworkRows));
+    task.scratch = work.data() + worker * shape.scratch();
     kernels().network(task);
   });
 }
 
 void network_backward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask whole, int64_t n,
-                      const float* values, const std::vector<DenseGradient>& gradients) {
-  const std::vector<float> weights = packed(shape, layers), passing = transposed(shape, weights);
-  const int64_t chunk_blocks = std::max<int64_t>(1, (blocks_of(n) + kMostChunks - 1) / kMostChunks);
-  const int64_t chunks = (blocks_of(n) + chunk_blocks - 1) / chunk_blocks, size = int64_t(weights.size());
-  std::vector<float> work(thread_count() * shape.scratch()), sums(std::max<int64_t>(chunks, 1) * size, 0.0f);
+                      const std::vector<DenseGradient>& gradients) {
+  const Floats weights = packed(shape, layers), passing = transposed(shape, weights);
+  const int64_t chunk_points = std::max<int64_t>(kNetworkRows, (n + kMostChunks - 1) / kMostChunks);
+  const int64_t chunks = (n + chunk_points - 1) / chunk_points, size = int64_t(weights.size());
+  Floats work(thread_count() * shape.scratch()), sums(std::max<int64_t>(chunks, 1) * size, 0.0f);
   whole.shape = shape;
   whole.weights = weights.data();
   whole.transposed = passing.data();
   parallel_for(chunks, [&](int64_t chunk, int worker) {
+    const int64_t first = chunk * chunk_points, last = std::min(n, first + chunk_points);
     NetworkTask task = whole;
     task.scratch = work.data() + worker * shape.scratch();
     task.d_weights = sums.data() + chunk * size;
-    for (int64_t block = chunk * chunk_blocks; block < std::min(blocks_of(n), (chunk + 1) * chunk_blocks); block++) {
-      task.first = block * kNetworkRows;
-      task.last = std::min(n, task.first + kNetworkRows);
-      task.values = const_cast<float*>(values) + task.first * shape.row();
+    if (task.d_given) std::fill(task.d_given + first * shape.given, task.d_given + last * shape.given, 0.0f);
+    const std::vector<int64_t> points = reached(task, first, last);
+    for (size_t at = 0; at < points.size(); at += kNetworkRows) {
+      task.points = points.data() + at;
+      task.count = int(std::min<size_t>(points.size() - at, kNetworkRows));
       kernels().network_backward(task);
     }
   });

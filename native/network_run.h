@@ -1,4 +1,4 @@
-// The deformation network on many points: weights laid out for the kernels, blocks of points shared among the threads.
+// A network on many points: weights laid out for the kernels, blocks of points shared among the threads.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -16,13 +16,10 @@ struct DenseGradient {
   float *weight, *bias;
 };
 
-// Floats of the values that the backward pass needs of n points.
-int64_t network_values(const NetworkShape& shape, int64_t n);
-
-// Writes out (n, outputs); values, of network_values floats, only if not null. The layers are the hidden ones, then the
-// heads, whose outputs are put side by side.
-void network_forward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask task, int64_t n, float* values);
+// Writes out (n, outputs). The layers are the hidden ones, then the heads, whose outputs are put side by side.
+void network_forward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask task, int64_t n);
+// Of the same task with d_out, and d_given if that gradient is wanted.
 void network_backward(const NetworkShape& shape, const std::vector<Dense>& layers, NetworkTask task, int64_t n,
-                      const float* values, const std::vector<DenseGradient>& gradients);
+                      const std::vector<DenseGradient>& gradients);
 
 }  // namespace dd

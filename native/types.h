@@ -161,6 +161,9 @@ struct Kernels {
   void (*activate_backward)(const ActivationTask&);
   void (*network)(const NetworkTask&);
   void (*network_backward)(const NetworkTask&);
+  void (*planes)(const PlanesTask&);
+  void (*planes_backward)(const PlanesTask&);
+  void (*steepness)(const SteepnessTask&);  // one image
 };
 
 const Kernels& kernels();                       // the set chosen at run time

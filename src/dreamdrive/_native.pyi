@@ -1,4 +1,4 @@
-"""Types of the compiled core (native/module.cpp, native/module_fit.cpp).
+"""Types of the compiled core (native/module.cpp, native/module_fit.cpp, native/module_motion.cpp).
 
 Arrays are contiguous float32 CPU tensors; ``visible``, ``mask`` and the ``sky`` of the geometry loss are
 bool, ``actor`` is int64.
@@ -135,23 +135,40 @@ def adam(
     epsilon: float,
 ) -> None: ...
 
-class Network:
-    """Weights of a deformation network, by reference."""
+class EncodedNetwork:
+    """Weights of a deformation network and the points it reads, by reference."""
 
-def network(
-    tensors: list[Tensor], depth: int, position_octaves: int, time_code: int, skip: int
-) -> Network: ...
-def network_values(network: Network, n: int) -> int: ...
-def network_forward(
-    network: Network,
+def encoded_network(
+    tensors: list[Tensor],
+    depth: int,
+    skip: int,
     means: Tensor,
     centre: Tensor,
     radius: float,
+    position_octaves: int,
     time_code: Tensor,
-    values: Tensor | None,
-    out: Tensor,
+) -> EncodedNetwork: ...
+def encoded_network_forward(network: EncodedNetwork, out: Tensor) -> None: ...
+def encoded_network_backward(network: EncodedNetwork, d_out: Tensor, gradients: list[Tensor]) -> None: ...
+
+class DenseNetwork:
+    """Weights of a network, by reference."""
+
+def dense_network(tensors: list[Tensor], depth: int) -> DenseNetwork: ...
+def dense_network_forward(network: DenseNetwork, inputs: Tensor, out: Tensor) -> None: ...
+def dense_network_backward(
+    network: DenseNetwork, inputs: Tensor, d_out: Tensor, d_inputs: Tensor, gradients: list[Tensor]
 ) -> None: ...
-def network_backward(network: Network, values: Tensor, d_out: Tensor, gradients: list[Tensor]) -> None: ...
+
+class Planes:
+    """Planes of features as the kernels read them, and the points that read them, by reference."""
+
+def planes(space: list[Tensor], lines: list[Tensor], means: Tensor, low: Tensor, high: Tensor) -> Planes: ...
+def planes_forward(planes: Planes, features: Tensor) -> None: ...
+def planes_backward(
+    planes: Planes, d_features: Tensor, d_space: list[Tensor], d_lines: list[Tensor]
+) -> None: ...
+def steepness(images: Tensor, weight: float, d_images: Tensor | None) -> float: ...
 
 class Pose:
     """Canonical Gaussians, what the network adds to them and the tracks of a time, by reference."""

@@ -32,32 +32,34 @@ def network_residual(
         skip: Which of them reads the encoding again.
         weights: Weight and bias of each hidden layer, then of the heads of mean, quaternion and log-scale.
     """
-    inputs = (means.detach(), centre_m, radius_m, time_code, octaves, depth, -1 if skip is None else skip)
-    return _Network.apply(inputs, *weights)  # pyright: ignore[reportReturnType]
+    shape = (depth, -1 if skip is None else skip)
+    encoding = (centre_m, radius_m, octaves, time_code)
+    return _EncodedNetwork.apply(means.detach(), shape, encoding, *weights)  # pyright: ignore[reportReturnType]
 
 
-class _Network(torch.autograd.Function):
+class _EncodedNetwork(torch.autograd.Function):
+    """Keeps nothing between: the backward pass computes it anew, of rows that some gradient arrives at."""
+
     @staticmethod
-    def forward(ctx: Any, inputs: tuple[Any, ...], *weights: Tensor) -> Tensor:
-        means, centre_m, radius_m, time_code, octaves, depth, skip = inputs
-        network = _native.network(
-            [w.detach().contiguous() for w in weights], depth, octaves, len(time_code), skip
-        )
+    def forward(
+        ctx: Any, means: Tensor, shape: tuple[int, int], encoding: tuple[Any, ...], *weights: Tensor
+    ) -> Tensor:
+        tensors = [w.detach().contiguous() for w in weights]
+        network = _native.encoded_network(tensors, *shape, means.contiguous(), *encoding)
         residual = torch.empty(len(means), 10)
-        wanted = any(ctx.needs_input_grad)
-        values = torch.empty(_native.network_values(network, len(means))) if wanted else None
-        _native.network_forward(network, means.contiguous(), centre_m, radius_m, time_code, values, residual)
-        if wanted:
-            ctx.network, ctx.values = network, values
-            ctx.save_for_backward(*weights)  # so that torch notices what was changed in place before backward
+        _native.encoded_network_forward(network, residual)
+        if any(ctx.needs_input_grad):
+            ctx.network = network
+            # So that torch notices what was changed in place before backward.
+            ctx.save_for_backward(means, *weights)
         return residual
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        gradients = [torch.empty(w.shape) for w in ctx.saved_tensors]
-        _native.network_backward(ctx.network, ctx.values, upstream[0].detach().contiguous(), gradients)
-        return None, *gradients
+        gradients = [torch.empty(w.shape) for w in ctx.saved_tensors[1:]]
+        _native.encoded_network_backward(ctx.network, upstream[0].detach().contiguous(), gradients)
+        return None, None, None, *gradients
 
 
 def posed(
