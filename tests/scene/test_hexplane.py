@@ -5,8 +5,11 @@ import pytest
 import torch
 from tests.scene.scenes import gaussians
 
+from dreamdrive import _native
+from dreamdrive.scene.compiled_hexplane import steepness
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.hexplane import Bounds, HexPlaneConfig, HexPlaneField
+from dreamdrive.splat import set_threads, threads
 
 BOUNDS = Bounds(np.array([-2.0, -1.0, 0.0]), np.array([2.0, 1.0, 10.0]), 1.0, 3.0)
 SMALL = HexPlaneConfig(width=4, features=2, resolution=3, levels=2, times=4, coefficients=4)
@@ -94,6 +97,54 @@ def test_gradients() -> None:
     assert torch.autograd.gradcheck(moved, leaves)
 
 
+def moved_with_gradients(made: HexPlaneField, start: Gaussians, t_s: float) -> dict[str, torch.Tensor]:
+    """Means and colours at ``t_s``, and the gradients of a random sum of them by the name of a parameter."""
+    after = made.apply_at(start, t_s)
+    generator = torch.Generator().manual_seed(8)
+    total = torch.zeros(())
+    for value in (after.means, after.sh):
+        weights = torch.randn(value.shape, generator=generator, dtype=torch.float64)
+        weights[::3] = 0  # rows that nothing of the picture depends on
+        total = total + (value * weights.to(value.dtype)).sum()
+    named = dict(made.named_parameters())
+    found = torch.autograd.grad(total, list(named.values()))
+    return {"means": after.means.detach(), "sh": after.sh.detach(), **dict(zip(named, found, strict=True))}
+
+
+@pytest.mark.parametrize("count", [1, 64, 131])
+@pytest.mark.parametrize(
+    "config",
+    [SMALL, HexPlaneConfig(times=3), HexPlaneConfig(width=20, features=11, resolution=2, levels=3)],
+)
+def test_the_compiled_core_agrees_with_plain_torch(config: HexPlaneConfig, count: int) -> None:
+    def centred() -> HexPlaneField:
+        made = field(config)
+        with torch.no_grad():
+            for parameter in made.parameters():
+                parameter.mul_(2).sub_(0.8)
+        return made
+
+    start = gaussians(count, 0)
+    double = {name: v.double() if v.is_floating_point() else v for name, v in start.tensors().items()}
+    single = moved_with_gradients(centred(), start, 1.9)
+    expected = moved_with_gradients(centred().double(), Gaussians(**double), 1.9)
+    for name, wanted in expected.items():
+        scale = wanted.abs().max().item() + 1e-6
+        torch.testing.assert_close(single[name].double(), wanted, rtol=0, atol=2e-5 * scale, msg=name)
+
+
+def test_thread_count_changes_no_bit() -> None:
+    start, before, results = gaussians(5000, 0), threads(), []
+    try:
+        for count in (1, 2, 3):
+            set_threads(count)
+            results.append(moved_with_gradients(field(HexPlaneConfig()), start, 1.9))
+    finally:
+        set_threads(before)
+    for other in results[1:]:
+        assert all(torch.equal(other[name], value) for name, value in results[0].items())
+
+
 class _Applied(torch.nn.Module):
     def __init__(self, made: HexPlaneField) -> None:
         super().__init__()
@@ -124,6 +175,43 @@ def test_the_penalty_adds_up_plane_by_plane() -> None:
             bend = plane[:, 2:] - 2 * plane[:, 1:-1] + plane[:, :-2]
             expected += c.time_weight * (bend**2).mean() + c.unity_weight * np.abs(plane - 1).mean()
     assert made.penalty(before, after).item() == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("nodes", [2, 15, 16, 33])
+def test_the_compiled_steepness_agrees_with_plain_torch(nodes: int) -> None:
+    generator = torch.Generator().manual_seed(nodes)
+    planes = torch.randn(3, 5, nodes, nodes, generator=generator, requires_grad=True)
+    double = planes.detach().double().requires_grad_()
+    expected = 0.7 * (double.diff(dim=2).square().mean() + double.diff(dim=3).square().mean())
+    found = steepness(planes, 0.7)
+    assert found.item() == pytest.approx(expected.item(), rel=1e-6)
+    (gradient,) = torch.autograd.grad(3 * found, planes)
+    (wanted,) = torch.autograd.grad(3 * expected, double)
+    torch.testing.assert_close(gradient.double(), wanted, rtol=0, atol=1e-6 * wanted.abs().max().item())
+
+
+def test_places_that_are_no_number_read_and_write_the_border() -> None:
+    means = torch.full((2, 3), torch.nan)
+    means[1] = torch.inf
+    features = field().features(means, 1.5)
+    features.sum().backward()
+    assert torch.isfinite(features).all()
+
+
+def test_the_core_refuses_what_does_not_fit() -> None:
+    low, high, means = torch.zeros(3), torch.ones(3), torch.zeros(2, 3)
+    space, lines = [torch.zeros(3, 2, 4, 4)], [torch.zeros(3, 2, 4)]
+    with pytest.raises(ValueError, match="each level"):
+        _native.planes(space, [], means, low, high)
+    with pytest.raises(ValueError, match="lines"):
+        _native.planes(space, [torch.zeros(3, 2, 3)], means, low, high)
+    planes = _native.planes(space, lines, means, low, high)
+    with pytest.raises(ValueError, match="features"):
+        _native.planes_forward(planes, torch.zeros(3))
+    with pytest.raises(ValueError, match="d_space"):
+        _native.planes_backward(planes, torch.zeros(2, 2), [torch.zeros(3)], lines)
+    with pytest.raises(ValueError, match="images"):
+        _native.steepness(torch.zeros(2, 3), 1.0, None)
 
 
 def test_two_nodes_along_time_have_no_curvature_to_punish() -> None:

@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from dreamdrive.scene.compiled_hexplane import dense_network, plane_features, steepness
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.motion import Motion
 
@@ -125,6 +126,9 @@ class HexPlaneField(Motion):
 
     def features(self, means: Float[Tensor, "n 3"], t_s: float) -> Float[Tensor, "n f"]:
         """Features (N, features * levels) of canonical means in metres at a time."""
+        if _compiled(means):
+            lines = [self._slice(time, t_s)[:, :, 0] for time in self.time]
+            return plane_features(means, self.low_m, self.high_m, list(self.space), lines)
         place = 2 * (means.detach() - self.low_m) / (self.high_m - self.low_m) - 1
         pairs = torch.stack([place[:, axes] for axes in _SPACE])
         lines = torch.stack([place.T, torch.zeros_like(place.T)], dim=-1)
@@ -146,6 +150,8 @@ class HexPlaneField(Motion):
     def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         """The Gaussians as they are at ``t_s``: moved and recoloured, their life spans untouched.
 
+        float32 on the CPU goes through the compiled core; all else goes through plain torch.
+
         Raises:
             ValueError: They have another number of colour coefficients than the field.
         """
@@ -153,12 +159,28 @@ class HexPlaneField(Motion):
             return gaussians
         if gaussians.sh.shape[1] != self.config.coefficients:
             raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
-        hidden = self.trunk(self.features(gaussians.means, t_s))
+        offsets = self._decoded(self.features(gaussians.means, t_s))
+        by_mean, by_sh = offsets.split([3, offsets.shape[1] - 3], dim=1)
         return replace(
             gaussians,
-            means=gaussians.means + self.head_mean(hidden),
-            sh=gaussians.sh + self.head_sh(hidden).view_as(gaussians.sh),
+            means=gaussians.means + by_mean,
+            sh=gaussians.sh + by_sh.view_as(gaussians.sh),
         )
+
+    def _decoded(self, features: Float[Tensor, "n f"]) -> Float[Tensor, "n o"]:
+        """Offsets of mean and colour of N features, side by side."""
+        if not _compiled(features):
+            hidden = self.trunk(features)
+            return torch.cat([self.head_mean(hidden), self.head_sh(hidden)], dim=1)
+        (middle, middle_bias, mean, mean_bias), (other, other_bias, sh, sh_bias) = (
+            tuple(head.parameters()) for head in (self.head_mean, self.head_sh)
+        )
+        # One layer for both heads, of which each reads its own half.
+        width = self.config.width
+        layers = [self.trunk.weight, self.trunk.bias]
+        layers += [torch.cat([middle, other]), torch.cat([middle_bias, other_bias])]
+        layers += [nn.functional.pad(mean, (0, width)), mean_bias, nn.functional.pad(sh, (width, 0)), sh_bias]
+        return dense_network(features, 2, layers)
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """Planes and decoder, which learn at different rates."""
@@ -173,11 +195,16 @@ class HexPlaneField(Motion):
         terms += [c.offset_weight * (moved.sh - canonical.sh).abs().mean()]
         for space, time in zip(self.space, self.time, strict=True):
             # Means over three planes at once; the papers' terms add up plane by plane.
-            terms += [3 * c.plane_weight * (_steepness(space, 2) + _steepness(space, 3))]
+            terms += [_steepness(space, 3 * c.plane_weight)]
             terms += [3 * c.unity_weight * (time - 1).abs().mean()]
             if c.times > 2:
                 terms += [3 * c.time_weight * time.diff(n=2, dim=2).square().mean()]
         return torch.stack(terms).sum()
+
+
+def _compiled(values: Tensor) -> bool:
+    """Whether the compiled core takes them; all else goes through plain torch."""
+    return values.dtype == torch.float32 and values.is_cpu
 
 
 def _head(width: int, outputs: int) -> nn.Sequential:
@@ -193,5 +220,8 @@ def _sample(planes: Float[Tensor, "3 c h w"], places: Float[Tensor, "3 n 2"]) ->
     return nn.functional.grid_sample(planes, grid, padding_mode="border", align_corners=True)[:, :, 0]
 
 
-def _steepness(planes: Tensor, axis: int) -> Tensor:
-    return planes.diff(dim=axis).square().mean()
+def _steepness(planes: Float[Tensor, "3 c r r"], weight: float) -> Float[Tensor, ""]:
+    """Weighted mean squares of the differences between neighbours along each axis."""
+    if _compiled(planes):
+        return steepness(planes, weight)
+    return weight * (planes.diff(dim=2).square().mean() + planes.diff(dim=3).square().mean())
