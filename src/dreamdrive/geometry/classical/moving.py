@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.classical import contest
 from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
-from dreamdrive.geometry.classical.roof import grow_upwards
+from dreamdrive.geometry.classical.outline import outline
 from dreamdrive.geometry.classical.sweep import sample
 from dreamdrive.geometry.classical.view import View, parallel
 
@@ -24,6 +24,7 @@ _OPEN_SHARE = 5 / 480
 _MIN_AREA = 0.0006  # of the image
 _MIN_SURE_SHARE = 0.05  # of a component
 _MIN_SURE_PX = 12
+_ROUNDS = 2  # of outlines, carried to the neighbours in between
 _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 
 
@@ -36,7 +37,7 @@ def moving_evidence(
     """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
-    enough sure pixels are kept, filled and given their roofs. Oncoming vehicles look like nearer static ones
+    enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer static ones
     and are found only where their flow leaves the epipolar line.
 
     Args:
@@ -52,17 +53,24 @@ def moving_evidence(
 
     verdicts = dict(zip(view.frames, parallel(judged, view.frames), strict=True))
     likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
-    evidence = np.zeros(inverse_depth.shape, np.float32)
 
     def decided(frame: int) -> np.ndarray:
-        votes = _vote(likely, frame, flows[frame])
-        found = decide(votes, _sure(verdicts[frame]), view.usable[frame])
-        px_per_m = view.plane_inverse[frame] * np.float32(view.cameras[frame].fy_px)
-        grown = grow_upwards(view.rgb[frame], found >= FLAGGED, sky[frame], px_per_m) & view.usable[frame]
-        return np.where(grown, np.maximum(found, FLAGGED), found)
+        return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
 
-    for frame, result in zip(view.frames, parallel(decided, view.frames), strict=True):
-        evidence[frame] = result
+    found = dict(zip(view.frames, parallel(decided, view.frames), strict=True))
+    flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
+    for around in range(_ROUNDS):
+        if around > 0:
+            flagged = {frame: _carried(flagged, frame, flows[frame]) for frame in view.frames}
+
+        def whole(frame: int, parts: Mapping[int, np.ndarray] = flagged) -> np.ndarray:
+            return outline(view, frame, flows[frame], inverse_depth[frame], parts[frame], sky[frame])
+
+        flagged = dict(zip(view.frames, parallel(whole, view.frames), strict=True))
+    evidence = np.zeros(inverse_depth.shape, np.float32)
+    for frame in view.frames:
+        inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
+        evidence[frame] = np.where(flagged[frame], inside, outside)
     return evidence
 
 
@@ -102,6 +110,18 @@ def _vote(
             total = total + np.where(flow.trusted, sample(likely[flow.source], flow.x, flow.y), 0)
             count = count + flow.trusted
     return total / count
+
+
+def _carried(
+    flagged: Mapping[int, Bool[np.ndarray, "h w"]], frame: int, flows: list[PairFlow]
+) -> Bool[np.ndarray, "h w"]:
+    """What at least half of the frame and its neighbours hold for moving, without specks."""
+    votes = _vote({key: value.astype(np.float32) for key, value in flagged.items()}, frame, flows)
+    mask = cv2.morphologyEx((votes >= 0.5).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, found, stats, _ = cv2.connectedComponentsWithStats(mask)
+    large = stats[:, cv2.CC_STAT_AREA] >= _MIN_AREA * mask.size
+    large[0] = False
+    return large[np.asarray(found, np.intp)]
 
 
 def decide(
