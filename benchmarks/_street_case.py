@@ -17,6 +17,7 @@ from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
@@ -179,6 +180,6 @@ def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 
                 return kept["frames"]
     seen = made.views(true_cameras(seed, view), made.times_s.tolist())
     frames = np.stack([v.frame for v in seen])
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, frames=frames, first=made.frames[0].astype(np.int64).sum())
+    with new_file(path) as partial:
+        np.savez_compressed(partial, frames=frames, first=made.frames[0].astype(np.int64).sum())
     return frames

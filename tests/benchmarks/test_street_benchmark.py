@@ -37,22 +37,35 @@ def test_quick_is_two_worlds_one_geometry_three_representations(street: ModuleTy
     assert len(wanted) == 2 * 3 * 2
 
 
-def test_a_full_run_has_every_row_once(street: ModuleType) -> None:
+def test_a_full_run_has_every_row_once_the_most_telling_first(street: ModuleType) -> None:
     wanted = list(street.jobs(options(street)))
-    assert len(set(wanted)) == len(wanted)
-    equal = [job for job in wanted if job.budget == "equal_steps"]
-    assert len(equal) == 8 * 3 * 2 * 5
+    assert len({job.result for job in wanted}) == len(wanted)
+    blocks = list(dict.fromkeys(job.block for job in wanted))
+    assert blocks == [
+        "equal_steps-true-corrupted",
+        "equal_steps-true-clean",
+        "equal_steps-estimated-corrupted",
+        "equal_steps-estimated-clean",
+        "equal_steps-unknown_focal-corrupted",
+        "equal_time-true-corrupted",
+        "equal_time-true-clean",
+        "five_times-true-corrupted",
+    ]
+    assert len([job for job in wanted if job.budget == "equal_steps"]) == 5 * 8 * 5
     assert all(job.representation != "hybrid" for job in wanted if job.budget != "equal_steps")
 
 
 def test_steps_at_equal_time_follow_from_measured_seconds(street: ModuleType, tmp_path: Path) -> None:
-    job = next(job for job in street.jobs(options(street)) if job.budget == "equal_time")
-    assert street.steps_of(job, tmp_path) is None
+    arguments = ("--runs", str(tmp_path))
+    job = next(job for job in street.jobs(options(street, *arguments)) if job.budget == "equal_time")
+    jobs_of = sys.modules["_street_jobs"]
+    with pytest.raises(FileNotFoundError, match="equal steps"):
+        jobs_of.steps_of(job)
     for name, figures in ("hybrid", {"seconds": 12.0}), (job.representation, {"step_s": 0.1}):
-        path = street.Job(job.case, name, "equal_steps").path(tmp_path)
+        path = job.with_equal_steps(name).result
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(figures))
-    assert street.steps_of(job, tmp_path) == 120
+        path.write_text(json.dumps({**figures, "threads": 1}))
+    assert jobs_of.steps_of(job) == 120
 
 
 def record(seed: int, name: str, psnr: float, street: ModuleType) -> dict[str, object]:
@@ -63,6 +76,7 @@ def record(seed: int, name: str, psnr: float, street: ModuleType) -> dict[str, o
         "budget": "equal_steps",
         "steps": 1,
         "seconds": 1.0,
+        "threads": 1,
         "mask_iou": None,
         "fake_m": 0.0,
         "views": views,
