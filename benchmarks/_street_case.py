@@ -1,5 +1,6 @@
 """What the street benchmark fits: seeded worlds, seen and understood in several ways."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -87,14 +88,27 @@ def clip_of(case: Case) -> Clip:
 
 def start(case: Case, quality: Quality, folder: Path) -> Start:
     """Geometry, seeds and static fit of a case, kept in the folder."""
-    stages = Stages(
-        folder / case.name, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True)
-    )
-    made = world_of(case.seed)
-    about = [case.name, FRAMES, SIZE, made.frames[0].mean().item()]
-    clip = stages.run("prior", (), about, lambda _: clip_of(case))
+    about = [case.name, FRAMES, SIZE, world_of(case.seed).frames[0].mean().item()]
+    return prepare(lambda: clip_of(case), about, quality, folder / case.name)
+
+
+def prepare(
+    make: Callable[[], Clip],
+    about: list[object],
+    quality: Quality,
+    folder: Path,
+    camera_height_m: float | None = None,
+) -> Start:
+    """What every fit of a clip begins with, kept in the folder; ``about`` tells the clip from others."""
+    stages = Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
+    clip = stages.run("prior", (), about, lambda _: make())
     seed = stage_seed(0, "geometry")
-    geometry = stages.run("geometry", ("prior",), seed, lambda _: reconstruct(clip, seed=seed))
+    geometry = stages.run(
+        "geometry",
+        ("prior",),
+        seed if camera_height_m is None else [seed, camera_height_m],
+        lambda _: reconstruct(clip, camera_height_m=camera_height_m, seed=seed),
+    )
     seeds = stages.run(
         "initialise",
         ("prior", "geometry"),

@@ -23,6 +23,8 @@ SAMPLES_EACH = 4
 OFFICIAL = ("fid", "fvd")
 """Distances with a name of their own, which are given in all dimensions as well."""
 RESAMPLES = 200
+TAIL = 0.025
+"""Share of the resamples beyond each end of an interval."""
 SPLITS = 10
 """Random halvings that a floor is the mean of."""
 RESAMPLE_SPLITS = 2
@@ -164,9 +166,9 @@ def _ratio(ours: float, theirs: float, drawn: Float[np.ndarray, " r"] | None) ->
 
 
 def _interval(value: float, drawn: Float[np.ndarray, " r"]) -> tuple[float, float]:
-    """Quantiles of what was drawn, moved so that their mean is the value."""
-    low, high = np.quantile(drawn - drawn.mean(), [0.025, 0.975])
-    return float(value + low), float(value + high)
+    """Quantiles of what was drawn, moved so that their middle is the value: duplicates raise a distance."""
+    low, middle, high = np.quantile(drawn, [TAIL, 0.5, 1 - TAIL])
+    return float(value + low - middle), float(value + high - middle)
 
 
 @dataclass(frozen=True)
@@ -181,10 +183,14 @@ class Halves:
     whole: dict[str, Float[np.ndarray, " r"]]
     half: dict[str, Float[np.ndarray, " r"]]
 
-    def ratios(self, ours: str, theirs: str) -> Float[np.ndarray, " r"]:
-        """Excess of one over the floor as a share of another's, of each draw."""
+    def ratios(self, ours: str, theirs: str) -> Float[np.ndarray, " r"] | None:
+        """Excess of one over the floor as a share of another's, of each draw.
+
+        None where the other has none in so many draws that the ratio has no bounds.
+        """
         floor = self.half[REAL]
-        return (self.half[ours] - floor) / (self.half[theirs] - floor)
+        excess = self.half[theirs] - floor
+        return (self.half[ours] - floor) / excess if np.quantile(excess, TAIL) > 0 else None
 
 
 def by_halves(

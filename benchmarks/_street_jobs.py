@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from _street_case import NOVEL, Case, Poses, References, start, true_frames
+from _street_consistency import consistency_of
 from _street_fit import (
     Features,
     features_of,
@@ -19,6 +20,7 @@ from _street_fit import (
     told_apart,
     with_steps,
 )
+from _street_recording import Recorded, recording
 from _workers import threads
 
 from dreamdrive.evaluate.extractors import Toolbox
@@ -90,6 +92,19 @@ def jobs(options: argparse.Namespace) -> Iterator[Job]:
                     yield Job(Case(seed, geometry, references), representation, budget, options.runs)
 
 
+def recorded(options: argparse.Namespace) -> list[Recorded]:
+    """The fits of a recording, where it is there and wanted."""
+    if options.no_recording or recording() is None:
+        return []
+    return [Recorded(representation, options.runs) for representation in options.representations]
+
+
+def in_order(street: list[Job], clips: list[Recorded]) -> list[Job | Recorded]:
+    """The recording after the fits at equal steps."""
+    first = [job for job in street if job.budget == "equal_steps"]
+    return [*first, *clips, *(job for job in street if job.budget != "equal_steps")]
+
+
 def steps_of(job: Job) -> int:
     """Steps of the joint fit."""
     base = QUALITY.fit.steps
@@ -128,6 +143,8 @@ def run(job: Job, toolbox: Toolbox) -> None:
         "views": views,
         **told_apart(fitted, job.case),
     }
+    if job.representation == "hybrid" and job.case.references == "corrupted":
+        record["consistency"] = consistency_of(fitted.scene, job.case, job.runs)
     keep_picture(job.runs / "shown" / f"{job.name}.png", middle)
     save(job.result, record, features)
 

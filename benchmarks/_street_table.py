@@ -6,9 +6,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-from _street_case import NOVEL, VIEWS, Case, true_frames
+from _street_case import NOVEL, SIZE, VIEWS, Case, true_frames
+from _street_consistency import MEASURES
 from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
 from _street_fit import Features
+from _street_recording import CLIP
+from jaxtyping import UInt8
 
 CAPTION = """\
 Fréchet distance in the first {most} principal components of the truth (kept: {counts}; at most one for
@@ -19,6 +22,9 @@ An excess is a distance of halves less the floor, which is that of two halves of
 drawn over worlds, and a ratio whose interval holds 1 is undecided.
 """
 OURS = "hybrid"
+COLUMNS = (OURS, "vibration", "hexplane", "deformable", "static")
+SHOWN = "true-corrupted-{}-equal_steps"
+MARGIN, HEAD = 70, 22
 RESAMPLES = 2000
 Key = tuple[str, str, str]  # geometry, references, budget
 AllFeatures = dict[tuple[Case, str, str], Features]
@@ -127,7 +133,38 @@ def _distances(
 def markdown(report: dict[str, Any]) -> str:
     """The tables as text."""
     parts = [part for table in report["tables"] for part in _table_lines(table)]
-    return "\n".join([*parts, *_captions(report)])
+    parts += _captions(report)
+    parts += [_consistency_lines(table) for table in report.get("consistency", [])]
+    if report.get("recording"):
+        parts.append(_recording_lines(report["recording"]))
+    return "\n".join(parts)
+
+
+def _consistency_lines(table: dict[str, Any]) -> str:
+    head = ["error", "worlds", "clean truth", "corrupted references", "rendered"]
+    lines = [[*head, "rendered / references", "excess over the truth"]]
+    for row in table["rows"]:
+        span = "" if row["low"] is None else f" ({row['low']:.2f} to {row['high']:.2f})"
+        values = [number(row[kind], ".3g") for kind in ("truth", "references", "rendered")]
+        ratios = [f"{row['ratio']:.2f}{span}", number(row["excess_ratio"], ".2f")]
+        lines.append([MEASURES[row["measure"]], str(row["worlds"]), *values, *ratios])
+    count = (
+        f"{len(table['at_most_half'])} of {len(table['rows'])} errors are at most half of the references'.\n"
+    )
+    title = f"## Consistency of hybrid's drive along the recorded path, {table['geometry']} geometry\n"
+    return "\n".join([title, grid(lines), count])
+
+
+def _recording_lines(rows: list[dict[str, Any]]) -> str:
+    width, height = rows[0]["size"]
+    cores = " or ".join(sorted({str(row["threads"]) for row in rows}))
+    head = ["representation", "steps", f"s on {cores} threads", "withheld", "moving IoU", "inside hulls, dB"]
+    lines = [head]
+    for row in sorted(rows, key=lambda r: -r["psnr"]):
+        cells = [f"{row['psnr']:.2f} / {row['ssim']:.3f}"]
+        cells += [number(row["moving_iou"], ".2f"), number(row["moving_psnr"], ".2f")]
+        lines.append([row["representation"], str(row["steps"]), f"{row['seconds']:.1f}", *cells])
+    return f"## {CLIP}, {rows[0]['frames']} frames of {width}x{height}\n\n" + grid(lines)
 
 
 def _table_lines(table: dict[str, Any]) -> list[str]:
@@ -219,14 +256,26 @@ def grid(lines: list[list[str]]) -> str:
 
 
 def picture(path: Path, seeds: list[int], runs: Path) -> None:
-    """A grid: a row a world, the truth of a shifted view beside what was kept of each representation."""
-    rows: list[np.ndarray] = []
-    for seed in seeds:
-        shown = [true_frames(seed, "shift_2", runs / "truth")[12]]
-        for name in (OURS, "vibration", "hexplane", "deformable", "static"):
-            kept = runs / "shown" / f"{seed}-true-corrupted-{name}-equal_steps.png"
-            if kept.exists():
-                shown.append(cv2.imread(str(kept))[..., ::-1])
-        rows.append(np.hstack(shown))
-    width = min(row.shape[1] for row in rows)
-    cv2.imwrite(str(path), np.vstack([row[:, :width] for row in rows])[..., ::-1])
+    """A grid with a head: a row a world, the truth of a shifted view beside each representation's."""
+    kept = {name: [runs / "shown" / f"{seed}-{SHOWN.format(name)}.png" for seed in seeds] for name in COLUMNS}
+    names = [name for name, files in kept.items() if any(file.exists() for file in files)]
+    rows = [_strip(["", "truth", *names])]
+    for number, seed in enumerate(seeds):
+        cells = [true_frames(seed, "shift_2", runs / "truth")[12][..., ::-1]]
+        blank = np.zeros_like(cells[0])
+        files = [kept[name][number] for name in names]
+        cells += [cv2.imread(str(file)) if file.exists() else blank for file in files]
+        rows.append(np.hstack([_label(f"world {seed}", (MARGIN, blank.shape[0])), *cells]))
+    cv2.imwrite(str(path), np.vstack(rows))
+
+
+def _strip(names: list[str]) -> UInt8[np.ndarray, "h w 3"]:
+    widths = [MARGIN] + [SIZE[0]] * (len(names) - 1)
+    return np.hstack([_label(name, (width, HEAD)) for name, width in zip(names, widths, strict=True)])
+
+
+def _label(text: str, size: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"]:
+    """Dark letters on white."""
+    image = np.full((size[1], size[0], 3), 255, dtype=np.uint8)
+    place = (6, size[1] // 2 + 5)
+    return cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (40, 40, 40), 1, cv2.LINE_AA)

@@ -9,7 +9,9 @@ Seeded worlds of 24 frames are reconstructed with five representations of motion
 PVG) and hybrid (ours). All take the same optimiser steps from the same points and the same static fit; a
 second table gives all the seconds of hybrid, a third gives the others five times the steps. Depth and motion
 are found by the classical geometry, with true poses, with true intrinsics alone, or with nothing known;
-references are clean, or corrupted as generated video is. Every view is compared with the clean truth.
+references are clean, or corrupted as generated video is. Every view is compared with the clean truth. Beside
+them stand how consistent a rendered drive is with itself and its path, against its references, and the same
+five fits of a recorded clip (``DREAMDRIVE_DATA``).
 
 Each fit is a file below ``--runs``; with ``--resume`` those that are there count. ``--workers`` makes that
 many fits side by side, each on its share of the cores. A fit that fails is named at the end, and its reason
@@ -24,9 +26,22 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from _street_case import FRAMES, VIEWS, Poses, References
+from _street_case import FRAMES, Poses, References
+from _street_consistency import consistency_tables
 from _street_fit import load, load_features
-from _street_jobs import BUDGETS, REPRESENTATIONS, SEEDS, Job, jobs, run, truth_features
+from _street_jobs import (
+    BUDGETS,
+    QUALITY,
+    REPRESENTATIONS,
+    SEEDS,
+    Job,
+    in_order,
+    jobs,
+    recorded,
+    run,
+    truth_features,
+)
+from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
 from _street_table import markdown, picture, summary
 from _workers import work_off
 
@@ -37,32 +52,30 @@ from dreamdrive.splat import native_info
 toolbox_of = lru_cache(maxsize=1)(open_toolbox)
 
 
-def make(job: Job, weights: WeightFiles) -> None:
+def make(job: Job | Recorded, weights: WeightFiles) -> None:
     """One fit, in a worker."""
-    run(job, toolbox_of(weights))
+    if isinstance(job, Recorded):
+        run_recorded(job, QUALITY)
+    else:
+        run(job, toolbox_of(weights))
 
 
-def report_of(wanted: list[Job], toolbox: Toolbox, seeds: list[int], runs: Path) -> dict[str, Any]:
-    """Tables and a row for each fit and view."""
+def report_of(
+    wanted: list[Job], clips: list[Recorded], toolbox: Toolbox, seeds: list[int], runs: Path
+) -> dict[str, Any]:
+    """Tables and a row for each fit."""
     there = [job for job in wanted if job.result.exists()]
     records = [record for job in there if (record := load(job.result)) is not None]
     features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
     truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
-    rows = [
-        {
-            **{key: value for key, value in record.items() if key != "views"},
-            "view": view,
-            **record["views"][view],
-        }
-        for record in records
-        for view in VIEWS
-    ]
     return {
         "frames": FRAMES,
         "machine": native_info(),
         "weights": toolbox.weights,
         "missing": toolbox.missing,
-        "rows": rows,
+        "rows": records,
+        "recording": [record for job in clips if (record := load(job.result)) is not None],
+        "consistency": consistency_tables(records),
         **summary(records, features, truth),
     }
 
@@ -78,6 +91,7 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--representations", nargs="+", choices=REPRESENTATIONS)
     parser.add_argument("--budgets", nargs="+", choices=BUDGETS)
     parser.add_argument("--references", nargs="+", choices=get_args(References))
+    parser.add_argument("--no-recording", action="store_true", help="leave the recorded clip out")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="fits side by side")
     parser.add_argument("--resume", action="store_true", help="keep fits that are finished")
     parser.add_argument("--table-only", action="store_true", help="fit nothing, show what is there")
@@ -90,6 +104,7 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     options.seeds = options.seeds or (list(SEEDS[:2]) if options.quick else list(SEEDS))
     options.geometry = options.geometry or (["true"] if options.quick else list(get_args(Poses)))
+    options.no_recording = options.no_recording or options.quick
     options.references = options.references or list(get_args(References))
     options.representations = options.representations or list(
         REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS
@@ -106,14 +121,17 @@ def main() -> int:
     toolbox = toolbox_of(weights)
     for figure, reason in toolbox.missing.items():
         print(f"not measured: {figure}: {reason}", file=sys.stderr)
-    wanted = list(jobs(options))
+    wanted, clips = list(jobs(options)), recorded(options)
+    if recording() is None and not options.no_recording:
+        print(f"not measured: {CLIP}: {DATA} has no such clip, set DREAMDRIVE_DATA", file=sys.stderr)
+    everything = in_order(wanted, clips)
     if not options.resume and not options.table_only:
-        for job in wanted:
+        for job in everything:
             job.result.unlink(missing_ok=True)
-    todo = [] if options.table_only else [job for job in wanted if not job.result.exists()]
+    todo = [] if options.table_only else [job for job in everything if not job.result.exists()]
     failed = work_off(todo, partial(make, weights=weights), options.workers)
     use_all_cores()
-    report = report_of(wanted, toolbox, options.seeds, options.runs)
+    report = report_of(wanted, clips, toolbox, options.seeds, options.runs)
     text = markdown(report)
     print(text)
     if options.json:

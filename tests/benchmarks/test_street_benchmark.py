@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import cv2
 import numpy as np
 import pytest
 
@@ -69,7 +70,7 @@ def test_steps_at_equal_time_follow_from_measured_seconds(street: ModuleType, tm
 
 
 def record(seed: int, name: str, psnr: float, street: ModuleType) -> dict[str, object]:
-    views = {view: {"psnr": psnr, "ssim": 0.9} for view in street.VIEWS}
+    views = {view: {"psnr": psnr, "ssim": 0.9} for view in sys.modules["_street_case"].VIEWS}
     about = {"seed": seed, "geometry": "true", "references": "clean", "representation": name}
     return {
         **about,
@@ -97,3 +98,67 @@ def test_differences_are_paired_over_worlds(street: ModuleType) -> None:
     text = street.markdown({"tables": [table]})
     assert "hybrid less the best other" in text
     assert text.index("| hybrid |") < text.index("| vibration |") < text.index("| static |")
+
+
+def test_the_recording_follows_the_fits_at_equal_steps(
+    street: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs_of = sys.modules["_street_jobs"]
+    monkeypatch.setattr(jobs_of, "recording", lambda: Path("clip"))
+    given = options(street)
+    clips = jobs_of.recorded(given)
+    assert [job.representation for job in clips] == list(street.REPRESENTATIONS)
+    everything = jobs_of.in_order(list(street.jobs(given)), clips)
+    places = [number for number, job in enumerate(everything) if job in clips]
+    assert places == list(range(5 * 8 * 5, 5 * 8 * 5 + 5))
+    assert jobs_of.recorded(options(street, "--quick")) == []
+    monkeypatch.setattr(jobs_of, "recording", lambda: None)
+    assert jobs_of.recorded(given) == []
+
+
+def test_consistency_is_compared_with_the_references_and_the_truth(street: ModuleType) -> None:
+    consistency = sys.modules["_street_consistency"]
+
+    def figures(value: float | None) -> dict[str, float | None]:
+        return dict.fromkeys(consistency.MEASURES, value)
+
+    found = [
+        {
+            "geometry": "true",
+            "consistency": {"truth": figures(1.0), "references": figures(3.0 + k), "rendered": figures(1.5)},
+        }
+        for k in range(3)
+    ]
+    lost = {**figures(1.5), "ate_percent": None}  # no path was found in one video
+    found[0]["consistency"]["rendered"] = lost
+    (table,) = consistency.consistency_tables([*found, {"geometry": "true"}])
+    rows = {row["measure"]: row for row in table["rows"]}
+    assert rows["warp_4"]["ratio"] == pytest.approx(1.5 / 4)
+    assert rows["warp_4"]["excess_ratio"] == pytest.approx(0.5 / 3)
+    assert rows["ate_percent"]["worlds"] == 2
+    assert len(table["at_most_half"]) == len(consistency.MEASURES)
+    text = street.markdown({"tables": [], "consistency": [table]})
+    assert "9 of 9 errors are at most half" in text
+
+
+def test_the_recording_has_a_table(street: ModuleType) -> None:
+    row = {"representation": "static", "size": [320, 180], "frames": 24, "steps": 300, "seconds": 1.0}
+    row |= {"threads": 1, "psnr": 20.0, "ssim": 0.7, "moving_iou": None, "moving_psnr": 15.0}
+    text = street.markdown({"tables": [], "recording": [row]})
+    assert "24 frames of 320x180" in text
+    assert "| static | 300 | 1.0 | 20.00 / 0.700 | - | 15.00 |" in text
+
+
+def test_the_grid_has_a_head_and_a_column_for_each_representation_there_is(
+    street: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables = sys.modules["_street_table"]
+    width, height = tables.SIZE
+    frames = np.zeros((13, height, width, 3), np.uint8)
+    monkeypatch.setattr(tables, "true_frames", lambda *_: frames)
+    kept = tmp_path / "shown" / f"0-{tables.SHOWN.format('static')}.png"
+    kept.parent.mkdir()
+    cv2.imwrite(str(kept), frames[0])
+    street.picture(tmp_path / "grid.png", [0, 1], tmp_path)
+    image = cv2.imread(str(tmp_path / "grid.png"))
+    assert image.shape == (tables.HEAD + 2 * height, tables.MARGIN + 2 * width, 3)
