@@ -25,9 +25,9 @@ OFFICIAL = ("fid", "fvd")
 RESAMPLES = 200
 TAIL = 0.025
 """Share of the resamples beyond each end of an interval."""
-SPLITS = 10
+SPLITS = 40
 """Random halvings that a floor is the mean of."""
-RESAMPLE_SPLITS = 2
+RESAMPLE_SPLITS = 4
 """The same in each resample."""
 REAL = "truth"
 """Name of the real set beside the representations."""

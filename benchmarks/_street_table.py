@@ -1,11 +1,13 @@
 """Tables of the street benchmark: means over worlds, paired differences, ratios of distances."""
 
+import json
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from _markdown import table as table_of
 from _street_case import NOVEL, SIZE, VIEWS, Case, true_frames
 from _street_consistency import MEASURES
 from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
@@ -251,8 +253,20 @@ def number(value: float | None, form: str) -> str:
 
 def grid(lines: list[list[str]]) -> str:
     """Rows of a table, the first its head."""
-    ruled = [lines[0], ["---"] * len(lines[0]), *lines[1:]]
-    return "\n".join("| " + " | ".join(line) + " |" for line in ruled) + "\n"
+    return table_of(lines[0], lines[1:]) + "\n"
+
+
+def as_text(report: dict[str, Any]) -> str:
+    """JSON of a report with six figures a number, small enough to be kept with the code."""
+    return json.dumps(_rounded(report), indent=1) + "\n"
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def picture(path: Path, seeds: list[int], runs: Path) -> None:

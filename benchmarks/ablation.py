@@ -9,7 +9,6 @@ prepared in the same ``--runs``.
 """
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Callable
@@ -22,7 +21,7 @@ import torch
 from _street_case import NOVEL, Case, References, Start, start
 from _street_fit import fit_case, load, measure, save, told_apart
 from _street_jobs import QUALITY
-from _street_table import grid, number
+from _street_table import as_text, grid, number
 from _workers import threads, work_off
 
 from dreamdrive.fit import Representation
@@ -230,7 +229,7 @@ def main() -> int:
     text = markdown(report["tables"])
     print(text)
     if options.json:
-        options.json.write_text(json.dumps(report, indent=1) + "\n")
+        options.json.write_text(as_text(report))
     if options.markdown:
         options.markdown.write_text(text)
     for cut in failed:

@@ -19,7 +19,6 @@ kept beside the others' results.
 """
 
 import argparse
-import json
 import os
 import sys
 from functools import lru_cache, partial
@@ -42,7 +41,7 @@ from _street_jobs import (
     truth_features,
 )
 from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
-from _street_table import markdown, picture, summary
+from _street_table import as_text, markdown, picture, summary
 from _workers import work_off
 
 from dreamdrive.cli.machine import use_all_cores
@@ -135,7 +134,7 @@ def main() -> int:
     text = markdown(report)
     print(text)
     if options.json:
-        options.json.write_text(json.dumps(report, indent=1) + "\n")
+        options.json.write_text(as_text(report))
     if options.markdown:
         options.markdown.write_text(text)
     if options.picture:

@@ -162,3 +162,17 @@ def test_the_grid_has_a_head_and_a_column_for_each_representation_there_is(
     street.picture(tmp_path / "grid.png", [0, 1], tmp_path)
     image = cv2.imread(str(tmp_path / "grid.png"))
     assert image.shape == (tables.HEAD + 2 * height, tables.MARGIN + 2 * width, 3)
+
+
+def test_the_report_of_a_full_run_is_small_enough_to_commit(street: ModuleType) -> None:
+    records = [
+        {
+            **record(0, job.representation, 21.123456789, street),
+            "consistency": {"a": dict.fromkeys(range(27), 1 / 3)},
+        }
+        for job in street.jobs(options(street))
+    ]
+    text = street.as_text({"rows": records})
+    assert len(text) < 500_000
+    assert "21.1235" in text
+    assert "21.12345" not in text
