@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Protocol
 
-from dreamdrive.cli.machine import available_cores, use_all_cores
+from dreamdrive.cli.machine import available_cores, stop_like_an_interruption, use_all_cores
 
 
 class Task(Protocol):
@@ -79,19 +79,24 @@ def work_off(tasks: Sequence[Task], make: Make, workers: int) -> list[Task]:
     """
     for task in tasks:
         error_file(task).unlink(missing_ok=True)
+    stop_like_an_interruption()
     waiting, running = units(tasks), list[_Running]()
     shares, began = _shares(workers), time.perf_counter()
-    while waiting or running:
-        busy = {run.unit[0].owner for run in running}
-        while shares and (unit := next_unit(waiting, busy)) is not None:
-            running.append(_start(unit, make, shares.pop()))
-            busy.add(unit[0].owner)
-        wait([run.process.sentinel for run in running])
-        for run in [run for run in running if not run.process.is_alive()]:
-            running.remove(run)
-            shares.append(run.cores)
-            waiting = _left_over(run) + waiting
-            _tell(tasks, began)
+    try:
+        while waiting or running:
+            busy = {run.unit[0].owner for run in running}
+            while shares and (unit := next_unit(waiting, busy)) is not None:
+                running.append(_start(unit, make, shares.pop()))
+                busy.add(unit[0].owner)
+            wait([run.process.sentinel for run in running])
+            for run in [run for run in running if not run.process.is_alive()]:
+                running.remove(run)
+                shares.append(run.cores)
+                waiting = _left_over(run) + waiting
+                _tell(tasks, began)
+    finally:
+        for run in running:
+            run.process.terminate()
     return [task for task in tasks if not task.result.exists()]
 
 
@@ -132,8 +137,11 @@ def _work(unit: Unit, make: Make, count: int) -> None:
     torch.set_num_threads(count)
     set_threads(count)
     for task in unit:
+        began = time.perf_counter()
         try:
             make(task)
+            spent = time.perf_counter() - began
+            print(f"{task.name}: {spent:.0f} s with all its measuring", file=sys.stderr, flush=True)
         except Exception:  # noqa: BLE001  (whatever it is, the other fits go on)
             _keep_error(task, traceback.format_exc())
 
