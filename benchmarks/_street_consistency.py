@@ -27,6 +27,8 @@ MEASURES = {
     "warp_4": "the same, 4 apart",
     "warp_8": "the same, 8 apart",
 }
+KINDS = ("truth", "references", "rendered")
+SHARPNESS = "sharpness"
 RESAMPLES = 2000
 
 
@@ -45,7 +47,14 @@ def errors_of(frames: UInt8[np.ndarray, "f h w 3"], seed: int, intrinsics: Camer
     made = world_of(seed)
     poses = np.stack([camera.world_from_camera for camera in true_cameras(seed, "recorded")])
     asked = Trajectory(poses, made.times_s)
-    return flat(evaluate_consistency(frames, made.times_s, intrinsics, asked, moving=made.moving))
+    found = evaluate_consistency(frames, made.times_s, intrinsics, asked, moving=made.moving)
+    return {**flat(found), SHARPNESS: sharpness(frames)}
+
+
+def sharpness(frames: UInt8[np.ndarray, "f h w 3"]) -> float:
+    """Mean change of grey from a pixel to the next, in grey levels: a blurred video scores well elsewhere."""
+    grey = frames.mean(axis=3)
+    return float(np.abs(np.diff(grey, axis=1)).mean() + np.abs(np.diff(grey, axis=2)).mean()) / 2
 
 
 def flat(found: Consistency) -> Figures:
@@ -79,14 +88,14 @@ def consistency_tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
         found = [record["consistency"] for record in measured if record["geometry"] == geometry]
         rows = [row for name in MEASURES if (row := _row(name, found)) is not None]
         halved = [row["measure"] for row in rows if row["ratio"] <= 0.5]
-        tables.append({"geometry": geometry, "rows": rows, "at_most_half": halved})
+        sharp = {kind: float(np.mean([world[kind][SHARPNESS] for world in found])) for kind in KINDS}
+        tables.append({"geometry": geometry, "rows": rows, "at_most_half": halved, SHARPNESS: sharp})
     return tables
 
 
 def _row(name: str, found: list[dict[str, Figures]]) -> dict[str, Any] | None:
     """One measure, over the worlds in which all three have it."""
-    kinds = ("truth", "references", "rendered")
-    known = [[world[kind][name] for kind in kinds] for world in found]
+    known = [[world[kind][name] for kind in KINDS] for world in found]
     values = np.array([row for row in known if None not in row], dtype=np.float64)
     if not len(values):
         return None

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from _markdown import table as table_of
 from _street_case import NOVEL, SIZE, VIEWS, Case, true_frames
-from _street_consistency import MEASURES
+from _street_consistency import KINDS, MEASURES
 from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
 from _street_fit import Features
 from _street_recording import CLIP
@@ -147,11 +147,14 @@ def _consistency_lines(table: dict[str, Any]) -> str:
     lines = [[*head, "rendered / references", "excess over the truth"]]
     for row in table["rows"]:
         span = "" if row["low"] is None else f" ({row['low']:.2f} to {row['high']:.2f})"
-        values = [number(row[kind], ".3g") for kind in ("truth", "references", "rendered")]
+        values = [number(row[kind], ".3g") for kind in KINDS]
         ratios = [f"{row['ratio']:.2f}{span}", number(row["excess_ratio"], ".2f")]
         lines.append([MEASURES[row["measure"]], str(row["worlds"]), *values, *ratios])
+    halved = len(table["at_most_half"])
+    sharp = ", ".join(f"{name} {value:.2f}" for name, value in table["sharpness"].items())
     count = (
-        f"{len(table['at_most_half'])} of {len(table['rows'])} errors are at most half of the references'.\n"
+        f"{halved} of {len(table['rows'])} errors are at most half of the references'. A blurred video "
+        f"changes less along its motion; mean change of grey from a pixel to the next: {sharp}.\n"
     )
     title = f"## Consistency of hybrid's drive along the recorded path, {table['geometry']} geometry\n"
     return "\n".join([title, grid(lines), count])
@@ -195,7 +198,9 @@ def _table_lines(table: dict[str, Any]) -> list[str]:
     if gains:
         parts.append("hybrid less the best other: " + "; ".join(gains) + ".\n")
     if table["distances"]:
-        parts += [_compared_lines(table["distances_compared"]), _distance_lines(table["distances"])]
+        if table["distances_compared"]:
+            parts.append(_compared_lines(table["distances_compared"]))
+        parts.append(_distance_lines(table["distances"]))
     return parts
 
 

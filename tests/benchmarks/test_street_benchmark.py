@@ -120,7 +120,7 @@ def test_consistency_is_compared_with_the_references_and_the_truth(street: Modul
     consistency = sys.modules["_street_consistency"]
 
     def figures(value: float | None) -> dict[str, float | None]:
-        return dict.fromkeys(consistency.MEASURES, value)
+        return {**dict.fromkeys(consistency.MEASURES, value), consistency.SHARPNESS: 7.0}
 
     found = [
         {
@@ -139,6 +139,14 @@ def test_consistency_is_compared_with_the_references_and_the_truth(street: Modul
     assert len(table["at_most_half"]) == len(consistency.MEASURES)
     text = street.markdown({"tables": [], "consistency": [table]})
     assert "9 of 9 errors are at most half" in text
+    assert "rendered 7.00" in text
+
+
+def test_a_blurred_video_is_less_sharp(street: ModuleType) -> None:
+    consistency = sys.modules["_street_consistency"]
+    frames = np.random.default_rng(0).integers(0, 256, (2, 24, 32, 3), np.uint8)
+    blurred = np.stack([cv2.GaussianBlur(frame, (0, 0), 2) for frame in frames])
+    assert consistency.sharpness(blurred) < 0.5 * consistency.sharpness(frames)
 
 
 def test_the_recording_has_a_table(street: ModuleType) -> None:
