@@ -27,7 +27,7 @@ TAIL = 0.025
 """Share of the resamples beyond each end of an interval."""
 SPLITS = 40
 """Random halvings that a floor is the mean of."""
-RESAMPLE_SPLITS = 4
+RESAMPLE_SPLITS = 2
 """The same in each resample."""
 REAL = "truth"
 """Name of the real set beside the representations."""
