@@ -1,5 +1,6 @@
 """What the street benchmark fits: seeded worlds, seen and understood in several ways."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
@@ -86,14 +88,27 @@ def clip_of(case: Case) -> Clip:
 
 def start(case: Case, quality: Quality, folder: Path) -> Start:
     """Geometry, seeds and static fit of a case, kept in the folder."""
-    stages = Stages(
-        folder / case.name, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True)
-    )
-    made = world_of(case.seed)
-    about = [case.name, FRAMES, SIZE, made.frames[0].mean().item()]
-    clip = stages.run("prior", (), about, lambda _: clip_of(case))
+    about = [case.name, FRAMES, SIZE, world_of(case.seed).frames[0].mean().item()]
+    return prepare(lambda: clip_of(case), about, quality, folder / case.name)
+
+
+def prepare(
+    make: Callable[[], Clip],
+    about: list[object],
+    quality: Quality,
+    folder: Path,
+    camera_height_m: float | None = None,
+) -> Start:
+    """What every fit of a clip begins with, kept in the folder; ``about`` tells the clip from others."""
+    stages = Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
+    clip = stages.run("prior", (), about, lambda _: make())
     seed = stage_seed(0, "geometry")
-    geometry = stages.run("geometry", ("prior",), seed, lambda _: reconstruct(clip, seed=seed))
+    geometry = stages.run(
+        "geometry",
+        ("prior",),
+        seed if camera_height_m is None else [seed, camera_height_m],
+        lambda _: reconstruct(clip, camera_height_m=camera_height_m, seed=seed),
+    )
     seeds = stages.run(
         "initialise",
         ("prior", "geometry"),
@@ -179,6 +194,6 @@ def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 
                 return kept["frames"]
     seen = made.views(true_cameras(seed, view), made.times_s.tolist())
     frames = np.stack([v.frame for v in seen])
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, frames=frames, first=made.frames[0].astype(np.int64).sum())
+    with new_file(path) as partial:
+        np.savez_compressed(partial, frames=frames, first=made.frames[0].astype(np.int64).sum())
     return frames

@@ -1,26 +1,40 @@
 """Tables of the street benchmark: means over worlds, paired differences, ratios of distances."""
 
+import json
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from _street_case import NOVEL, VIEWS, Case, true_frames
+from _markdown import table as table_of
+from _street_case import NOVEL, SIZE, VIEWS, Case, true_frames
+from _street_consistency import KINDS, MEASURES
+from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
 from _street_fit import Features
+from _street_recording import CLIP
+from jaxtyping import UInt8
 
-from dreamdrive.evaluate.bootstrap import frechet_ratio, frechet_with_interval
-
+CAPTION = """\
+Fréchet distance in the first {most} principal components of the truth (kept: {counts}; at most one for
+{each} samples): features centred and projected, not whitened, one basis for all rows; FID and FVD, where
+their weights are given, in all dimensions as well. Samples are frames of image networks and windows of 16
+frames, each 2 after the last, of video networks, of shifted, raised and turned views of all worlds together.
+An excess is a distance of halves less the floor, which is that of two halves of the truth; intervals are
+drawn over worlds, and a ratio whose interval holds 1 is undecided.
+"""
 OURS = "hybrid"
+COLUMNS = (OURS, "vibration", "hexplane", "deformable", "static")
+SHOWN = "true-corrupted-{}-equal_steps"
+MARGIN, HEAD = 70, 22
 RESAMPLES = 2000
 Key = tuple[str, str, str]  # geometry, references, budget
 AllFeatures = dict[tuple[Case, str, str], Features]
 
 
-def summary(
-    records: list[dict[str, Any]], features: AllFeatures, truth: dict[int, Features]
-) -> dict[str, Any]:
+def summary(records: list[dict[str, Any]], features: AllFeatures, truth: Worlds) -> dict[str, Any]:
     """Everything the tables show, as plain values."""
+    bases = bases_of(truth)
     groups: dict[Key, list[dict[str, Any]]] = defaultdict(list)
     for record in records:
         groups[record["geometry"], record["references"], record["budget"]].append(record)
@@ -31,17 +45,20 @@ def summary(
             r for r in groups.get((geometry, references, "equal_steps"), []) if r["representation"] == OURS
         ]
         found = found if budget == "equal_steps" else ours + found
+        distances = _distances((geometry, references, budget), found, features, truth, bases)
         tables.append(
             {
                 "geometry": geometry,
                 "references": references,
                 "budget": budget,
+                "threads": sorted({record["threads"] for record in found}),
                 "means": _means(found),
                 "against_best_other": _paired(found),
-                "distances": _distances(geometry, references, budget, found, features, truth),
+                "distances": distances,
+                "distances_compared": compared(distances),
             }
         )
-    return {"tables": tables}
+    return {"components": {name: basis.axes.shape[1] for name, basis in bases.items()}, "tables": tables}
 
 
 def _seeds(found: list[dict[str, Any]]) -> dict[str, dict[int, dict[str, Any]]]:
@@ -101,112 +118,183 @@ def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _distances(
-    geometry: str,
-    references: str,
-    budget: str,
-    found: list[dict[str, Any]],
-    features: AllFeatures,
-    truth: dict[int, Features],
+    key: Key, found: list[dict[str, Any]], features: AllFeatures, truth: Worlds, bases: dict[str, Basis]
 ) -> list[dict[str, Any]]:
-    """Fréchet distances of novel views pooled over worlds and views, and ratios to ours above the floor."""
-    by = _seeds(found)
-    networks = sorted({name.split("/")[0] for rows in truth.values() for name in rows})
-    if OURS not in by:
+    """Rows of the table of distances; what ours reached with equal steps stands in all of them."""
+    if not truth:
         return []
-    worlds = sorted(set.intersection(*(set(w) for w in by.values())))
-    rows: list[dict[str, Any]] = []
-    for network in networks:
-
-        def pooled(of: Features, network: str = network) -> np.ndarray:
-            return np.concatenate([of[f"{network}/{view}"] for view in NOVEL])
-
-        real = [pooled(truth[seed]) for seed in worlds]
-        fake = {
-            name: [pooled(_features(features, Case(s, geometry, references), name, budget)) for s in worlds]  # pyright: ignore[reportArgumentType]
-            for name in by
-        }
-        for name, clips in fake.items():
-            figure = frechet_with_interval(real, clips, paired=True, resamples=200)
-            row = {
-                "network": network,
-                "representation": name,
-                "distance": figure.value,
-                "low": figure.low,
-                "high": figure.high,
-                "floor": figure.floor,
-                "samples": figure.real_samples,
-            }
-            if name != OURS:
-                ratio = frechet_ratio(real, fake[OURS], clips, resamples=200)
-                row |= {"ours_over_this": ratio.value, "ratio_low": ratio.low, "ratio_high": ratio.high}
-            rows.append(row)
-    return rows
-
-
-def _features(features: AllFeatures, case: Case, name: str, budget: str) -> Features:
-    return features[case, name, "equal_steps" if name == OURS else budget]
+    geometry, references, budget = key
+    fits: dict[str, Worlds] = {}
+    for name, worlds in _seeds(found).items():
+        spent = "equal_steps" if name == OURS else budget
+        cases = {seed: Case(seed, geometry, references) for seed in worlds}  # pyright: ignore[reportArgumentType]
+        fits[name] = {seed: features[case, name, spent] for seed, case in cases.items()}
+    return distance_rows(OURS, fits, truth, bases)
 
 
 def markdown(report: dict[str, Any]) -> str:
     """The tables as text."""
-    parts: list[str] = []
-    for table in report["tables"]:
-        parts.append(
-            f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n"
-        )
-        head = ["representation", "worlds", "steps", "s", *VIEWS, "mask IoU", "fake motion, m"]
-        lines = [head, ["---"] * len(head)]
-        for row in sorted(table["means"], key=lambda r: -r["held_out_psnr"]):
-            cells = [f"{row[f'{view}_psnr']:.2f} / {row[f'{view}_ssim']:.3f}" for view in VIEWS]
-            for figure, form in (("mask_iou", ".2f"), ("fake_m", ".3f")):
-                cells.append("-" if row[figure] is None else format(row[figure], form))
-            counts = [str(row["worlds"]), f"{row['steps']:.0f}", f"{row['seconds']:.1f}"]
-            lines.append([row["representation"], *counts, *cells])
-        parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n")
-        gains = [
-            f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}), {gain['best_other']}"
-            for view, gain in table["against_best_other"].items()
-        ]
-        if gains:
-            parts.append("hybrid less the best other: " + "; ".join(gains) + ".\n")
-        if table["distances"]:
-            parts.append(_distance_lines(table["distances"]))
+    parts = [part for table in report["tables"] for part in _table_lines(table)]
+    parts += _captions(report)
+    parts += [_consistency_lines(table) for table in report.get("consistency", [])]
+    if report.get("recording"):
+        parts.append(_recording_lines(report["recording"]))
     return "\n".join(parts)
 
 
+def _consistency_lines(table: dict[str, Any]) -> str:
+    head = ["error", "worlds", "clean truth", "corrupted references", "rendered"]
+    lines = [[*head, "rendered / references", "excess over the truth"]]
+    for row in table["rows"]:
+        span = "" if row["low"] is None else f" ({row['low']:.2f} to {row['high']:.2f})"
+        values = [number(row[kind], ".3g") for kind in KINDS]
+        ratios = [f"{row['ratio']:.2f}{span}", number(row["excess_ratio"], ".2f")]
+        lines.append([MEASURES[row["measure"]], str(row["worlds"]), *values, *ratios])
+    halved = len(table["at_most_half"])
+    sharp = ", ".join(f"{name} {value:.2f}" for name, value in table["sharpness"].items())
+    count = (
+        f"{halved} of {len(table['rows'])} errors are at most half of the references'. A blurred video "
+        f"changes less along its motion; mean change of grey from a pixel to the next: {sharp}.\n"
+    )
+    title = f"## Consistency of hybrid's drive along the recorded path, {table['geometry']} geometry\n"
+    return "\n".join([title, grid(lines), count])
+
+
+def _recording_lines(rows: list[dict[str, Any]]) -> str:
+    width, height = rows[0]["size"]
+    cores = " or ".join(sorted({str(row["threads"]) for row in rows}))
+    head = ["representation", "steps", f"s on {cores} threads", "withheld", "moving IoU", "inside hulls, dB"]
+    lines = [head]
+    for row in sorted(rows, key=lambda r: -r["psnr"]):
+        cells = [f"{row['psnr']:.2f} / {row['ssim']:.3f}"]
+        cells += [number(row["moving_iou"], ".2f"), number(row["moving_psnr"], ".2f")]
+        lines.append([row["representation"], str(row["steps"]), f"{row['seconds']:.1f}", *cells])
+    return f"## {CLIP}, {rows[0]['frames']} frames of {width}x{height}\n\n" + grid(lines)
+
+
+def _table_lines(table: dict[str, Any]) -> list[str]:
+    parts = [f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n"]
+    cores = " or ".join(str(count) for count in table["threads"])
+    head = [
+        "representation",
+        "worlds",
+        "steps",
+        f"s on {cores} threads",
+        *VIEWS,
+        "mask IoU",
+        "fake motion, m",
+    ]
+    lines = [head]
+    for row in sorted(table["means"], key=lambda r: -r["held_out_psnr"]):
+        cells = [f"{row[f'{view}_psnr']:.2f} / {row[f'{view}_ssim']:.3f}" for view in VIEWS]
+        cells += [number(row["mask_iou"], ".2f"), number(row["fake_m"], ".3f")]
+        counts = [str(row["worlds"]), f"{row['steps']:.0f}", f"{row['seconds']:.1f}"]
+        lines.append([row["representation"], *counts, *cells])
+    parts.append(grid(lines))
+    gains = [
+        f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}), {gain['best_other']}"
+        for view, gain in table["against_best_other"].items()
+    ]
+    if gains:
+        parts.append("hybrid less the best other: " + "; ".join(gains) + ".\n")
+    if table["distances"]:
+        if table["distances_compared"]:
+            parts.append(_compared_lines(table["distances_compared"]))
+        parts.append(_distance_lines(table["distances"]))
+    return parts
+
+
+def _captions(report: dict[str, Any]) -> list[str]:
+    counts = ", ".join(f"{count} of {name}" for name, count in report.get("components", {}).items())
+    if not counts:
+        return []
+    return [CAPTION.format(most=COMPONENTS, each=SAMPLES_EACH, counts=counts)]
+
+
+def _compared_lines(rows: list[dict[str, Any]]) -> str:
+    lines = [["network", "hybrid's excess over", "of", "ratio"]]
+    lines += [[_network(row), row["against"], row["representation"], _ratio(row)] for row in rows]
+    return grid(lines)
+
+
 def _distance_lines(rows: list[dict[str, Any]]) -> str:
-    head = ["network", "representation", "distance", "95 %", "floor", "N", "hybrid's excess over this one's"]
-    lines = [head, ["---"] * len(head)]
+    lines = [
+        [
+            "network",
+            "representation",
+            "distance",
+            "95 %",
+            "of halves",
+            "floor",
+            "N",
+            "hybrid's excess over this one's",
+        ]
+    ]
     for row in rows:
         span = "-" if row["low"] is None else f"{row['low']:.3g} to {row['high']:.3g}"
-        ratio = "-"
-        if row.get("ours_over_this") is not None:
-            low, high = row["ratio_low"], row["ratio_high"]
-            ratio = f"{row['ours_over_this']:.2f}"
-            if low is not None:
-                ratio += f" ({low:.2f} to {high:.2f})" + (", undecided" if low <= 1 <= high else "")
-        cells = [
-            row["network"],
-            row["representation"],
-            f"{row['distance']:.4g}",
-            span,
-            f"{row['floor']:.3g}",
-            str(row["samples"]),
-            ratio,
-        ]
+        cells = [_network(row), row["representation"], f"{row['distance']:.4g}", span]
+        cells += [f"{row['of_halves']:.4g}", f"{row['floor']:.3g}", str(row["samples"]), _ratio(row)]
         lines.append(cells)
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return grid(lines)
+
+
+def _network(row: dict[str, Any]) -> str:
+    return f"{row['network']}, {row['dimensions']} " + ("components" if row["projected"] else "dimensions")
+
+
+def _ratio(row: dict[str, Any]) -> str:
+    if row.get("ours_over_this") is None:
+        return "-"
+    text = f"{row['ours_over_this']:.2f}"
+    if row["ratio_low"] is not None:
+        text += f" ({row['ratio_low']:.2f} to {row['ratio_high']:.2f})"
+    return text + (", undecided" if row["undecided"] else "")
+
+
+def number(value: float | None, form: str) -> str:
+    """A dash for what was not measured."""
+    return "-" if value is None else format(value, form)
+
+
+def grid(lines: list[list[str]]) -> str:
+    """Rows of a table, the first its head."""
+    return table_of(lines[0], lines[1:]) + "\n"
+
+
+def as_text(report: dict[str, Any]) -> str:
+    """JSON of a report with six figures a number, small enough to be kept with the code."""
+    return json.dumps(_rounded(report), indent=1) + "\n"
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def picture(path: Path, seeds: list[int], runs: Path) -> None:
-    """A grid: a row a world, the truth of a shifted view beside what was kept of each representation."""
-    rows: list[np.ndarray] = []
-    for seed in seeds:
-        shown = [true_frames(seed, "shift_2", runs / "truth")[12]]
-        for name in (OURS, "vibration", "hexplane", "deformable", "static"):
-            kept = runs / "shown" / f"{seed}-true-corrupted-{name}-equal_steps.png"
-            if kept.exists():
-                shown.append(cv2.imread(str(kept))[..., ::-1])
-        rows.append(np.hstack(shown))
-    width = min(row.shape[1] for row in rows)
-    cv2.imwrite(str(path), np.vstack([row[:, :width] for row in rows])[..., ::-1])
+    """A grid with a head: a row a world, the truth of a shifted view beside each representation's."""
+    kept = {name: [runs / "shown" / f"{seed}-{SHOWN.format(name)}.png" for seed in seeds] for name in COLUMNS}
+    names = [name for name, files in kept.items() if any(file.exists() for file in files)]
+    rows = [_strip(["", "truth", *names])]
+    for number, seed in enumerate(seeds):
+        cells = [true_frames(seed, "shift_2", runs / "truth")[12][..., ::-1]]
+        blank = np.zeros_like(cells[0])
+        files = [kept[name][number] for name in names]
+        cells += [cv2.imread(str(file)) if file.exists() else blank for file in files]
+        rows.append(np.hstack([_label(f"world {seed}", (MARGIN, blank.shape[0])), *cells]))
+    cv2.imwrite(str(path), np.vstack(rows))
+
+
+def _strip(names: list[str]) -> UInt8[np.ndarray, "h w 3"]:
+    widths = [MARGIN] + [SIZE[0]] * (len(names) - 1)
+    return np.hstack([_label(name, (width, HEAD)) for name, width in zip(names, widths, strict=True)])
+
+
+def _label(text: str, size: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"]:
+    """Dark letters on white."""
+    image = np.full((size[1], size[0], 3), 255, dtype=np.uint8)
+    place = (6, size[1] // 2 + 5)
+    return cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (40, 40, 40), 1, cv2.LINE_AA)

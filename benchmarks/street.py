@@ -1,133 +1,82 @@
 """Which representation shows a street best from where no camera has been: the paper's Table I with a truth.
 
-    python benchmarks/street.py [--quick] [--seeds S ...] [--resume] [--runs runs/street] [--json FILE]
-                                [--markdown FILE] [--picture FILE] [--inception FILE] [--i3d FILE]
+    python benchmarks/street.py [--quick] [--seeds S ...] [--workers N] [--resume] [--runs runs/street]
+                                [--json FILE] [--markdown FILE] [--picture FILE]
+                                [--inception FILE] [--i3d FILE]
 
 Seeded worlds of 24 frames are reconstructed with five representations of motion: static (3D-GS), deformable
 (all Gaussians through F_deform, as Deformable-GS and MagicDrive3D), hexplane (as S3Gaussian), vibration (as
 PVG) and hybrid (ours). All take the same optimiser steps from the same points and the same static fit; a
 second table gives all the seconds of hybrid, a third gives the others five times the steps. Depth and motion
 are found by the classical geometry, with true poses, with true intrinsics alone, or with nothing known;
-references are clean, or corrupted as generated video is. Every view is compared with the clean truth.
+references are clean, or corrupted as generated video is. Every view is compared with the clean truth. Beside
+them stand how consistent a rendered drive is with itself and its path, against its references, and the same
+five fits of a recorded clip (``DREAMDRIVE_DATA``).
 
-Each fit is a file below ``--runs``; with ``--resume`` those that are there count.
+Each fit is a file below ``--runs``; with ``--resume`` those that are there count. ``--workers`` makes that
+many fits side by side, each on its share of the cores. A fit that fails is named at the end, and its reason
+kept beside the others' results.
 """
 
 import argparse
-import json
+import os
 import sys
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from _street_case import FRAMES, NOVEL, VIEWS, Case, Poses, References, start, true_frames
-from _street_fit import (
-    Features,
-    features_of,
-    fit_case,
-    keep_picture,
-    load,
-    load_features,
-    measure,
-    save,
-    told_apart,
-    with_steps,
+from _street_case import FRAMES, Poses, References
+from _street_consistency import consistency_tables
+from _street_fit import load, load_features
+from _street_jobs import (
+    BUDGETS,
+    QUALITY,
+    REPRESENTATIONS,
+    SEEDS,
+    Job,
+    in_order,
+    jobs,
+    recorded,
+    run,
+    truth_features,
 )
-from _street_table import markdown, picture, summary
+from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
+from _street_table import as_text, markdown, picture, summary
+from _workers import work_off
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.evaluate.extractors import Toolbox, WeightFiles, open_toolbox
-from dreamdrive.fit import Representation
-from dreamdrive.options import QUALITIES
 from dreamdrive.splat import native_info
 
-SEEDS = tuple(range(8))
-REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
-BUDGETS = ("equal_steps", "equal_time", "five_times")
-QUALITY = QUALITIES["draft"]
-TIMES = 5
+toolbox_of = lru_cache(maxsize=1)(open_toolbox)
 
 
-@dataclass(frozen=True)
-class Job:
-    """One fit."""
-
-    case: Case
-    representation: Representation
-    budget: str
-
-    def path(self, runs: Path) -> Path:
-        """Where its result is kept."""
-        return runs / "fits" / f"{self.case.name}-{self.representation}-{self.budget}.json"
+def make(job: Job | Recorded, weights: WeightFiles) -> None:
+    """One fit, in a worker."""
+    if isinstance(job, Recorded):
+        run_recorded(job, QUALITY)
+    else:
+        run(job, toolbox_of(weights))
 
 
-def jobs(options: argparse.Namespace) -> Iterator[Job]:
-    """All fits, the most telling first."""
-    for budget in options.budgets:
-        for references in get_args(References):
-            for geometry in options.geometry:
-                if geometry == "unknown_focal" and budget != "equal_steps":
-                    continue
-                for seed in options.seeds:
-                    for representation in options.representations:
-                        if not (budget != "equal_steps" and representation == "hybrid"):
-                            yield Job(Case(seed, geometry, references), representation, budget)
-
-
-def steps_of(job: Job, runs: Path) -> int | None:
-    """Steps of the joint fit; None if what they follow from is not there."""
-    base = QUALITY.fit.steps
-    if job.budget == "equal_steps":
-        return base
-    if job.budget == "five_times":
-        return TIMES * (QUALITY.static.steps + base) - QUALITY.static.steps
-    ours = load(Job(job.case, "hybrid", "equal_steps").path(runs))
-    theirs = load(Job(job.case, job.representation, "equal_steps").path(runs))
-    if ours is None or theirs is None:
-        return None
-    return max(1, round(ours["seconds"] / theirs["step_s"]))
-
-
-def run(job: Job, runs: Path, toolbox: Toolbox) -> None:
-    """Fit, measure and keep."""
-    steps = steps_of(job, runs)
-    if steps is None:
-        return
-    begin = start(job.case, QUALITY, runs / "cases")
-    fitted = fit_case(begin, job.representation, with_steps(QUALITY, steps), lambda *_: None)
-    views, features, middle = measure(fitted, job.case, toolbox.extractors, runs / "truth")
-    record = {
-        "seed": job.case.seed,
-        "geometry": job.case.geometry,
-        "references": job.case.references,
-        "representation": job.representation,
-        "budget": job.budget,
-        "static_steps": QUALITY.static.steps,
-        "steps": steps,
-        "seconds": fitted.seconds,
-        "step_s": fitted.step_s,
-        "gaussians": {"static": len(fitted.scene.static), "dynamic": len(fitted.scene.dynamic)},
-        "views": views,
-        **told_apart(fitted, job.case),
+def report_of(
+    wanted: list[Job], clips: list[Recorded], toolbox: Toolbox, seeds: list[int], runs: Path
+) -> dict[str, Any]:
+    """Tables and a row for each fit."""
+    there = [job for job in wanted if job.result.exists()]
+    records = [record for job in there if (record := load(job.result)) is not None]
+    features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
+    truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
+    return {
+        "frames": FRAMES,
+        "machine": native_info(),
+        "weights": toolbox.weights,
+        "missing": toolbox.missing,
+        "rows": records,
+        "recording": [record for job in clips if (record := load(job.result)) is not None],
+        "consistency": consistency_tables(records),
+        **summary(records, features, truth),
     }
-    keep_picture(runs / "shown" / f"{job.path(runs).stem}.png", middle)
-    save(job.path(runs), record, features)
-
-
-def truth_features(seed: int, runs: Path, toolbox: Toolbox) -> Features:
-    """Features of the true novel views of a world, kept."""
-    path = runs / "truth" / f"features-{seed}.json"
-    wanted = {extractor.frechet for extractor in toolbox.extractors}
-    if path.exists() and set(json.loads(path.read_text())["networks"]) == wanted:
-        return load_features(path)
-    found: Features = {}
-    for view in NOVEL:
-        rows = features_of(true_frames(seed, view, runs / "truth"), toolbox.extractors)
-        found |= {f"{name}/{view}": values for name, values in rows.items()}
-    save(path, {"networks": sorted(wanted)}, found)
-    return found
 
 
 def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -140,6 +89,9 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--geometry", nargs="+", choices=get_args(Poses))
     parser.add_argument("--representations", nargs="+", choices=REPRESENTATIONS)
     parser.add_argument("--budgets", nargs="+", choices=BUDGETS)
+    parser.add_argument("--references", nargs="+", choices=get_args(References))
+    parser.add_argument("--no-recording", action="store_true", help="leave the recorded clip out")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="fits side by side")
     parser.add_argument("--resume", action="store_true", help="keep fits that are finished")
     parser.add_argument("--table-only", action="store_true", help="fit nothing, show what is there")
     parser.add_argument("--runs", type=Path, default=Path("runs/street"), metavar="DIR")
@@ -151,6 +103,8 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     options.seeds = options.seeds or (list(SEEDS[:2]) if options.quick else list(SEEDS))
     options.geometry = options.geometry or (["true"] if options.quick else list(get_args(Poses)))
+    options.no_recording = options.no_recording or options.quick
+    options.references = options.references or list(get_args(References))
     options.representations = options.representations or list(
         REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS
     )
@@ -158,56 +112,37 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     return options
 
 
-def main() -> None:
+def main() -> int:
     """Fit what is not there yet and print the tables."""
-    use_all_cores()
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     options = options_of()
-    toolbox = open_toolbox(WeightFiles(inception=options.inception, i3d=options.i3d))
+    weights = WeightFiles(inception=options.inception, i3d=options.i3d)
+    toolbox = toolbox_of(weights)
     for figure, reason in toolbox.missing.items():
         print(f"not measured: {figure}: {reason}", file=sys.stderr)
-    wanted = list(jobs(options))
+    wanted, clips = list(jobs(options)), recorded(options)
+    if recording() is None and not options.no_recording:
+        print(f"not measured: {CLIP}: {DATA} has no such clip, set DREAMDRIVE_DATA", file=sys.stderr)
+    everything = in_order(wanted, clips)
     if not options.resume and not options.table_only:
-        for job in wanted:
-            job.path(options.runs).unlink(missing_ok=True)
-    todo = [] if options.table_only else [job for job in wanted if not job.path(options.runs).exists()]
-    began = time.perf_counter()
-    for number, job in enumerate(todo):
-        run(job, options.runs, toolbox)
-        spent = time.perf_counter() - began
-        left_min = spent / (number + 1) * (len(todo) - number - 1) / 60
-        name = f"{job.case.name} {job.representation} {job.budget}"
-        print(f"{number + 1}/{len(todo)} {name}: about {left_min:.0f} min left", file=sys.stderr, flush=True)
-    records = [record for job in wanted if (record := load(job.path(options.runs))) is not None]
-    features = {}
-    for job in wanted:
-        if job.path(options.runs).exists():
-            features[job.case, job.representation, job.budget] = load_features(job.path(options.runs))
-    truth = {seed: truth_features(seed, options.runs, toolbox) for seed in options.seeds}
-    report: dict[str, Any] = {
-        "frames": FRAMES,
-        "machine": native_info(),
-        "weights": toolbox.weights,
-        "missing": toolbox.missing,
-        "rows": [
-            {
-                **{key: value for key, value in record.items() if key != "views"},
-                "view": view,
-                **record["views"][view],
-            }
-            for record in records
-            for view in VIEWS
-        ],
-        **summary(records, features, truth),
-    }
+        for job in everything:
+            job.result.unlink(missing_ok=True)
+    todo = [] if options.table_only else [job for job in everything if not job.result.exists()]
+    failed = work_off(todo, partial(make, weights=weights), options.workers)
+    use_all_cores()
+    report = report_of(wanted, clips, toolbox, options.seeds, options.runs)
     text = markdown(report)
     print(text)
     if options.json:
-        options.json.write_text(json.dumps(report, indent=1) + "\n")
+        options.json.write_text(as_text(report))
     if options.markdown:
         options.markdown.write_text(text)
     if options.picture:
         picture(options.picture, options.seeds[:4], options.runs)
+    for job in failed:
+        print(f"failed: {job.name}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,0 +1,241 @@
+"""What each part of telling static from moving is worth, on drawn streets with a truth.
+
+    python benchmarks/ablation.py [--seeds S ...] [--variants NAME ...] [--workers N] [--resume]
+                                  [--runs runs/street] [--json FILE] [--markdown FILE]
+
+Variants of hybrid with true poses, from corrupted and from clean references: each leaves one part out, or
+takes the paper's choice in its place. All begin with the static fit of ``street.py`` and use what that has
+prepared in the same ``--runs``.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import torch
+from _street_case import NOVEL, Case, References, Start, start
+from _street_fit import fit_case, load, measure, save, told_apart
+from _street_jobs import QUALITY
+from _street_table import as_text, grid, number
+from _workers import threads, work_off
+
+from dreamdrive.fit import Representation
+from dreamdrive.options import Quality
+from dreamdrive.splat import native_info
+
+SEEDS = (0, 1, 2, 3)
+FIGURES = ("held_out_psnr", "novel_psnr", "mask_iou", "label_iou", "fake_m")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Hybrid with one thing changed.
+
+    Attributes:
+        about: For the table.
+        change: Of the options.
+        features: Whether F_score sees Z_ref.
+        representation: What is fitted.
+    """
+
+    about: str
+    change: Callable[[Quality], Quality] = lambda quality: quality
+    features: bool = True
+    representation: Representation = "hybrid"
+
+
+def scored(**changes: Any) -> Callable[[Quality], Quality]:
+    """Other options of the scores."""
+    return lambda quality: replace(quality, score=replace(quality.score, **changes))
+
+
+def grouped(**changes: Any) -> Callable[[Quality], Quality]:
+    """Other options of the grouping."""
+    return lambda quality: replace(quality, group=replace(quality.group, **changes))
+
+
+def ungrouped(quality: Quality) -> Quality:
+    """No clusters, hence no things that could have tracks."""
+    cut = grouped(clustering=False)(quality)
+    return replace(cut, cast=replace(cut.cast, least_frames=10**6))
+
+
+VARIANTS = {
+    "hybrid": Variant("all parts"),
+    "no-grouping": Variant("each Gaussian's own score against tau, no tracks", ungrouped),
+    "no-features": Variant("F_score without Z_ref", features=False),
+    "error-alone": Variant("the colour error alone as target (eq. 6)", scored(target="error")),
+    "all-frames": Variant("scores splatted into all frames, as the paper", scored(window=None)),
+    "paper": Variant("both of the above, as the paper", scored(target="error", window=None)),
+    "tau-0.20": Variant("tau = 0.20", grouped(threshold=0.20)),
+    "tau-0.50": Variant("tau = 0.50", grouped(threshold=0.50)),
+    "tau-0.65": Variant("tau = 0.65", grouped(threshold=0.65)),
+    "static": Variant("nothing moves", representation="static"),
+}
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One fit of a variant."""
+
+    seed: int
+    references: References
+    variant: str
+    runs: Path
+
+    @property
+    def name(self) -> str:
+        """For files and messages."""
+        return f"{self.seed}-{self.references}-{self.variant}"
+
+    @property
+    def block(self) -> str:
+        """Its table."""
+        return self.references
+
+    @property
+    def owner(self) -> str:
+        """Its world."""
+        return str(self.seed)
+
+    @property
+    def result(self) -> Path:
+        """Where its figures are kept."""
+        return self.runs / "ablation" / f"{self.name}.json"
+
+
+def begun(begin: Start, variant: Variant) -> Start:
+    """What the variant is fitted to."""
+    features = begin.seeds.features
+    if variant.features or features is None:
+        return begin
+    return replace(begin, seeds=replace(begin.seeds, features=torch.zeros_like(features)))
+
+
+def make(cut: Cut) -> None:
+    """Fit, measure and keep."""
+    case, variant = Case(cut.seed, "true", cut.references), VARIANTS[cut.variant]
+    begin = begun(start(case, QUALITY, cut.runs / "cases"), variant)
+    fitted = fit_case(begin, variant.representation, variant.change(QUALITY), lambda *_: None)
+    views, _, _ = measure(fitted, case, [], cut.runs / "truth")
+    record = {
+        "seed": cut.seed,
+        "references": cut.references,
+        "variant": cut.variant,
+        "steps": fitted.steps,
+        "seconds": fitted.seconds,
+        "threads": threads(),
+        "gaussians": {"static": len(fitted.scene.static), "dynamic": len(fitted.scene.dynamic)},
+        "held_out_psnr": views["held_out"]["psnr"],
+        "novel_psnr": float(np.mean([views[view]["psnr"] for view in NOVEL])),
+        "views": views,
+        **told_apart(fitted, case),
+    }
+    save(cut.result, record, {})
+
+
+def tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Means over worlds, and what each variant changes against all parts, world by world."""
+    found: list[dict[str, Any]] = []
+    for references in dict.fromkeys(record["references"] for record in records):
+        here = [record for record in records if record["references"] == references]
+        whole = {record["seed"]: record for record in here if record["variant"] == "hybrid"}
+        rows = [
+            _row(variant, [record for record in here if record["variant"] == variant], whole)
+            for variant in dict.fromkeys(record["variant"] for record in here)
+        ]
+        found.append({"references": references, "rows": rows})
+    return found
+
+
+def _row(variant: str, found: list[dict[str, Any]], whole: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    row: dict[str, Any] = {"variant": variant, "worlds": len(found)}
+    for figure in FIGURES:
+        row[figure] = _mean([record[figure] for record in found])
+        pairs = [
+            (record[figure], whole[record["seed"]][figure]) for record in found if record["seed"] in whole
+        ]
+        row[f"{figure}_change"] = _mean([a - b for a, b in pairs if a is not None and b is not None])
+    return row
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def markdown(found: list[dict[str, Any]]) -> str:
+    """The tables as text; in brackets the change against all parts."""
+    parts: list[str] = []
+    heads = ["withheld, dB", "novel, dB", "mask IoU", "label IoU", "fake motion, m"]
+    forms = (".2f", ".2f", ".3f", ".3f", ".4f")
+    for table in found:
+        lines = [["variant", "", "worlds", *heads]]
+        for row in table["rows"]:
+            cells = [
+                f"{number(row[figure], form)} ({number(row[figure + '_change'], '+' + form)})"
+                for figure, form in zip(FIGURES, forms, strict=True)
+            ]
+            about = VARIANTS[row["variant"]].about
+            lines.append([row["variant"], about, str(row["worlds"]), *cells])
+        parts += [f"## {table['references']} references, true poses\n", grid(lines)]
+    return "\n".join(parts)
+
+
+def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, nargs="+", metavar="S", default=list(SEEDS))
+    parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS))
+    parser.add_argument(
+        "--references", nargs="+", choices=get_args(References), default=["corrupted", "clean"]
+    )
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="fits side by side")
+    parser.add_argument("--resume", action="store_true", help="keep fits that are finished")
+    parser.add_argument("--runs", type=Path, default=Path("runs/street"), metavar="DIR")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--markdown", type=Path, metavar="FILE")
+    return parser.parse_args(arguments)
+
+
+def cuts(options: argparse.Namespace) -> list[Cut]:
+    """All fits, world by world."""
+    return [
+        Cut(seed, references, variant, options.runs)
+        for references in options.references
+        for seed in options.seeds
+        for variant in options.variants
+    ]
+
+
+def main() -> int:
+    """Fit what is not there yet and print the tables."""
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    options = options_of()
+    wanted = cuts(options)
+    if not options.resume:
+        for cut in wanted:
+            cut.result.unlink(missing_ok=True)
+    failed = work_off([cut for cut in wanted if not cut.result.exists()], make, options.workers)
+    records = [record for cut in wanted if (record := load(cut.result)) is not None]
+    report = {"machine": native_info(), "rows": records, "tables": tables(records)}
+    text = markdown(report["tables"])
+    print(text)
+    if options.json:
+        options.json.write_text(as_text(report))
+    if options.markdown:
+        options.markdown.write_text(text)
+    for cut in failed:
+        print(f"failed: {cut.name}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
