@@ -21,7 +21,7 @@ from dreamdrive.geometry.classical.view import View
 _REACH = 2  # offsets beyond this are not asked
 _ERROR_CAP = 25.0  # grey levels
 _WINDOW_PX = 3
-_SAME_PX = 1.0  # explanations that land this near are one
+_SAME_PX = 2.0  # explanations that land this near are one
 _PLANE_SHARE = 0.8
 _MIN_FLOW_PX = 30  # pixels with trusted flow from which a motion is drawn
 _MIN_SHARE = 0.4  # of them that have to follow it
@@ -34,10 +34,10 @@ _BELOW_SHARE = 0.1
 _WORTH = 0.5  # of a grey level by which the motion explains a pixel better
 _MAX_LEVELS = 12.0
 _KNOWN = 1.0  # worth of a pixel that is known to move
-_AWAY = 0.15  # cost of one that is not, unless it is above one that is
+_AWAY = 1.0  # cost of one that is not, unless it is above one that is
 _UNDER = 1.0  # cost of a pixel below the region
 _NEVER = 100.0
-_EDGE = 4.0  # weight of two equal neighbours
+_EDGE = 6.0  # weight of two equal neighbours
 _EDGE_FLOOR = 0.3
 _EDGE_LEVELS = 15.0  # difference in colour at which the weight is 0.6 of that
 
