@@ -75,6 +75,11 @@ class Job:
         """Where its figures are kept."""
         return self.runs / "fits" / f"{self.name}.json"
 
+    @property
+    def has_distances(self) -> bool:
+        """Whether its views count in distances between sets: these are for the main tables, and take long."""
+        return self.budget == "equal_steps" and self.case.geometry != "unknown_focal"
+
     def with_equal_steps(self, representation: Representation) -> "Job":
         """The fit of the same case by steps."""
         return Job(self.case, representation, "equal_steps", self.runs)
@@ -126,7 +131,8 @@ def run(job: Job, toolbox: Toolbox) -> None:
     steps = steps_of(job)
     begin = start(job.case, QUALITY, job.runs / "cases")
     fitted = fit_case(begin, job.representation, with_steps(QUALITY, steps), lambda *_: None)
-    views, features, middle = measure(fitted, job.case, toolbox.extractors, job.runs / "truth")
+    extractors = toolbox.extractors if job.has_distances else []
+    views, features, middle = measure(fitted, job.case, extractors, job.runs / "truth")
     truth_features(job.case.seed, job.runs, toolbox)
     record = {
         "seed": job.case.seed,

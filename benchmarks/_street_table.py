@@ -120,15 +120,14 @@ def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
 def _distances(
     key: Key, found: list[dict[str, Any]], features: AllFeatures, truth: Worlds, bases: dict[str, Basis]
 ) -> list[dict[str, Any]]:
-    """Rows of the table of distances; what ours reached with equal steps stands in all of them."""
-    if not truth:
-        return []
+    """Rows of the table of distances, where features were kept for it."""
     geometry, references, budget = key
+    if not truth or budget != "equal_steps" or geometry == "unknown_focal":
+        return []
     fits: dict[str, Worlds] = {}
     for name, worlds in _seeds(found).items():
-        spent = "equal_steps" if name == OURS else budget
         cases = {seed: Case(seed, geometry, references) for seed in worlds}  # pyright: ignore[reportArgumentType]
-        fits[name] = {seed: features[case, name, spent] for seed, case in cases.items()}
+        fits[name] = {seed: features[case, name, budget] for seed, case in cases.items()}
     return distance_rows(OURS, fits, truth, bases)
 
 
