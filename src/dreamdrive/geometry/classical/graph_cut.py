@@ -17,10 +17,10 @@ def minimum_cut(
 
     Args:
         gain: What labelling a pixel is worth; negative where it costs.
-        right: Non-negative weight of each pixel (H, W - 1) and its neighbour on the right having unlike labels.
+        right: Non-negative weight of unlike labels of each pixel (H, W - 1) and its neighbour on the right.
         below: The same of each pixel (H - 1, W) and its neighbour below.
 
-    Gains and weights count in steps of 1/100. Of equally good labellings it is the one with the fewest pixels.
+    Gains and weights count in steps of 1/100. Of equally good labellings it is that of the fewest pixels.
     """
     pixel = np.arange(gain.size).reshape(gain.shape)
     source, sink = gain.size, gain.size + 1

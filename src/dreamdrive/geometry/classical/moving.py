@@ -37,8 +37,8 @@ def moving_evidence(
     """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
-    enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer static ones
-    and are found only where their flow leaves the epipolar line.
+    enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
+    static ones and are found only where their flow leaves the epipolar line.
 
     Args:
         view: The posed frames.

@@ -34,7 +34,7 @@ _BELOW_SHARE = 0.1
 _WORTH = 0.5  # of a grey level by which the motion explains a pixel better
 _MAX_LEVELS = 12.0
 _KNOWN = 1.0  # worth of a pixel that is known to move
-_AWAY = 1.0  # cost of one that is not, unless it is above one that is
+_AWAY = 1.0  # cost of one that is not, unless it is above one that is: bare road fits both explanations
 _UNDER = 1.0  # cost of a pixel below the region
 _NEVER = 100.0
 _EDGE = 6.0  # weight of two equal neighbours
@@ -58,7 +58,7 @@ def outline(
     flagged: Bool[np.ndarray, "h w"],
     sky: Bool[np.ndarray, "h w"],
 ) -> Bool[np.ndarray, "h w"]:
-    """The moving things (H, W) of which ``flagged`` shows a part; what has no motion of its own stays as it is.
+    """The moving things (H, W) of which ``flagged`` shows a part; what has no motion of its own stays so.
 
     Args:
         view: The posed frames.
@@ -123,7 +123,7 @@ def _gain(
     region: Bool[np.ndarray, "h w"],
     window: tuple[slice, slice],
 ) -> Float[np.ndarray, "u v"] | None:
-    """What the region's own motion is worth in the window, over that of the static street; None without one."""
+    """What the region's own motion, if it has one, is worth in the window over that of the static street."""
     gains: list[np.ndarray] = []
     for neighbour in near:
         motion = _motion(neighbour.flow, region)
