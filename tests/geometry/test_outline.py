@@ -46,7 +46,7 @@ def test_the_plain_upper_part_is_found_with_the_textured_lower_one(street, seen)
     found = outline(view, FRAME, flows, static_inverse(view), box & (rows > HORIZON + 12), NO_SKY)
     assert found[box].mean() > 0.9
     assert found[~box].mean() < 0.005
-    assert found[box & (rows < HORIZON)].mean() > 0.8
+    assert found[box & (rows < HORIZON)].mean() > 0.7
 
 
 def test_road_that_was_taken_for_the_thing_is_given_back(street, seen):
