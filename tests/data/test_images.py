@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tests.data.pictures import texture
 
 from dreamdrive.data.images import ImageFolder, natural_key, read_image
+from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
 
 EXIF = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0%c\0\0\0\0\0\0"
@@ -38,6 +39,14 @@ def test_a_folder_without_images_tells_where_they_are(make_folder, tmp_path):
     make_folder(2, name="front_camera")
     with pytest.raises(InputError, match="did you mean one of these in it: front_camera"):
         ImageFolder.open(tmp_path)
+
+
+def test_a_folder_of_a_recording_gives_its_frames(make_folder, tmp_path):
+    cv2.imwrite(str(tmp_path / "layout.png"), texture(10, 10))
+    frames = make_folder(3, name="frames")
+    source = open_source(tmp_path)
+    assert source.path == frames
+    assert source.count() == 3
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".jpeg", ".bmp", ".tif", ".webp"])

@@ -11,7 +11,7 @@ Source = ImageFolder | Video
 
 
 def open_source(path: Path) -> Source:
-    """Open a recording.
+    """Open a recording; of a folder with ``frames`` in it, as ``world make`` writes, the images there.
 
     Raises:
         InputError: The path is missing, is a single photo or is not a recording.
@@ -19,7 +19,8 @@ def open_source(path: Path) -> Source:
     if not path.exists():
         raise InputError(f"{path} does not exist; expected a video or a folder of images")
     if path.is_dir():
-        return ImageFolder.open(path)
+        frames = path / "frames"
+        return ImageFolder.open(frames if frames.is_dir() else path)
     if path.suffix.lower() in SUFFIXES:
         raise one_frame(path)
     if path.suffix.lower() == ".json":
