@@ -18,7 +18,7 @@ from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
-from dreamdrive.prior import choose_prior
+from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.report import describe
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
@@ -34,7 +34,7 @@ def generate(
     control: Control,
     out: Path,
     *,
-    prior: str = "replay",
+    prior: str | None = None,
     geometry_method: str = "classical",
     geometry_files: Path | None = None,
     quality: QualityName = "standard",
@@ -52,7 +52,7 @@ def generate(
     Args:
         control: The input and how to read it; its seed is that of everything random.
         out: The output folder, see ``workspace``.
-        prior: Name in ``prior.PRIORS``.
+        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
         geometry_files: Folder with cameras and depth to use, see ``geometry.files``.
         quality: Name in ``options.QUALITIES``.
@@ -69,6 +69,7 @@ def generate(
     Raises:
         InputError: The input, an option or ``out`` cannot be used.
     """
+    prior = prior or prior_of(control.path)
     choose_prior(prior)
     if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")

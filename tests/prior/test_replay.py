@@ -8,7 +8,7 @@ from tests.data.pictures import texture
 
 from dreamdrive.data import read_clip
 from dreamdrive.errors import InputError
-from dreamdrive.prior import PRIORS, Prior, choose_prior, replay
+from dreamdrive.prior import PRIORS, Prior, choose_prior, prior_of, replay
 from dreamdrive.scene.control import Control
 
 
@@ -44,3 +44,9 @@ def test_priors_are_found_by_name():
     assert all(isinstance(prior, Prior) for prior in PRIORS.values())
     with pytest.raises(InputError, match="--prior sora: unknown; available are replay, street-world"):
         choose_prior("sora")
+
+
+def test_without_a_name_the_input_decides():
+    assert prior_of(Path("street/layout.json")) == "street-world"
+    assert prior_of(Path("drive.mp4")) == "replay"
+    assert prior_of(None) == "replay"

@@ -82,7 +82,7 @@ def generate(
         made = run(
             control,
             out,
-            prior=prior or ("street-world" if input is not None and input.suffix == ".json" else "replay"),
+            prior=prior,
             geometry_method=geometry,
             geometry_files=geometry_files,
             quality=quality,

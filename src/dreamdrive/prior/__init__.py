@@ -1,6 +1,7 @@
 """Priors: from a control to a clip with features."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 
 from dreamdrive.errors import InputError
@@ -28,4 +29,9 @@ def choose_prior(name: str) -> Prior:
     return PRIORS[name]
 
 
-__all__ = ["PRIORS", "Prior", "choose_prior", "replay", "street_world"]
+def prior_of(path: Path | None) -> str:
+    """The prior for an input where none is named: a layout is drawn, anything else is a recording."""
+    return "street-world" if path is not None and path.suffix.lower() == ".json" else "replay"
+
+
+__all__ = ["PRIORS", "Prior", "choose_prior", "prior_of", "replay", "street_world"]
