@@ -153,7 +153,7 @@ def _motion(flow: PairFlow, region: Bool[np.ndarray, "h w"]) -> tuple[np.ndarray
     there = np.stack([flow.x[rows, columns], flow.y[rows, columns]], axis=1)
     cv2.setRNGSeed(0)
     affine, follows = cv2.estimateAffine2D(here, there, method=cv2.RANSAC, ransacReprojThreshold=_FOLLOWS_PX)
-    if affine is None or follows.mean() < _MIN_SHARE:
+    if follows.mean() < _MIN_SHARE:  # also where none was found at all
         return None
     x, y = pixel_grid(*region.shape)
     a = affine.astype(np.float32)
@@ -166,7 +166,7 @@ def _prior(
     """What a pixel is worth by its place alone: nothing above the region, less beside and below it."""
     top, height = int(box[1]), int(box[3])
     rows = np.arange(window[0].start, window[0].start + len(part))[:, None]
-    above = part.any(axis=0)[None] & (rows <= top + height // 2)
+    above = np.atleast_2d(part.any(axis=0)) & (rows <= top + height // 2)
     worth = np.where(part, _KNOWN, np.where(above, 0, -_AWAY))
     return (worth - np.where(rows >= top + height, _UNDER, 0)).astype(np.float32)
 
