@@ -75,7 +75,8 @@ def _parts(begin: Start, representation: Representation, quality: Quality) -> Pa
     if representation != "hybrid":
         return Parts(begin.seeds.select(nothing), fitted, None, ())
     clip, geometry, seeds = begin.clip, begin.geometry, begin.seeds
-    errors = error_maps(clip, geometry, fitted, begin.static.sky, begin.static.exposure)
+    sky, exposure = begin.static.sky, begin.static.exposure
+    errors = error_maps(clip, geometry, fitted, sky, exposure, quality.score.error)
     scores = score(clip, geometry, seeds, errors, quality.score, stage_seed(0, "score"), lambda *_: None)
     grouping = group(clip, geometry, seeds, scores, quality.group)
     moving = cast(clip, geometry, seeds, grouping, quality.cast)

@@ -1,11 +1,11 @@
-"""What each part of telling static from moving is worth, on drawn streets with a truth.
+"""What each part of hybrid is worth, on drawn streets with a truth.
 
     python benchmarks/ablation.py [--seeds S ...] [--variants NAME ...] [--workers N] [--resume]
                                   [--runs runs/street] [--json FILE] [--markdown FILE]
 
 Variants of hybrid with true poses, from corrupted and from clean references: each leaves one part out, or
-takes the paper's choice in its place. All begin with the static fit of ``street.py`` and use what that has
-prepared in the same ``--runs``.
+takes another choice, such as the paper's, in its place. All begin with the static fit of ``street.py``, but for
+those that vary it, and use what that has prepared in the same ``--runs``.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from typing import Any, get_args
 import numpy as np
 import torch
 from _street_case import NOVEL, Case, References, Start, start
-from _street_fit import fit_case, load, measure, save, told_apart
+from _street_fit import fit_case, load, measure, save, told_apart, with_steps
 from _street_jobs import QUALITY
 from _street_table import as_text, grid, number
 from _workers import threads, work_off
@@ -59,6 +59,21 @@ def grouped(**changes: Any) -> Callable[[Quality], Quality]:
     return lambda quality: replace(quality, group=replace(quality.group, **changes))
 
 
+def played(**changes: Any) -> Callable[[Quality], Quality]:
+    """Other options of the actors."""
+    return lambda quality: replace(quality, cast=replace(quality.cast, **changes))
+
+
+def fitted_with(**changes: Any) -> Callable[[Quality], Quality]:
+    """Other options of the joint fit."""
+    return lambda quality: replace(quality, fit=replace(quality.fit, **changes))
+
+
+def prefit(steps: int) -> Callable[[Quality], Quality]:
+    """Another length of the static fit."""
+    return lambda quality: with_steps(quality, quality.fit.steps, steps)
+
+
 def ungrouped(quality: Quality) -> Quality:
     """No clusters, hence no things that could have tracks."""
     cut = grouped(clustering=False)(quality)
@@ -70,11 +85,19 @@ VARIANTS = {
     "no-grouping": Variant("each Gaussian's own score against tau, no tracks", ungrouped),
     "no-features": Variant("F_score without Z_ref", features=False),
     "error-alone": Variant("the colour error alone as target (eq. 6)", scored(target="error")),
+    "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
     "all-frames": Variant("scores splatted into all frames, as the paper", scored(window=None)),
     "paper": Variant("both of the above, as the paper", scored(target="error", window=None)),
     "tau-0.20": Variant("tau = 0.20", grouped(threshold=0.20)),
     "tau-0.50": Variant("tau = 0.50", grouped(threshold=0.50)),
     "tau-0.65": Variant("tau = 0.65", grouped(threshold=0.65)),
+    "no-tracks": Variant("F_deform alone moves things (eq. 11)", played(least_frames=10**6)),
+    "long-lives": Variant("copies live three times as long", played(lifespan_frames=3.75)),
+    "paper-loss": Variant("L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
+    "no-depth": Variant("no term on depth", fitted_with(depth_weight=0.0)),
+    "no-shape": Variant("no term on elongation", fitted_with(shape_weight=0.0)),
+    "prefit-50": Variant("static fit of 50 steps", prefit(50)),
+    "prefit-400": Variant("static fit of 400 steps", prefit(400)),
     "static": Variant("nothing moves", representation="static"),
 }
 
@@ -120,8 +143,11 @@ def begun(begin: Start, variant: Variant) -> Start:
 def make(cut: Cut) -> None:
     """Fit, measure and keep."""
     case, variant = Case(cut.seed, "true", cut.references), VARIANTS[cut.variant]
-    begin = begun(start(case, QUALITY, cut.runs / "cases"), variant)
-    fitted = fit_case(begin, variant.representation, variant.change(QUALITY), lambda *_: None)
+    quality = variant.change(QUALITY)
+    steps = quality.static.steps
+    cases = cut.runs / ("cases" if steps == QUALITY.static.steps else f"cases-{steps}")
+    begin = begun(start(case, quality, cases), variant)
+    fitted = fit_case(begin, variant.representation, quality, lambda *_: None)
     views, _, _ = measure(fitted, case, [], cut.runs / "truth")
     record = {
         "seed": cut.seed,

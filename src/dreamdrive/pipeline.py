@@ -184,7 +184,7 @@ def _decompose(
             clip,
             geometry,
             seeds,
-            error_maps(clip, geometry, static.gaussians, static.sky, static.exposure),
+            error_maps(clip, geometry, static.gaussians, static.sky, static.exposure, settings.score.error),
             settings.score,
             seed,
             tell,

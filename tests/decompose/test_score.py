@@ -26,6 +26,16 @@ def test_static_gaussians_fail_where_things_move(fitted):
     assert (errors[clip.held_out] == 0).all()
 
 
+def test_every_error_is_largest_where_things_move(fitted):
+    street, clip, geometry, seeds, _ = fitted
+    start = fit_static(clip, geometry, seeds, FitOptions(steps=40), 0, quiet)
+    errors = error_maps(clip, geometry, start.gaussians, start.sky, start.exposure, "dssim")
+    seen = ~clip.held_out
+    assert (errors >= 0).all()
+    assert (errors <= 1).all()
+    assert errors[seen][street.moving[seen]].mean() > 1.3 * errors[seen][~street.moving[seen]].mean()
+
+
 def test_scores_tell_the_moving_car_from_the_street(fitted):
     _, clip, geometry, seeds, errors = fitted
     scores = score(clip, geometry, seeds, errors, ScoreOptions(steps=120), 0, quiet)

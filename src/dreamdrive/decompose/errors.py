@@ -1,5 +1,7 @@
 """Where static Gaussians fail: renders of the static fit and their distance from the frames (eq. 5-6)."""
 
+from typing import Literal
+
 import cv2
 import numpy as np
 import torch
@@ -10,15 +12,17 @@ from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import one_torch_thread, render, ssim_map
+
+ErrorName = Literal["l1", "dssim"]
 
 
 @one_torch_thread()
 @torch.no_grad()
 def error_maps(
-    clip: Clip, geometry: Geometry, gaussians: Gaussians, sky: Sky, exposure: Exposure
+    clip: Clip, geometry: Geometry, gaussians: Gaussians, sky: Sky, exposure: Exposure, name: ErrorName = "l1"
 ) -> Float[np.ndarray, "f h w"]:
-    """|I_static - I_ref|, mean over colour (eq. 6), in [0, 1].
+    """How far I_static is from I_ref, mean over colour, in [0, 1].
 
     Args:
         clip: The references; held-out frames get 0 and are not read.
@@ -26,13 +30,16 @@ def error_maps(
         gaussians: The static fit (eq. 5).
         sky: Its background.
         exposure: Its colour over time.
+        name: ``"l1"`` is |I_static - I_ref| (eq. 6), ``"dssim"`` is (1 - SSIM) / 2.
     """
     errors = np.zeros(clip.frames.shape[:3], dtype=np.float32)
     for i in np.flatnonzero(~clip.held_out).tolist():
         rendered = render(gaussians, geometry.cameras[i])
         image = rendered.colour + (1 - rendered.alpha)[..., None] * sky.colour(geometry.cameras[i])
-        image = exposure.apply(image, float(clip.times_s[i])).clamp(0, 1).numpy()
-        error = np.abs(image - clip.frames[i] / np.float32(255)).mean(axis=2)
+        image = exposure.apply(image, float(clip.times_s[i])).clamp(0, 1)
+        reference = torch.from_numpy(clip.frames[i] / np.float32(255))
+        far = (image - reference).abs() if name == "l1" else (1 - ssim_map(image, reference)) / 2
+        error = far.mean(dim=2).numpy()
         errors[i] = np.where(clip.valid[i] & (geometry.fixed_regions == 0), error, 0)
     return errors
 
