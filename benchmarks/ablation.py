@@ -4,7 +4,7 @@
                                   [--runs runs/street] [--json FILE] [--markdown FILE]
 
 Variants of hybrid with true poses, from corrupted and from clean references: each leaves one part out, or
-takes another choice, such as the paper's, in its place. All begin with the static fit of ``street.py``, but for
+takes another choice in its place, such as the paper's. All begin with the static fit of ``street.py``, except
 those that vary it, and use what that has prepared in the same ``--runs``.
 """
 
