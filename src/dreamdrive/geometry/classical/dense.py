@@ -53,7 +53,7 @@ def densify(clip: Clip, posed: Posed) -> Dense:
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = _swept(view, sky)
-        moving = _moving(view, inverse, sky, given, posed) * ~sky
+        moving = _moving(view, inverse, confidence, sky, given, posed) * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _finish(view, inverse, confidence, sky, moving)
@@ -62,6 +62,7 @@ def densify(clip: Clip, posed: Posed) -> Dense:
 def _moving(
     view: View,
     inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     given: bool,
     posed: Posed,
@@ -70,7 +71,7 @@ def _moving(
         return standing_evidence(view)
     if posed.fallback is not None:
         return np.zeros(inverse.shape, np.float32)
-    return moving_evidence(view, inverse, sky, given)
+    return moving_evidence(view, inverse, confidence, sky, given)
 
 
 def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:

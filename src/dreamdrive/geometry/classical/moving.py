@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.classical import contest
+from dreamdrive.geometry.classical.floating import Floating, floating
 from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.classical.outline import outline
 from dreamdrive.geometry.classical.sweep import sample
@@ -31,6 +32,7 @@ _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 def moving_evidence(
     view: View,
     inverse_depth: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     known_depth: bool,
 ) -> Float[np.ndarray, "f h w"]:
@@ -38,11 +40,12 @@ def moving_evidence(
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
     enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
-    static ones and are found only where their flow leaves the epipolar line.
+    static ones; they are found where they visibly do not stand on the road, which takes depth that was found.
 
     Args:
         view: The posed frames.
         inverse_depth: Static depth in 1/m.
+        confidence: Trust in it.
         sky: Sky masks; nothing grows into them.
         known_depth: Whether that depth was given rather than found.
     """
@@ -58,6 +61,9 @@ def moving_evidence(
         return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
 
     found = dict(zip(view.frames, parallel(decided, view.frames), strict=True))
+    if not known_depth:
+        oncoming = _oncoming(view, flows, inverse_depth, confidence, sky)
+        found = {frame: np.maximum(found[frame], oncoming[frame]) for frame in view.frames}
     flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
     for around in range(_ROUNDS):
         if around > 0:
@@ -72,6 +78,26 @@ def moving_evidence(
         inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
         evidence[frame] = np.where(flagged[frame], inside, outside)
     return evidence
+
+
+def _oncoming(
+    view: View,
+    flows: Mapping[int, list[PairFlow]],
+    inverse_depth: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+) -> dict[int, Float[np.ndarray, "h w"]]:
+    """Evidence that something floats, after the vote of the neighbours."""
+
+    def seen(frame: int) -> Floating:
+        return floating(view, frame, flows[frame], inverse_depth[frame], confidence[frame], sky[frame])
+
+    things = dict(zip(view.frames, parallel(seen, view.frames), strict=True))
+    likely = {frame: thing.likely.astype(np.float32) for frame, thing in things.items()}
+    return {
+        frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame])
+        for frame in view.frames
+    }
 
 
 def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:

@@ -15,12 +15,11 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.geometry.classical.flow import PairFlow, pixel_grid
 from dreamdrive.geometry.classical.graph_cut import minimum_cut
-from dreamdrive.geometry.classical.sweep import Warp, inside, sample
+from dreamdrive.geometry.classical.misfit import misfit
+from dreamdrive.geometry.classical.sweep import Warp
 from dreamdrive.geometry.classical.view import View
 
 _REACH = 2  # offsets beyond this are not asked
-_ERROR_CAP = 25.0  # grey levels
-_WINDOW_PX = 3
 _SAME_PX = 2.0  # explanations that land this near are one
 _PLANE_SHARE = 0.8
 _MIN_FLOW_PX = 30  # pixels with trusted flow from which a motion is drawn
@@ -92,15 +91,8 @@ def _neighbour(view: View, frame: int, flow: PairFlow, inverse_depth: Float[np.n
     explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for inverse in (inverse_depth, np.maximum(inverse_depth, np.float32(_PLANE_SHARE) * plane), plane):
         x, y = warp(inverse)
-        explanations.append((x, y, _misfit(view, frame, flow.source, x, y)))
+        explanations.append((x, y, misfit(view, frame, flow.source, x, y)))
     return _Neighbour(flow, explanations)
-
-
-def _misfit(view: View, frame: int, other: int, x: np.ndarray, y: np.ndarray) -> Float[np.ndarray, "h w"]:
-    """Mean difference in grey levels of a small window, capped; NaN outside the other frame."""
-    difference = np.minimum(np.abs(sample(view.grey[other], x, y) - view.grey[frame]), np.float32(_ERROR_CAP))
-    mean = cv2.boxFilter(difference, cv2.CV_32F, (_WINDOW_PX, _WINDOW_PX))
-    return np.where(inside(x, y, view.usable[other]), mean, np.float32(np.nan))
 
 
 def _window(view: View, frame: int, box: np.ndarray) -> tuple[slice, slice]:
@@ -130,11 +122,11 @@ def _gain(
         if motion is None:
             continue
         x, y = motion
-        own = _misfit(view, frame, neighbour.flow.source, x, y)[window]
+        own = misfit(view, frame, neighbour.flow.source, x, y)[window]
         static = np.full(own.shape, np.float32(np.inf))
-        for at_x, at_y, misfit in neighbour.explanations:
+        for at_x, at_y, error in neighbour.explanations:
             apart = np.hypot(at_x[window] - x[window], at_y[window] - y[window]) >= _SAME_PX
-            static = np.where(apart, np.fmin(static, misfit[window]), static)
+            static = np.where(apart, np.fmin(static, error[window]), static)
         gain = np.clip(static - own, -_MAX_LEVELS, _MAX_LEVELS)
         gains.append(np.where(np.isfinite(static), gain, np.float32(np.nan)))
     if not gains:
