@@ -61,9 +61,8 @@ def moving_evidence(
         return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
 
     found = dict(zip(view.frames, parallel(decided, view.frames), strict=True))
-    if not known_depth:
-        oncoming = _oncoming(view, flows, inverse_depth, confidence, sky)
-        found = {frame: np.maximum(found[frame], oncoming[frame]) for frame in view.frames}
+    oncoming = {} if known_depth else _oncoming(view, flows, inverse_depth, confidence, sky)
+    found |= {frame: np.maximum(found[frame], evidence) for frame, evidence in oncoming.items()}
     flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
     for around in range(_ROUNDS):
         if around > 0:
@@ -73,6 +72,8 @@ def moving_evidence(
             return outline(view, frame, flows[frame], inverse_depth[frame], parts[frame], sky[frame])
 
         flagged = dict(zip(view.frames, parallel(whole, view.frames), strict=True))
+    # The flow of what is taken for standing is poor: an outline may lose it.
+    flagged |= {frame: flagged[frame] | (evidence >= FLAGGED) for frame, evidence in oncoming.items()}
     evidence = np.zeros(inverse_depth.shape, np.float32)
     for frame in view.frames:
         inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
