@@ -16,6 +16,7 @@ from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.linked_pixels import linked_pixels
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,9 @@ def _space_time_labels(
         rows = np.flatnonzero(frames == frame)
         if not len(rows):
             continue
-        component[rows] = component.max() + 1 + _components(points[rows], options)
+        component[rows] = (
+            component.max() + 1 + linked_pixels(points[rows], options.reach_px, options.reach_depth)
+        )
         earlier = np.flatnonzero(frames == before) if before is not None else rows[:0]
         if before is not None and len(earlier):
             flow = neighbour_flow(clip, before, frame)
@@ -209,14 +212,6 @@ def _joined(
     same = (shared >= options.join * common) & (common >= 0.5 * np.minimum(life[a], life[b]))
     pairs = np.column_stack([a[same], b[same]])
     return connected_components(_graph(pairs, count), directed=False)[1][labels]
-
-
-def _components(pixels: Float[np.ndarray, "m 3"], options: GroupOptions) -> Int[np.ndarray, " m"]:
-    """Connected components of one frame's points."""
-    scale = options.reach_px / options.reach_depth
-    tree = KDTree(np.column_stack([pixels[:, :2], np.log(pixels[:, 2]) * scale]))
-    pairs = tree.query_pairs(options.reach_px, p=np.inf, output_type="ndarray")
-    return connected_components(_graph(pairs, len(pixels)), directed=False)[1]
 
 
 def _graph(pairs: Int[np.ndarray, "p 2"], count: int) -> coo_matrix:

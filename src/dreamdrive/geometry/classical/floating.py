@@ -11,14 +11,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from dreamdrive.geometry.classical.flow import PairFlow
 from dreamdrive.geometry.classical.misfit import misfit
 from dreamdrive.geometry.classical.sweep import Warp
 from dreamdrive.geometry.classical.view import View
+from dreamdrive.scene.linked_pixels import linked_pixels
 
 _SURE = 0.4  # confidence from which stereo is believed
 _NEARER = 1.12  # times the road's inverse depth
@@ -159,11 +157,8 @@ def _things(
     rows, columns = np.nonzero(standing)
     if not len(rows):
         return
-    reach = _NEIGHBOUR_SHARE * standing.shape[1]
-    depth = np.log(inverse_depth[rows, columns]) * (reach / _NEIGHBOUR_DEPTH)
-    pairs = KDTree(np.column_stack([columns, rows, depth])).query_pairs(reach, np.inf, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(rows), len(rows)))
-    labels = connected_components(links, directed=False)[1]
+    pixels = np.column_stack([columns, rows, 1 / inverse_depth[rows, columns]])
+    labels = linked_pixels(pixels, _NEIGHBOUR_SHARE * standing.shape[1], _NEIGHBOUR_DEPTH)
     for label in np.flatnonzero(np.bincount(labels) >= _MIN_AREA * standing.size):
         yield rows[labels == label], columns[labels == label]
 

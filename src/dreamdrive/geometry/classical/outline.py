@@ -67,6 +67,8 @@ def outline(
         flagged: Pixels known to move; some may be wrong.
         sky: Never part of a thing.
     """
+    if not flagged.any():
+        return flagged.copy()
     near = [_neighbour(view, frame, flow, inverse_depth) for flow in flows if abs(flow.offset) <= _REACH]
     count, found, stats, _ = cv2.connectedComponentsWithStats(flagged.astype(np.uint8))
     labels = np.asarray(found, np.intp)
