@@ -14,7 +14,8 @@ them stand how consistent a rendered drive is with itself and its path, against 
 five fits of a recorded clip (``DREAMDRIVE_DATA``).
 
 Each fit is a file below ``--runs``; with ``--resume`` those that are there count. ``--workers`` makes that
-many fits side by side, each on its share of the cores. A fit that fails is named at the end, and its reason
+many fits side by side, each on its share of the cores. Seconds are the processor's, so that equal time does
+not depend on what else the machine does. A fit that fails is named at the end, and its reason
 kept beside the others' results.
 """
 
