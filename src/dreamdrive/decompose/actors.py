@@ -1,8 +1,8 @@
 """Dynamic clusters become actors: one track each, and one canonical set of Gaussians in place of copies.
 
 The initial points hold a moving car once per frame. Each cluster's copies are carried to one canonical time
-along the cluster's own track, so that at any time the copies lie on top of each other where the car is; a
-life span lets the copies nearest in time speak loudest, and hides the actor when it was not seen.
+along the cluster's own track, so that at any time the copies lie on top of each other where the car is; life
+spans let the copies nearest in time speak loudest, see ``lives``.
 """
 
 import math
@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
+from dreamdrive.decompose.lives import Glimpse, lives
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.deformation import Tracks
@@ -29,7 +30,9 @@ class ActorOptions:
 
     Attributes:
         lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames.
-        contact_weight: Trust in one frame's depth against that in the change of size between two frames.
+        lasting: Whether copies of what no other frame sees live on, see ``lives``.
+        contact_weight: Trust in one frame's depth against that in the change of size between two frames; a
+            frame that shows more of the actor weighs more.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
         least_points: Flow vectors needed to measure a change of size and place.
         opacity: Opacity to start from: what moves hides what it passes, and must not leave the static
@@ -37,6 +40,7 @@ class ActorOptions:
     """
 
     lifespan_frames: float = 1.25
+    lasting: bool = True
     contact_weight: float = 0.05
     least_frames: int = 2
     least_points: int = 12
@@ -145,7 +149,10 @@ def _path(
         spread = pixels[rows[frames[rows] == seen[k + 1]], :2].std(axis=0).max()
         if drift > 2 * spread + 4:
             anchors[k + 1] = centres[k + 1]
-    depth = np.exp(_smooth_logs(np.log(contact), log_ratio, trust, options.contact_weight))
+    # What shows little of a thing often misses where it stands.
+    shown = np.array([np.count_nonzero(frames[rows] == f) for f in seen])
+    weight = options.contact_weight * shown / shown.mean()
+    depth = np.exp(_smooth_logs(np.log(contact), log_ratio, trust, weight))
     return _Path(seen, anchors, depth, contact)
 
 
@@ -170,11 +177,11 @@ def _smooth_logs(
     seen: Float[np.ndarray, " k"],
     ratio: Float[np.ndarray, " j"],
     trust: Float[np.ndarray, " j"],
-    weight: float,
+    weight: Float[np.ndarray, " k"],
 ) -> Float[np.ndarray, " k"]:
     """Least squares: close to ``seen`` weakly, to the measured differences strongly, at an even pace."""
     count = len(seen)
-    rows, right = [np.sqrt(weight) * np.eye(count)], [np.sqrt(weight) * seen]
+    rows, right = [np.diag(np.sqrt(weight))], [np.sqrt(weight) * seen]
     for k in range(count - 1):
         row = np.zeros((1, count))
         row[0, k], row[0, k + 1] = -1, 1
@@ -204,7 +211,8 @@ def _merge(
     log_scales = chosen.log_scales.numpy().copy()
     opacity = torch.full_like(chosen.logit_opacities, math.log(options.opacity / (1 - options.opacity)))
     actor = np.full(len(means), -1, dtype=np.int64)
-    deviation = np.full(len(means), 0.5 * interval)
+    short_s = np.full(len(means), 0.5 * interval)
+    lifespan = np.column_stack([clip.times_s[chosen.source_frame.numpy()], short_s])
     translations, pivots, actors = [], [], []
     frames = chosen.source_frame.numpy()
     for c, path in enumerate(paths):
@@ -220,7 +228,11 @@ def _merge(
         means[rows] = centres + (means[rows] - centres) * stretch[:, None] - (places - places[middle])[where]
         log_scales[rows] += np.log(stretch)[:, None]
         actor[rows] = len(actors)
-        deviation[rows] = options.lifespan_frames * interval
+        lifespan[rows, 1] = options.lifespan_frames * interval
+        if options.lasting:
+            glimpses = _glimpses(clip, geometry, path, places - places[middle], pixels[rows], frames[rows])
+            span_s = float(clip.times_s[0]), float(clip.times_s[-1])
+            lifespan[rows] = lives(means[rows], where, glimpses, span_s, options.lifespan_frames * interval)
         translations.append(offsets)
         pivots.append(places[middle])
         name = f"actor {len(actors)}"
@@ -231,13 +243,30 @@ def _merge(
         log_scales=torch.tensor(log_scales, dtype=torch.float32),
         logit_opacities=opacity,
         actor=torch.from_numpy(actor),
-        lifespan=torch.tensor(np.column_stack([clip.times_s[frames], deviation]), dtype=torch.float32),
+        lifespan=torch.tensor(lifespan, dtype=torch.float32),
     )
     tracks = None
     if actors:
         stacked = np.stack(translations)
         tracks = Tracks(times, stacked, np.zeros(stacked.shape[:2]), np.stack(pivots))
     return Cast(merged, tracks, tuple(actors))
+
+
+def _glimpses(
+    clip: Clip,
+    geometry: Geometry,
+    path: _Path,
+    offsets_m: Float[np.ndarray, "k 3"],
+    pixels: Float[np.ndarray, "m 3"],
+    frames: Int[np.ndarray, " m"],
+) -> list[Glimpse]:
+    """What each frame of a path saw of its cluster, as deep as the path says."""
+    found: list[Glimpse] = []
+    for k, frame in enumerate(path.frames.tolist()):
+        copies = pixels[frames == frame] * [1, 1, path.depth_m[k] / path.seen_depth_m[k]]
+        time_s = float(clip.times_s[frame])
+        found.append(Glimpse(time_s, geometry.cameras[frame], offsets_m[k], copies, geometry.depth_m[frame]))
+    return found
 
 
 def _places(geometry: Geometry, path: _Path) -> Float[np.ndarray, "k 3"]:

@@ -1,0 +1,105 @@
+"""How long each copy of an actor's surface lives.
+
+Every training frame leaves a copy of what it sees of an actor. Where another frame has its own, nearer in
+time, an older copy only blurs it. But what no other frame sees is there all the same: the rear of a car that
+still has to overtake shows in a view from the side. A copy therefore lives on until a frame sees its surface
+again.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import KDTree
+
+from dreamdrive.scene.camera import Camera
+
+_REACH_PX = 4.0  # seeds on moving things are up to 3 px apart
+_LIKE_DEPTH = 0.12  # in the logarithm
+_NEAR_M = 0.2
+_WIDTH = (
+    0.6  # standard deviation over half the length of a long life: at its ends a copy keeps half its opacity
+)
+
+
+@dataclass(frozen=True)
+class Glimpse:
+    """What one training frame saw of an actor.
+
+    Attributes:
+        time_s: When.
+        camera: From where.
+        offset_m: How far the actor was from its canonical place (3,), in the world.
+        copies: Column, row and depth along z of the copies it left (M, 3).
+        depth_m: Depth of all that it saw (H, W); 0 where that is unknown.
+    """
+
+    time_s: float
+    camera: Camera
+    offset_m: Float[np.ndarray, "3"]
+    copies: Float[np.ndarray, "m 3"]
+    depth_m: Float[np.ndarray, "h w"]
+
+
+def lives(
+    places: Float[np.ndarray, "n 3"],
+    source: Int[np.ndarray, " n"],
+    glimpses: Sequence[Glimpse],
+    span_s: tuple[float, float],
+    deviation_s: float,
+) -> Float[np.ndarray, "n 2"]:
+    """Centre and standard deviation of each copy's life in seconds (N, 2).
+
+    Args:
+        places: Canonical places in the world.
+        source: Which of the glimpses each copy is from.
+        glimpses: In the order of time.
+        span_s: First and last time of the clip.
+        deviation_s: Standard deviation of the life of a copy that its neighbours in time replace.
+    """
+    unseen = np.stack([_unseen(places, glimpse) for glimpse in glimpses])
+    times = np.array([glimpse.time_s for glimpse in glimpses])
+    begin = _until(unseen, source, times, -1, span_s[0])
+    end = _until(unseen, source, times, 1, span_s[1])
+    return np.stack([(begin + end) / 2, deviation_s + _WIDTH * (end - begin) / 2], axis=1)
+
+
+def _until(
+    unseen: Bool[np.ndarray, "k n"],
+    source: Int[np.ndarray, " n"],
+    times: np.ndarray,
+    way: int,
+    limit_s: float,
+) -> Float[np.ndarray, " n"]:
+    """Time of the last frame on one side up to which none sees the surface; the limit if none ever does."""
+    until, living, at = times[source], np.ones(len(source), bool), source.copy()
+    for _ in times:
+        at = at + way
+        beyond = (at < 0) | (at >= len(times))
+        until[living & beyond & (at - way != source)] = limit_s
+        living &= ~beyond
+        rows = np.flatnonzero(living)
+        living[rows] = unseen[at[rows], rows]
+        rows = np.flatnonzero(living)
+        until[rows] = times[at[rows]]
+    return until
+
+
+def _unseen(places: Float[np.ndarray, "n 3"], glimpse: Glimpse) -> Bool[np.ndarray, " n"]:
+    """Which surfaces a frame cannot see: out of view, or behind the actor itself or something else.
+
+    One that would stand in front of what the frame saw, or beside the actor, is misplaced: it counts as seen.
+    """
+    column, row, z = glimpse.camera.project(places + glimpse.offset_m).T
+    height, width = glimpse.depth_m.shape
+    in_view = (z > _NEAR_M) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    unseen = ~in_view
+    where = np.stack([column[in_view], row[in_view]], axis=1)
+    shown_m = glimpse.depth_m[where[:, 1].astype(int), where[:, 0].astype(int)].astype(np.float64)
+    if len(glimpse.copies) and len(where):
+        distance, nearest = KDTree(glimpse.copies[:, :2]).query(where, distance_upper_bound=_REACH_PX)
+        own = np.isfinite(distance)
+        shown_m[own] = glimpse.copies[np.asarray(nearest)[own], 2]
+    unseen[in_view] = (shown_m > 0) & (z[in_view] > np.exp(_LIKE_DEPTH) * shown_m)
+    return unseen

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from dreamdrive.decompose.lives import Glimpse, lives
+from dreamdrive.scene.camera import Camera
+
+CAMERA = Camera(100, 100, 50, 50, 100, 100)
+TIMES = (0.0, 0.1, 0.2, 0.3)
+NONE = np.zeros((0, 3))
+
+
+def glimpse(k: int, copies: np.ndarray = NONE, behind_m: float = 50.0, offset_m: float = 0.0) -> Glimpse:
+    depth = np.full((100, 100), behind_m, np.float32)
+    return Glimpse(TIMES[k], CAMERA, np.array([offset_m, 0.0, 0.0]), copies, depth)
+
+
+def copy_at(x_m: float, z_m: float) -> np.ndarray:
+    return np.array([[50 + 100 * x_m / z_m, 50.0, z_m]])
+
+
+def life(place: tuple[float, float, float], source: int, glimpses: list[Glimpse]) -> tuple[float, float]:
+    found = lives(np.array([place], float), np.array([source]), glimpses, (0.0, 0.5), 0.125)
+    return float(found[0, 0]), float(found[0, 1])
+
+
+def test_what_all_frames_see_is_short_lived():
+    seen = [glimpse(k, copy_at(0, 10)) for k in range(4)]
+    assert life((0, 0, 10), 2, seen) == (0.2, 0.125)
+
+
+def test_what_lies_behind_the_actor_before_lives_from_the_beginning():
+    # In the first two frames something of the actor's own, 3 m nearer, hides it.
+    seen = [
+        glimpse(0, copy_at(0, 7)),
+        glimpse(1, copy_at(0, 7)),
+        *(glimpse(k, copy_at(0, 10)) for k in (2, 3)),
+    ]
+    centre, deviation = life((0, 0, 10), 2, seen)
+    assert centre == pytest.approx(0.1)
+    assert deviation == pytest.approx(0.125 + 0.6 * 0.1)
+    assert life((0, 0, 10), 3, seen) == pytest.approx((0.3, 0.125))  # frame 2 has a copy of its own
+
+
+def test_what_leaves_the_picture_lives_to_the_end():
+    out_m = -8.0
+    seen = [glimpse(0, copy_at(0, 10)), *(glimpse(k, offset_m=out_m) for k in (1, 2, 3))]
+    centre, _ = life((0, 0, 10), 0, seen)
+    assert centre == pytest.approx(0.25)
+
+
+def test_behind_a_wall_it_lives_until_it_is_seen_again():
+    seen = [
+        glimpse(0, copy_at(0, 10)),
+        glimpse(1, behind_m=5),
+        glimpse(2, behind_m=5),
+        glimpse(3, copy_at(0, 10)),
+    ]
+    assert life((0, 0, 10), 0, seen)[0] == pytest.approx(0.1)
+    assert life((0, 0, 10), 3, seen)[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("beside", [glimpse(1), glimpse(1, copy_at(0, 14))])
+def test_what_would_stand_where_the_frame_sees_through_it_does_not_live_on(beside: Glimpse):
+    assert life((0, 0, 10), 0, [glimpse(0, copy_at(0, 10)), beside]) == (0.0, 0.125)
+
+
+def test_a_single_glimpse():
+    assert life((0, 0, 10), 0, [glimpse(0, copy_at(0, 10))]) == (0.0, 0.125)
+
+
+def test_unknown_depth_counts_as_seen():
+    seen = [glimpse(0, copy_at(0, 10)), glimpse(1, behind_m=0)]
+    assert life((0, 0, 10), 0, seen) == (0.0, 0.125)
