@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks.checkpoint import load_network
+from dreamdrive.weights import load_network
 
 
 class Small(nn.Module):
