@@ -16,7 +16,7 @@ from dreamdrive.errors import InputError
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4
-_REFUSED = re.compile(r"GLOBAL (\S+) was not an allowed global")
+_REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
 def load_network(
