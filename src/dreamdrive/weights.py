@@ -2,9 +2,10 @@
 
 import hashlib
 import pickle
+import re
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ from dreamdrive.errors import InputError
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4
+_REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
 def load_network(
@@ -70,12 +72,26 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
     Raises:
         InputError: The file is missing, unreadable or holds something else.
     """
+    return as_state(read_torch(path, expected), str(path), expected)
+
+
+def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
+    """What ``torch.save`` wrote, if it consists of tensors, plain values and the allowed classes.
+
+    Args:
+        path: The file; nothing in it is ever executed.
+        expected: Which file is expected, for messages.
+        allowed: Further classes that objects in the file may have.
+
+    Raises:
+        InputError: The file is missing or unreadable, or holds objects of other classes.
+    """
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {expected}")
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), torch.serialization.safe_globals(list(allowed)):
             warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
-            state: Any = torch.load(path, map_location="cpu", weights_only=True)
+            return torch.load(path, map_location="cpu", weights_only=True)
     except (
         RuntimeError,
         pickle.UnpicklingError,
@@ -84,14 +100,29 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
         OSError,
         ValueError,
         KeyError,
-    ):
+    ) as error:
+        refused = _REFUSED.search(str(error))
+        about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
         raise InputError(
             f"{path} cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled "
-            f"object); expected {expected}"
+            f"object{about}); expected {expected}"
         ) from None
-    if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):  # pyright: ignore[reportUnknownVariableType]
-        raise InputError(f"{path} holds no table of tensors; expected {expected}")
-    return {str(key): value for key, value in state.items()}  # pyright: ignore[reportUnknownVariableType]
+
+
+def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
+    """A state dict, if that is what ``content`` is.
+
+    Args:
+        content: What was read.
+        source: Where it comes from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: It is something else.
+    """
+    if not isinstance(content, dict) or not all(isinstance(value, Tensor) for value in content.values()):
+        raise InputError(f"{source} holds no table of tensors; expected {expected}")
+    return {str(key): value for key, value in content.items()}
 
 
 def sha256(path: Path) -> str:

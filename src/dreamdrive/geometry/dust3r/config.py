@@ -1,0 +1,317 @@
+"""Sizes and modes of the network: as published, as a checkpoint states them, as its tensors show them.
+
+A checkpoint states them as the text of a constructor call, the hub's form as JSON. Neither is executed. Sizes
+also follow from the shapes of the tensors, all but the numbers of heads; the two accounts have to agree.
+"""
+
+import ast
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
+
+from dreamdrive.errors import InputError
+
+HeadKind = Literal["dpt", "linear"]
+DepthMode = Literal["exp", "linear", "square"]
+ConfidenceMode = Literal["exp", "sigmoid"]
+
+CLASS = "AsymmetricCroCo3DStereo"
+"""Name of the network's class in the authors' checkpoints."""
+HEAD_DIM = 64
+"""Channels of a head in all published models; only needed where nothing states the number of heads."""
+
+# What the authors' constructor takes for keywords that are not given.
+_DEFAULTS: dict[str, Any] = {
+    "img_size": 224,
+    "patch_size": 16,
+    "enc_embed_dim": 768,
+    "enc_depth": 12,
+    "enc_num_heads": 12,
+    "dec_embed_dim": 512,
+    "dec_depth": 8,
+    "dec_num_heads": 16,
+    "mlp_ratio": 4,
+    "norm_im2_in_dec": True,
+    "pos_embed": "cosine",
+    "output_mode": "pts3d",
+    "head_type": "linear",
+    "depth_mode": ("exp", -math.inf, math.inf),
+    "conf_mode": ("exp", 1, math.inf),
+}
+_FROM_SHAPES = ("enc_dim", "enc_depth", "dec_dim", "dec_depth", "patch", "head")
+
+
+@dataclass(frozen=True)
+class DptSizes:
+    """Widths of the DPT head; the defaults are those of all published models.
+
+    Attributes:
+        layer_dims: Channels of the four feature images before they are brought to a common width.
+        feature_dim: The common width.
+        last_dim: Channels at full resolution.
+    """
+
+    layer_dims: tuple[int, int, int, int] = (96, 192, 384, 768)
+    feature_dim: int = 256
+    last_dim: int = 128
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Sizes and modes; the defaults are those of the published model 512_dpt.
+
+    Attributes:
+        enc_dim: Channels of a token in the encoder.
+        enc_depth: Layers of the encoder.
+        enc_heads: Heads of its attention.
+        dec_dim: Channels of a token in the decoders.
+        dec_depth: Layers of each decoder.
+        dec_heads: Heads of their attention.
+        patch: Side in pixels of the square a token stands for.
+        mlp_ratio: Width of the inner linear layer over that of a token.
+        head: What makes pixels of tokens.
+        dpt: Sizes of the DPT head; without meaning for the linear head.
+        depth_mode: How the length of a raw vector becomes the distance of a point.
+        conf_mode: How a raw number becomes a confidence.
+        conf_range: Least and largest confidence.
+        rope_base: Ratio of the angular frequencies of the rotary embedding.
+        image_size: Long side in pixels of the pictures it was trained with; 224 means squares.
+    """
+
+    enc_dim: int = 1024
+    enc_depth: int = 24
+    enc_heads: int = 16
+    dec_dim: int = 768
+    dec_depth: int = 12
+    dec_heads: int = 12
+    patch: int = 16
+    mlp_ratio: float = 4.0
+    head: HeadKind = "dpt"
+    dpt: DptSizes = field(default_factory=DptSizes)
+    depth_mode: DepthMode = "exp"
+    conf_mode: ConfidenceMode = "exp"
+    conf_range: tuple[float, float] = (1.0, math.inf)
+    rope_base: float = 100.0
+    image_size: int = 512
+
+    def __post_init__(self) -> None:
+        sizes = (self.enc_depth, self.dec_depth, self.enc_heads, self.dec_heads, self.patch, self.image_size)
+        if min(sizes) < 1:
+            raise ValueError("depths, numbers of heads, patch and image size must be positive")
+        for name, dim, heads in (
+            ("encoder", self.enc_dim, self.enc_heads),
+            ("decoder", self.dec_dim, self.dec_heads),
+        ):
+            if dim < 1 or dim % (4 * heads):
+                raise ValueError(f"{name}: {dim} channels do not split into {heads} heads of a multiple of 4")
+        if self.head == "dpt" and self.patch != 16:
+            raise ValueError(f"the DPT head needs patches of 16 px, not {self.patch}")
+        if not self.conf_range[0] < self.conf_range[1]:
+            raise ValueError(f"confidences from {self.conf_range[0]} to {self.conf_range[1]} are no range")
+        if self.conf_mode == "sigmoid" and not all(map(math.isfinite, self.conf_range)):
+            raise ValueError("confidences by a sigmoid need two finite bounds")
+
+    def hidden(self, dim: int) -> int:
+        """Width of the inner linear layer of a block of ``dim`` channels."""
+        return int(dim * self.mlp_ratio)
+
+
+def config_from_call(text: str, source: str) -> NetworkConfig:
+    """Configuration from a constructor call as text, which is parsed and not executed.
+
+    Args:
+        text: For example ``AsymmetricCroCo3DStereo(pos_embed='RoPE100', head_type='dpt', ...)``.
+        source: Where it comes from, for messages.
+
+    Raises:
+        InputError: It is no such call, or states something that this network does not do.
+    """
+    try:
+        call = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError(f"{source}: the model {_short(text)} is no constructor call") from None
+    if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id != CLASS:
+        raise InputError(f"{source}: the model {_short(text)} is another one; expected {CLASS}(...)")
+    known = {word.arg: word.value for word in call.keywords if word.arg in _DEFAULTS}
+    values = {str(name): _value(node, str(name), source) for name, node in known.items()}
+    return config_from_keywords(values, source)
+
+
+def config_from_json(text: str, source: str) -> NetworkConfig:
+    """Configuration from the hub's ``config.json``: the constructor's keywords, ``Infinity`` a number.
+
+    Raises:
+        InputError: It is no JSON object, or states something that this network does not do.
+    """
+    try:
+        values = json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{source} is not JSON ({error})") from None
+    if not isinstance(values, dict):
+        raise InputError(f"{source} holds no JSON object; expected the keywords of {CLASS}")
+    return config_from_keywords(values, source)
+
+
+def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig:
+    """Configuration from the keywords of the authors' constructor, with its defaults; others are ignored.
+
+    Raises:
+        InputError: A value is of a wrong kind or names something that this network does not do.
+    """
+    values = _DEFAULTS | {key: value for key, value in given.items() if key in _DEFAULTS}
+    _only(values, "output_mode", "pts3d", source)
+    _only(values, "norm_im2_in_dec", True, source)
+    depth_mode, depth_range = _mode(values, "depth_mode", get_args(DepthMode), source)
+    if depth_range != (-math.inf, math.inf):
+        raise InputError(f"{source}: depth_mode with bounds {depth_range} is not supported; expected none")
+    conf_mode, conf_range = _mode(values, "conf_mode", get_args(ConfidenceMode), source)
+    if values["head_type"] not in get_args(HeadKind):
+        raise InputError(f"{source}: head_type {values['head_type']!r}; expected 'dpt' or 'linear'")
+    return _make(
+        source,
+        enc_dim=_integer(values, "enc_embed_dim", source),
+        enc_depth=_integer(values, "enc_depth", source),
+        enc_heads=_integer(values, "enc_num_heads", source),
+        dec_dim=_integer(values, "dec_embed_dim", source),
+        dec_depth=_integer(values, "dec_depth", source),
+        dec_heads=_integer(values, "dec_num_heads", source),
+        patch=_integer(values, "patch_size", source),
+        mlp_ratio=_number(values["mlp_ratio"], "mlp_ratio", source),
+        head=values["head_type"],
+        depth_mode=depth_mode,
+        conf_mode=conf_mode,
+        conf_range=conf_range,
+        rope_base=_rope_base(values["pos_embed"], source),
+        image_size=_image_size(values["img_size"], source),
+    )
+
+
+def config_from_shapes(shapes: Mapping[str, tuple[int, ...]], source: str) -> NetworkConfig:
+    """Configuration from the shapes of a state dict; heads of 64 channels and published modes are assumed.
+
+    Raises:
+        InputError: A tensor that tells a size is missing, or the sizes do not fit each other.
+    """
+
+    def shape(key: str, sides: int) -> tuple[int, ...]:
+        found = shapes.get(key)
+        if found is None:
+            raise InputError(f"{source} is no DUSt3R model: there is no tensor {key}")
+        if len(found) != sides:
+            raise InputError(f"{source}: {key} has the shape {found}, not {sides} sides")
+        return found
+
+    enc_dim, _, patch, _ = shape("patch_embed.proj.weight", 4)
+    dec_dim, _ = shape("decoder_embed.weight", 2)
+    hidden, _ = shape("enc_blocks.0.mlp.fc1.weight", 2)
+    head: HeadKind = "dpt" if any(key.startswith("downstream_head1.dpt.") for key in shapes) else "linear"
+    dpt = DptSizes()
+    if head == "dpt":
+        a, b, c, d = (shape(f"downstream_head1.dpt.act_postprocess.{i}.0.weight", 4)[0] for i in range(4))
+        last_dim, feature_dim, _, _ = shape("downstream_head1.dpt.head.0.weight", 4)
+        dpt = DptSizes((a, b, c, d), feature_dim, last_dim)
+    return _make(
+        source,
+        enc_dim=enc_dim,
+        enc_depth=_depth(shapes, "enc_blocks"),
+        enc_heads=max(enc_dim // HEAD_DIM, 1),
+        dec_dim=dec_dim,
+        dec_depth=_depth(shapes, "dec_blocks"),
+        dec_heads=max(dec_dim // HEAD_DIM, 1),
+        patch=patch,
+        mlp_ratio=hidden / max(enc_dim, 1),
+        head=head,
+        dpt=dpt,
+    )
+
+
+def check_agreement(stated: NetworkConfig, found: NetworkConfig, source: str) -> None:
+    """Compare what a checkpoint states with what its tensors show.
+
+    Raises:
+        InputError: They disagree.
+    """
+    trouble = [
+        f"{name} is stated as {getattr(stated, name)!r}, the tensors have {getattr(found, name)!r}"
+        for name in (item.name for item in fields(NetworkConfig))
+        if name in _FROM_SHAPES and getattr(stated, name) != getattr(found, name)
+    ]
+    if trouble:
+        raise InputError(
+            f"{source}: statement and weights disagree ({'; '.join(trouble)}); take both from the same model"
+        )
+
+
+def _make(source: str, **values: Any) -> NetworkConfig:
+    try:
+        return NetworkConfig(**values)
+    except ValueError as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def _depth(shapes: Mapping[str, tuple[int, ...]], blocks: str) -> int:
+    numbers = [int(m.group(1)) for key in shapes if (m := re.match(rf"{blocks}\.(\d+)\.", key))]
+    return max(numbers, default=-1) + 1
+
+
+def _value(node: ast.expr, name: str, source: str) -> Any:
+    """A constant, a tuple of constants, infinity, or the negative of a number."""
+    if isinstance(node, ast.Constant):
+        return node.value
+    if isinstance(node, ast.Tuple | ast.List):
+        return tuple(_value(item, name, source) for item in node.elts)
+    if isinstance(node, ast.Name) and node.id == "inf":
+        return math.inf
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        value = _value(node.operand, name, source)
+        if isinstance(value, int | float):
+            return -value
+    raise InputError(f"{source}: {name}={_short(ast.unparse(node))} is no plain value")
+
+
+def _only(values: Mapping[str, Any], name: str, supported: object, source: str) -> None:
+    if values[name] != supported:
+        raise InputError(f"{source}: {name} {values[name]!r} is not supported; expected {supported!r}")
+
+
+def _mode(
+    values: Mapping[str, Any], name: str, kinds: tuple[str, ...], source: str
+) -> tuple[str, tuple[float, float]]:
+    value = values[name]
+    if not isinstance(value, tuple | list) or len(value) != 3 or value[0] not in kinds:
+        raise InputError(f"{source}: {name} {value!r}; expected a kind of {', '.join(kinds)} and two bounds")
+    return value[0], (_number(value[1], name, source), _number(value[2], name, source))
+
+
+def _rope_base(value: object, source: str) -> float:
+    match = re.fullmatch(r"RoPE(\d+(?:\.\d+)?)", str(value))
+    if match is None or not float(match.group(1)) > 0:
+        raise InputError(f"{source}: pos_embed {value!r} is not supported; expected RoPE100 or the like")
+    return float(match.group(1))
+
+
+def _image_size(value: Any, source: str) -> int:
+    sides: Sequence[Any] = value if isinstance(value, tuple | list) else (value,)
+    if not sides or not all(isinstance(side, int) and side > 0 for side in sides):
+        raise InputError(f"{source}: img_size {value!r}; expected one or two positive numbers")
+    return max(sides)
+
+
+def _integer(values: Mapping[str, Any], name: str, source: str) -> int:
+    value = values[name]
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise InputError(f"{source}: {name} {value!r}; expected a whole number")
+    return value
+
+
+def _number(value: object, name: str, source: str) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
+        raise InputError(f"{source}: {name} holds {value!r}; expected a number")
+    return float(value)
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + "...")
