@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.geometry.dust3r.golden import Golden
+from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph

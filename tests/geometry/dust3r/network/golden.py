@@ -12,9 +12,9 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.checkpoint import normalise
-from dreamdrive.geometry.dust3r.config import DptSizes, NetworkConfig, config_from_keywords
-from dreamdrive.geometry.dust3r.network import Dust3r
+from dreamdrive.geometry.dust3r.network.checkpoint import normalise
+from dreamdrive.geometry.dust3r.network.config import DptSizes, NetworkConfig, config_from_keywords
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
 from dreamdrive.weights import fill_network
 
 TINY = NetworkConfig(

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.geometry.dust3r.config import ConfidenceMode, DepthMode, NetworkConfig
+from dreamdrive.geometry.dust3r.network.config import ConfidenceMode, DepthMode, NetworkConfig
 
 _CHANNELS = 4  # x, y, z and confidence
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.geometry.dust3r.golden import Golden
+from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.images import Fitting, as_input, fitting, prepare
+from dreamdrive.geometry.dust3r.network.images import Fitting, as_input, fitting, prepare
 from dreamdrive.scene.camera import Camera
 
 SIZES = {"down": 128, "up": 128, "square": 64, "port": 64, "s224": 224}

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.config import NetworkConfig
-from dreamdrive.geometry.dust3r.network import Dust3r
+from dreamdrive.geometry.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
 
 Size = tuple[int, int]
 """Height and width in pixels."""

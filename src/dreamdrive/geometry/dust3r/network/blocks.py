@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.geometry.dust3r.rope import Rotation, rotate
+from dreamdrive.geometry.dust3r.network.rope import Rotation, rotate
 
 NORM_EPS = 1e-6
 

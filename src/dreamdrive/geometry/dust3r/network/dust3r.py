@@ -6,10 +6,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from dreamdrive.geometry.dust3r.blocks import NORM_EPS, DecoderBlock, EncoderBlock, Linear, lower
-from dreamdrive.geometry.dust3r.config import NetworkConfig
-from dreamdrive.geometry.dust3r.heads import Pointmap, make_head, pointmap
-from dreamdrive.geometry.dust3r.rope import Rotation, grid_positions, rotation
+from dreamdrive.geometry.dust3r.network.blocks import NORM_EPS, DecoderBlock, EncoderBlock, Linear, lower
+from dreamdrive.geometry.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.dust3r.network.heads import Pointmap, make_head, pointmap
+from dreamdrive.geometry.dust3r.network.rope import Rotation, grid_positions, rotation
 
 
 @dataclass(frozen=True)

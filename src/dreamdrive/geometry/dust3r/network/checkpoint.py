@@ -13,14 +13,14 @@ from safetensors.torch import load_file
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.config import (
+from dreamdrive.geometry.dust3r.network.config import (
     NetworkConfig,
     check_agreement,
     config_from_call,
     config_from_json,
     config_from_shapes,
 )
-from dreamdrive.geometry.dust3r.network import Dust3r
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
 from dreamdrive.weights import as_state, fill_network, read_torch
 
 EXPECTED = (

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.geometry.dust3r.golden import Golden
+from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.config import (
+from dreamdrive.geometry.dust3r.network.config import (
     NetworkConfig,
     check_agreement,
     config_from_call,

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.geometry.dust3r.golden import tiny
+from tests.geometry.dust3r.network.golden import tiny
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.checkpoint import load_dust3r
-from dreamdrive.geometry.dust3r.network import Dust3r
+from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
 
 ALIAS = ".scratch.layer_rn."
 
