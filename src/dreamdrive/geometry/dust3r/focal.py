@@ -13,11 +13,11 @@ from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.weighted import weighted_median
 
 FocalRule = Literal["robust", "weiszfeld", "median"]
-_STEPS = 10
+_STEPS, _ROBUST_STEPS = 10, 6
 _TINY_PX = 1e-8
 _TUKEY = 4.685  # of the spread: 95 % as good as least squares where there are no outliers
 _SPREAD_FLOOR_PX = 1e-3
-_ENOUGH = 10_000  # pixels; more of them do not make the robust estimate better, only slower
+_ENOUGH = 3_000  # pixels; more of them do not make the robust estimate better, only slower
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def robust_px(
     some = some[:: max(1, len(some) // _ENOUGH)]
     p, q, pq, qq, trust = p[some], q[some], pq[some], qq[some], trust[some]
     focal = weighted_median(pq / qq, trust * np.linalg.norm(p, axis=1))
-    for _ in range(_STEPS):
+    for _ in range(_ROBUST_STEPS):
         error = np.linalg.norm(p - focal * q, axis=1)
         reach = _TUKEY * max(1.4826 * weighted_median(error, trust), _SPREAD_FLOOR_PX)
         weight = trust * np.square(np.maximum(1 - np.square(error / reach), 0))

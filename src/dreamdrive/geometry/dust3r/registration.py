@@ -23,9 +23,10 @@ class Similarity:
     translation: Float[np.ndarray, "3"]
 
     def __call__(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """The points (..., 3) brought over, in their own precision."""
-        turned = points @ (self.scale * self.rotation.T).astype(points.dtype)
-        return turned + self.translation.astype(points.dtype)
+        """The points (..., 3) brought over, in their own precision, float32 at least."""
+        kind = np.result_type(points.dtype, np.float32)
+        turned = points.astype(kind, copy=False) @ (self.scale * self.rotation.T).astype(kind)
+        return turned + self.translation.astype(kind)
 
 
 def register(

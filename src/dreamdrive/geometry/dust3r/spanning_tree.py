@@ -17,8 +17,8 @@ from dreamdrive.geometry.dust3r.registration import Similarity, register
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
 PNP_CONFIDENCE = 3.0
 _PNP_STEPS = 10
-_ROBUST_STEPS = 10
-_REGISTERED = 5_000  # pixels of a pair that are registered
+_ROBUST_STEPS = 5
+_REGISTERED = 2_000  # pixels of a pair that are registered
 _NEAREST = 0.01  # quantile of the valid depths that replaces those behind the camera
 
 
@@ -102,7 +102,8 @@ class _Tree:
         waiting = self._strongest_first()
         first = waiting.pop(0)
         before = edge = self.edge_of[first]
-        self.points[first[0]], self.points[first[1]] = self.maps.points[edge]
+        for image, points in zip(first, self.maps.points[edge], strict=True):
+            self.points[image] = points.astype(np.float32, copy=False)
         self.poses[first[0]] = np.eye(4)
         if self.upstream:
             self.focals[first[0]] = self._focal(edge)
