@@ -24,8 +24,8 @@ def descend(
 ) -> Float[np.ndarray, " _"]:
     """Move the parameters in place; the loss (steps,) before each step comes back.
 
-    A step moves a parameter by about the rate at most, and the rates of 300 steps sum to 1.5: the log of a focal
-    length, being a 20th of its parameter, never moves by more than 0.075.
+    A step moves a parameter by about the rate at most, and the rates of 300 steps sum to 1.5: the log of a
+    focal length, being a 20th of its parameter, never moves by more than 0.075.
 
     Args:
         objective: The loss.

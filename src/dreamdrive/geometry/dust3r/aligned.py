@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from dreamdrive.geometry.dust3r.focal import FocalVotes
 from dreamdrive.geometry.dust3r.graph import Graph
 from dreamdrive.geometry.dust3r.normal import ImageSamples
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.registration import Similarity
 from dreamdrive.geometry.dust3r.samples import Dense
 from dreamdrive.geometry.dust3r.state import State
 
@@ -28,12 +29,15 @@ class Aligned:
         world_from_camera: Poses (N, 4, 4).
         focals_px: Focal lengths (N,).
         depth: Depth along z (H, W) of each image, positive, in the unit of the poses.
+        pairs: Similarity from each pair's first camera, in the pair's own unit, to the world.
         confidence: The greatest confidence (H, W) that an edge gave each pixel; 1 is masked out.
-        loss: Of the objective that was solved, over all pixels, in the unit in which the pairs' scales average 0.5.
+        loss: Of the objective that was solved, over all pixels, in the unit in which the pairs' scales
+            average 0.5.
         losses: Over the solver's samples, before each of its last steps and at the end.
-        focal_spread: Robust standard deviation over edges of the focal lengths that pointmaps speak for, relative.
-        pair_spread: Median distance between where a pair has its first camera and where that ended, in units of
-            the median distance between paired cameras.
+        focal_spread: Robust standard deviation over edges of the focal lengths that pointmaps speak for,
+            relative.
+        pair_spread: Median distance between where a pair has its first camera and where that ended, in units
+            of the median distance between paired cameras.
         residual: Median relative miss (E,) of each pair's points.
         masked_share: Share of the pixels (N,) that no edge weighs.
         focal_observed: The focal lengths are known, or the pointmaps agree on them.
@@ -43,6 +47,7 @@ class Aligned:
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focals_px: Float[np.ndarray, " n"]
     depth: tuple[Float[np.ndarray, "_ _"], ...]
+    pairs: tuple[Similarity, ...]
     confidence: tuple[Float[np.ndarray, "_ _"], ...]
     loss: float
     losses: tuple[float, ...]
@@ -81,14 +86,20 @@ def report(
     known_poses: Float[np.ndarray, "n 4 4"] | None,
 ) -> Aligned:
     """Bring the solution to the frame of image 0, or to that of the known poses, and measure it."""
-    poses, unit = _in_frame(found.state, known_poses)
-    confidence = [np.maximum.reduce([maps.confidence[h.edge][h.side] for h in halves]) for halves in graph.halves]
+    frame = _frame(found.state, known_poses)
+    poses = _poses(found.state, frame)
+    if known_poses is None:
+        poses[0] = np.eye(4)
+    confidence = [
+        np.maximum.reduce([maps.confidence[h.edge][h.side] for h in halves]) for halves in graph.halves
+    ]
     pair_spread = _pair_spread(maps, found.state)
     error = votes.spread / np.sqrt(len(graph))
     return Aligned(
-        world_from_camera=poses,
+        world_from_camera=poses if known_poses is None else known_poses.astype(np.float64),
         focals_px=found.state.focal_px,
-        depth=tuple(depth * np.float32(unit) for depth in found.dense.depth),
+        depth=tuple(depth * np.float32(frame.scale) for depth in found.dense.depth),
+        pairs=_pairs(found.state, frame),
         confidence=tuple(confidence),
         loss=found.dense.loss,
         losses=found.losses,
@@ -101,16 +112,29 @@ def report(
     )
 
 
-def _in_frame(
-    state: State, known: Float[np.ndarray, "n 4 4"] | None
-) -> tuple[Float[np.ndarray, "n 4 4"], float]:
-    """Poses, and by what depth is multiplied."""
+def _frame(state: State, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity:
+    """From the solver's world to that of the result."""
     if known is None:
-        poses = np.linalg.inv(state.world_from_camera[0]) @ state.world_from_camera
-        poses[0] = np.eye(4)
-        return poses, 1.0
+        turn = state.rotation[0].T
+        return Similarity(1.0, turn, -turn @ state.centre[0])
     moved = float(np.linalg.norm(state.centre))
-    return known.astype(np.float64), float(np.linalg.norm(known[:, :3, 3])) / moved if moved > 0 else 1.0
+    unit = float(np.linalg.norm(known[:, :3, 3])) / moved if moved > 0 else 1.0
+    return Similarity(unit, np.eye(3), np.zeros(3))
+
+
+def _poses(state: State, frame: Similarity) -> Float[np.ndarray, "n 4 4"]:
+    poses = np.tile(np.eye(4), (len(state.centre), 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = frame.rotation @ state.rotation, frame(state.centre)
+    return poses
+
+
+def _pairs(state: State, frame: Similarity) -> tuple[Similarity, ...]:
+    return tuple(
+        Similarity(frame.scale * float(scale), frame.rotation @ rotation, frame(centre))
+        for scale, rotation, centre in zip(
+            state.edge_scale, state.edge_rotation, state.edge_centre, strict=True
+        )
+    )
 
 
 def _pair_spread(maps: PairMaps, state: State) -> float:
@@ -125,7 +149,7 @@ def _residuals(found: Found, edges: int) -> Float[np.ndarray, " e"]:
     for samples in found.samples:
         depth = found.dense.depth[samples.image]
         height, width = depth.shape
-        columns, rows = np.rint(samples.pixels.numpy() + [width / 2, height / 2]).astype(np.intp).T
+        columns, rows = np.rint(samples.pixels.numpy() + np.array([width / 2, height / 2])).astype(np.intp).T
         here = depth[rows, columns].astype(np.float64)
         misses = samples.misses(found.state)
         along = misses.length.numpy() * (here - misses.foot.numpy())

@@ -32,10 +32,12 @@ class AlignOptions:
     """How pairs are brought together.
 
     Attributes:
-        objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there with relative
-            misses under a cost that forgives outliers, and counts those across the ray more than those along it.
+        objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
+            with relative misses under a cost that forgives outliers, and counts those across the ray more
+            than those along it.
         normalisation: How the paper's loss divides, see ``objective.half_areas``.
-        focal: One focal length for all images, which one camera took; one for ``each``; or ``fixed`` where it starts.
+        focal: One focal length for all images, which one camera took; one for ``each``; or ``fixed`` where it
+            starts.
         samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
         outlier: Relative miss from which on the robust cost grows slowly.
         sharper: How much more a miss across the ray counts than one along it, in the robust cost.
@@ -93,8 +95,8 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
 
 
 def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
-    start = spanning_tree(maps)
     votes = focal_votes(maps)
+    start = spanning_tree(maps, votes)
     start = replace(start, focals_px=_first_focals(start, votes, options, known))
     poses = start.world_from_camera
     if known.world_from_camera is not None:
@@ -135,7 +137,9 @@ def _first_focals(
 def _check_known(known: Known, images: int) -> None:
     focals, poses = known.focals_px, known.world_from_camera
     if focals is not None and (len(focals) != images or not (np.isfinite(focals) & (focals > 0)).all()):
-        raise InputError(f"{images} images take {images} positive focal lengths in pixels; got {focals.tolist()}.")
+        raise InputError(
+            f"{images} images take {images} positive focal lengths in pixels; got {focals.tolist()}."
+        )
     if poses is None:
         return
     if len(poses) != images:

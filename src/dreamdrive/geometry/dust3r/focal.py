@@ -1,6 +1,6 @@
 """The focal length that a pointmap in its own camera's frame speaks for.
 
-With the pixels p relative to the principal point and the slopes q = (x/z, y/z) of the points, it is the f of p = f q.
+It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/z, y/z) of their points.
 """
 
 from dataclasses import dataclass
@@ -105,9 +105,7 @@ def weiszfeld_px(
     return float(np.clip(focal, bounds[0] * unit, bounds[1] * unit))
 
 
-def median_px(
-    points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None = None
-) -> float:
+def median_px(points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None = None) -> float:
     """Median of the votes u z/x and v z/y of all pixels; of an even number the lower middle one."""
     grid = _grid(points.shape[0], points.shape[1], principal_px)
     flat = points.reshape(-1, 3).astype(np.float64)
@@ -125,8 +123,8 @@ def robust_px(
     """Log confidences weigh, masked pixels and points behind the camera do not count, outliers drop out.
 
     A sum of norms has no protection against points of great slope: a fifth of them six times too steep takes
-    Weiszfeld's result from 36 px to 10. Here the weighted median of the radial votes p·q / q·q, each weighing as
-    much as its distance from the principal point, starts steps with Tukey's weights, which end at zero.
+    Weiszfeld's result from 36 px to 10. Here the weighted median of the radial votes p·q / q·q, each weighing
+    as much as its distance from the principal point, starts steps with Tukey's weights, which end at zero.
 
     Args:
         points: Pointmap (H, W, 3) in the frame of its own camera.

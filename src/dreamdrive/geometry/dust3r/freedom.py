@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE, State
@@ -27,8 +26,8 @@ class Freedom:
     def basis(self, state: State) -> csr_array:
         """Matrix (7 N + 7 E, unknowns): step = basis @ unknowns.
 
-        Image 0 stays where it is. The scales of the pairs keep their geometric mean, or the loss would be least
-        where everything shrinks to a point.
+        Image 0 stays where it is. The scales of the pairs keep their geometric mean, or the loss would be
+        least where everything shrinks to a point.
         """
         rows: list[int] = []
         columns: list[int] = []

@@ -90,14 +90,16 @@ def _check_values(maps: PairMaps, sizes: tuple[tuple[int, ...], ...]) -> None:
         )
     if empty:
         raise InputError(
-            f"{_images(sorted(empty))} left with fewer than {_FEWEST} pixels of confidence above 1 in a pair; "
-            "mask less, or leave these images out."
+            f"{_images(sorted(empty))} left with fewer than {_FEWEST} pixels of confidence above 1 in a "
+            "pair; mask less, or leave these images out."
         )
 
 
 def _check_connected(maps: PairMaps, count: int) -> None:
     ends = maps.edges.T
-    parts, part = connected_components(coo_array((np.ones(len(maps.edges)), tuple(ends)), shape=(count, count)), False)
+    parts, part = connected_components(
+        coo_array((np.ones(len(maps.edges)), tuple(ends)), shape=(count, count)), False
+    )
     if parts > 1:
         lists = "; ".join(str(np.flatnonzero(part == number).tolist()) for number in range(parts))
         raise InputError(

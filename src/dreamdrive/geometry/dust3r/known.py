@@ -16,8 +16,8 @@ def onto_known(
 ) -> tuple[Start, Float[np.ndarray, "n 4 4"]]:
     """The start in the known world, and the known poses in the unit in which the pairs' scales average 0.5.
 
-    The unit is not that of the known poses: were the scales of pairs free, the loss could fall while the clouds
-    shrink. One factor between the two is left for the solver.
+    The unit is not that of the known poses: were the scales of pairs free, the loss could fall while the
+    clouds shrink. One factor between the two is left for the solver.
     """
     similarity = register(
         _marks(start.world_from_camera), _marks(world_from_camera), np.ones(4 * len(world_from_camera))
@@ -39,7 +39,7 @@ def onto_known(
 
 
 def _marks(poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "m 3"]:
-    """Centres, and points along all axes as far out as the centres spread: a straight path alone leaves a roll."""
+    """Centres, and points along all axes as far out as these spread: a straight path alone leaves a roll."""
     centres = poses[:, :3, 3]
     spread = float(np.sqrt(np.square(centres - centres.mean(axis=0)).sum(axis=1).mean()))
     reach = spread if spread > _STANDING else 1.0

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.penalty import Penalty
+from dreamdrive.geometry.dust3r.penalty import Distance, Penalty
 from dreamdrive.geometry.dust3r.rays import RayMisses, pixel_rays
 from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE, State
 
@@ -67,15 +67,18 @@ def normal_equations(
     """Gauss-Newton with the weights of the touching quadratic, depth eliminated by its Schur complement.
 
     A miss is r = X - Y, X = c + R x d with the ray x, Y = T + s R P. With W the 3x3 weight of a miss,
-    J = dr/d(step) and D = dX/d(depth) = R x, each pixel adds J'WJ - (D'WJ)'(D'WJ) / (D'WD).
+    J = dr/d(step) and D = dX/d(depth) = R x, each pixel adds J'WJ - (D'WJ)'(D'WJ) / (D'WD). Where W tells the
+    directions along and across the ray apart it turns with the ray, which the gradient knows and the Hessian
+    does not.
 
     Args:
         samples: The pixels.
         state: Cameras and pairs.
         depth: Depth (P,) of the pixels, the best for this state.
         penalty: Cost of a miss.
-        bend: Share of the true curvature of a distance along the miss itself, where it has none, that is taken: 0 is
-            the quadratic that lies above everywhere, 1 would be Newton's. For :class:`Distance` alone.
+        bend: Share of the true curvature of a distance along the miss itself, where it has none, that is
+            taken: 0 is the quadratic that lies above everywhere, 1 would be Newton's. For :class:`Distance`
+                alone.
     """
     edges = list(samples.edges)
     turn = torch.from_numpy(state.rotation[samples.image])
@@ -93,20 +96,26 @@ def normal_equations(
     own = _columns(arm, -1.0, -flat * depth[:, None])
     theirs = _columns(lever, 1.0, -lever)
 
-    if penalty.across == 1:
-        straight, bent = 1.0, -bend
-        axis = miss / miss.norm(dim=-1, keepdim=True).clamp_min(_TINY)
+    straight = penalty.across
+    if isinstance(penalty, Distance):
+        slack, bent = 0.0, -bend
+        axis = miss / (miss.square().sum(dim=-1, keepdim=True) + penalty.floor**2).sqrt()
     else:
-        straight, bent = penalty.across, 1 - penalty.across
+        slack = bent = 1 - penalty.across
         axis = (world_rays / misses.length[:, None]).expand_as(miss)
     weighed = _weighed(theirs, weight, straight, bent, axis)
     metric = straight * weight.sum(dim=0)[:, None, None] * torch.eye(3, dtype=torch.float64)
     if bent:
         by_pixel = axis.transpose(0, 1)
         metric = metric + by_pixel.mT @ (by_pixel * (bent * weight).T[..., None])
-    slack = 0.0 if penalty.across == 1 else bent
     pull = _weighed(miss[..., None], weight, straight, slack, axis)[..., 0]
-    return _assembled(own, theirs, weighed, metric, pull, world_rays)
+    result = _assembled(own, theirs, weighed, metric, pull, world_rays)
+    if slack:
+        bends = -(flat - axis[0] * (axis[0] * flat).sum(dim=-1, keepdim=True)) / misses.length[:, None]
+        along = weight * (axis * miss).sum(dim=-1)
+        result.gradient[:3] -= torch.linalg.cross(miss, pull).sum(dim=(0, 1))
+        result.gradient[6] += slack * (along * (bends * miss).sum(dim=-1)).sum()
+    return result
 
 
 def _assembled(
@@ -142,7 +151,9 @@ def _assembled(
     return Normal(hessian, gradient)
 
 
-def _columns(lever: Float[Tensor, "*p 3"], sign: float, last: Float[Tensor, "*p 3"]) -> Float[Tensor, "*p 3 7"]:
+def _columns(
+    lever: Float[Tensor, "*p 3"], sign: float, last: Float[Tensor, "*p 3"]
+) -> Float[Tensor, "*p 3 7"]:
     """Derivatives of a miss by a turn, sign [lever], a shift, -sign I, and one number."""
     result = lever.new_zeros(*lever.shape, PER_IMAGE)
     for row, column, part in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):

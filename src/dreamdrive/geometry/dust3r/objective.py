@@ -1,7 +1,7 @@
 """The loss of global alignment as its authors' program writes it: raw parameters, all edges stacked.
 
-Kept as the reference that the solver is measured against. With the points X of image i in the world, the points P of
-an edge, its similarity T and w = ln confidence (Wang et al. 2024, eq. 5):
+Kept as the reference that the solver is measured against. With the points X of image i in the world, the
+points P of an edge, its similarity T and w = ln confidence (Wang et al. 2024, eq. 5):
     L = sum over edges and both images, sum over pixels, w |X - T P| / A
 """
 
@@ -26,8 +26,8 @@ _FOCAL_BREAK = 20.0
 def half_areas(maps: PairMaps, normalisation: Normalisation) -> Float[np.ndarray, "e 2"]:
     """The divisor A (E, 2) of each edge's first and second image.
 
-    ``pooled`` is the number of pixels of all first images, or of all second images; ``modular`` the mean over edges
-    of the means over pixels. They are the same where all images are of one size.
+    ``pooled`` is the number of pixels of all first images, or of all second images; ``modular`` the mean over
+    edges of the means over pixels. They are the same where all images are of one size.
     """
     areas = np.array([[side.size for side in pair] for pair in maps.confidence], dtype=np.float64)
     if normalisation == "modular":
@@ -62,7 +62,8 @@ def raw_parameters(start: Start) -> Raw:
     most = max(depth.size for depth in start.depth)
     depth = [np.pad(np.log(depth).ravel(), (0, most - depth.size)) for depth in start.depth]
     pairs = [
-        [*_quaternion(p.rotation), *_signed_log1p(p.translation / p.scale), np.log(p.scale)] for p in start.pairs
+        [*_quaternion(p.rotation), *_signed_log1p(p.translation / p.scale), np.log(p.scale)]
+        for p in start.pairs
     ]
     poses = [[*_quaternion(pose[:3, :3]), *_signed_log1p(pose[:3, 3])] for pose in start.world_from_camera]
     arrays = (pairs, poses, _FOCAL_BREAK * np.log(start.focals_px)[:, None], np.stack(depth))
@@ -121,7 +122,9 @@ class Objective:
             focals = (raw.im_focals[:, 0].double() / _FOCAL_BREAK).exp().numpy()
             scales, rotations, translations = (part.double().numpy() for part in pair_transforms(raw))
             depth = raw.im_depthmaps.exp().numpy()
-        pairs = [Similarity(float(s), r, s * t) for s, r, t in zip(scales, rotations, translations, strict=True)]
+        pairs = [
+            Similarity(float(s), r, s * t) for s, r, t in zip(scales, rotations, translations, strict=True)
+        ]
         maps = [d[: h * w].reshape(h, w) for d, (h, w) in zip(depth, self.sizes, strict=True)]
         return Start(poses, focals, tuple(maps), tuple(pairs))
 

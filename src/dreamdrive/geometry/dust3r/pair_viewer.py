@@ -15,8 +15,9 @@ _PNP_STEPS = 100
 def view_pair(maps: PairMaps, rule: FocalRule = "weiszfeld", confident: float = PNP_CONFIDENCE) -> Start:
     """Cameras and depth of two images from the more trusted direction of their pair.
 
-    The other camera is posed by PnP of its pixels to its points in the frame of the first. Where that fails, its
-    index is in ``unsure`` and its pose the identity. No similarities come back: nothing is brought together.
+    The other camera is posed by PnP of its pixels to its points in the frame of the first. Where that fails,
+    its index is in ``unsure`` and its pose the identity. No similarities come back: nothing is brought
+    together.
 
     Args:
         maps: The edges (0, 1) and (1, 0).
@@ -29,11 +30,11 @@ def view_pair(maps: PairMaps, rule: FocalRule = "weiszfeld", confident: float = 
     graph_of(maps)
     edge_of = {(int(i), int(j)): edge for edge, (i, j) in enumerate(maps.edges)}
     if set(edge_of) != {(0, 1), (1, 0)} or len(maps.edges) != 2:
-        raise InputError(f"A single pair is viewed from its edges (0, 1) and (1, 0); got {maps.edges.tolist()}.")
+        raise InputError(
+            f"A single pair is viewed from its edges (0, 1) and (1, 0); got {maps.edges.tolist()}."
+        )
     forth, back = edge_of[0, 1], edge_of[1, 0]
-    focals = [
-        focal_px(maps.points[edge][0], maps.confidence[edge][0], rule) for edge in (forth, back)
-    ]
+    focals = [focal_px(maps.points[edge][0], maps.confidence[edge][0], rule) for edge in (forth, back)]
     scores = [float(np.prod([side.mean() for side in maps.confidence[edge]])) for edge in (forth, back)]
     first, edge = (0, forth) if scores[0] > scores[1] else (1, back)
     other = 1 - first

@@ -15,8 +15,8 @@ class PairMaps:
 
     Attributes:
         edges: Indices (E, 2) of the first and the second image.
-        points: For each edge the points of its first image (H, W, 3) and of its second one (U, V, 3), in a unit
-            of length that is the edge's own.
+        points: For each edge the points of its first image (H, W, 3) and of its second one (U, V, 3), in a
+            unit of length that is the edge's own.
         confidence: For each edge the confidences of both, (H, W) and (U, V), at least 1. Exactly 1 weighs
             nothing: that pixel is masked out.
     """

@@ -4,37 +4,10 @@ The miss of a pixel's point X against where an edge places it is split along the
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
-
-
-class Penalty(Protocol):
-    """Cost of misses and the weights of the quadratic that touches it from above."""
-
-    def __call__(
-        self,
-        along: Float[Tensor, "k p"],
-        across2: Float[Tensor, "k p"],
-        weight: Float[Tensor, "k p"],
-        depth: Float[Tensor, " p"],
-    ) -> tuple[Float[Tensor, "k p"], Float[Tensor, "k p"]]:
-        """Cost, and weight of ``along`` squared in the touching quadratic (K, P).
-
-        Args:
-            along: Miss along the ray (K, P) of each of K edges at each of P pixels.
-            across2: Square of the miss across the ray.
-            weight: Log confidence over the divisor of the loss.
-            depth: Depth (P,) by which a relative cost measures.
-        """
-        ...
-
-    @property
-    def across(self) -> float:
-        """Weight of ``across`` squared in the quadratic, in units of that of ``along``."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -49,7 +22,7 @@ class Distance:
 
     @property
     def across(self) -> float:
-        """The same in all directions."""
+        """Weight of the miss across the ray in units of that along it: the same in all directions."""
         return 1.0
 
     def __call__(
@@ -59,7 +32,14 @@ class Distance:
         weight: Float[Tensor, "k p"],
         depth: Float[Tensor, " p"],
     ) -> tuple[Float[Tensor, "k p"], Float[Tensor, "k p"]]:
-        """See :class:`Penalty`."""
+        """Cost, and weight of ``along`` squared (K, P) in the quadratic that touches the cost from above.
+
+        Args:
+            along: Miss along the ray (K, P) of each of K edges at each of P pixels.
+            across2: Square of the miss across the ray.
+            weight: Log confidence over the divisor of the loss.
+            depth: Depth (P,) by which a relative cost measures; without meaning here.
+        """
         distance = torch.sqrt(along * along + (across2 + self.floor**2))
         return weight * distance, weight / distance
 
@@ -90,8 +70,11 @@ class Cauchy:
         weight: Float[Tensor, "k p"],
         depth: Float[Tensor, " p"],
     ) -> tuple[Float[Tensor, "k p"], Float[Tensor, "k p"]]:
-        """See :class:`Penalty`."""
+        """Cost and weight as of :class:`Distance`, with ``depth`` (P,) the measure of a miss."""
         unit = (self.width * depth) ** 2
         square = (along * along + self.across * across2) / unit
         cost = weight * (0.5 * self.width**2) * torch.log1p(square)
         return cost, weight / (depth.square() * (1 + square))
+
+
+Penalty = Distance | Cauchy

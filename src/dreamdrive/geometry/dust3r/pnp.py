@@ -19,7 +19,8 @@ def pose_by_pnp(
     Args:
         points: World point (H, W, 3) of each pixel.
         usable: Pixels to use (H, W).
-        focal_px: None tries 21 focal lengths from S/2 to 3 S, S the longer side, and keeps that of most inliers.
+        focal_px: None tries 21 focal lengths from S/2 to 3 S, S the longer side, and keeps that of most
+            inliers.
         iterations: Of RANSAC.
 
     Returns:
@@ -44,7 +45,7 @@ def pose_by_pnp(
             reprojectionError=_REPROJECTION_PX,
             flags=cv2.SOLVEPNP_SQPNP,
         )
-        if success and inliers is not None and (best is None or len(inliers) > best[0]):
+        if success and (best is None or len(inliers) > best[0]):
             camera_from_world = np.eye(4)
             camera_from_world[:3, :3] = cv2.Rodrigues(turn)[0]
             camera_from_world[:3, 3] = shift[:, 0]

@@ -1,4 +1,4 @@
-"""Depth of each pixel, given everything else: a problem of one unknown along its ray, solved in closed form."""
+"""Depth of each pixel, given everything else: one unknown along its ray, solved in closed form."""
 
 from dataclasses import dataclass
 
@@ -61,7 +61,7 @@ class RayMisses:
     def depth(
         self, depth: Float[Tensor, " p"], penalty: Penalty, reference: Float[Tensor, " p"], steps: int
     ) -> Float[Tensor, " p"]:
-        """Depth (P,) after steps of iteratively reweighted least squares d = sum w a / sum w, from a given one.
+        """Depth (P,) after steps of reweighted least squares, d = sum w a / sum w, from a given one.
 
         Each step lowers the cost of each pixel, or leaves it. A pixel that no edge weighs keeps its depth.
         """

@@ -50,7 +50,9 @@ def register(
     """
     counts = weights > 0
     if np.count_nonzero(counts) < 3:
-        raise ValueError(f"registration: {np.count_nonzero(counts)} weighted points; a similarity takes three")
+        raise ValueError(
+            f"registration: {np.count_nonzero(counts)} weighted points; a similarity takes three"
+        )
     x, y = source[counts].astype(np.float64), target[counts].astype(np.float64)
     trust = weights[counts].astype(np.float64)
     found = _umeyama(x, y, trust)

@@ -77,7 +77,11 @@ def solve_depth(
         parts = [state.camera_from_edge(image, half.edge) for half in halves]
         matrices, shifts = (torch.from_numpy(np.stack(part)).float() for part in zip(*parts, strict=True))
         flat = [
-            (maps.points[h.edge][h.side].reshape(-1, 3), maps.confidence[h.edge][h.side].ravel(), areas[h.edge, h.side])
+            (
+                maps.points[h.edge][h.side].reshape(-1, 3),
+                maps.confidence[h.edge][h.side].ravel(),
+                areas[h.edge, h.side],
+            )
             for h in halves
         ]
         depth = torch.zeros(size[0] * size[1])
@@ -85,7 +89,9 @@ def solve_depth(
         for first in range(0, len(depth), _CHUNK):
             some = slice(first, min(first + _CHUNK, len(depth)))
             rays = pixel_rays(_pixels(some, size), float(state.focal_px[image]))
-            weight = torch.from_numpy(np.stack([np.log(c[some], dtype=np.float32) / np.float32(a) for _, c, a in flat]))
+            weight = torch.from_numpy(
+                np.stack([np.log(c[some], dtype=np.float32) / np.float32(a) for _, c, a in flat])
+            )
             points = torch.from_numpy(np.stack([p[some].astype(np.float32, copy=False) for p, _, _ in flat]))
             points = torch.where(weight[..., None] > 0, points, 0.0)
             misses = RayMisses.of(rays, torch.baddbmm(shifts[:, None], points, matrices.mT), weight)

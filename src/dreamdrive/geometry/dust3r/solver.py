@@ -55,8 +55,8 @@ def solve(
 ) -> Solved:
     """Lower the loss over the samples until a step gains less than ``tolerance`` of it.
 
-    Each step solves the depth of every sampled pixel along its ray, then for cameras and pairs the damped normal
-    equations in which those depths follow along. A step that does not lower the loss is taken back.
+    Each step solves the depth of every sampled pixel along its ray, then for cameras and pairs the damped
+    normal equations in which those depths follow along. A step that does not lower the loss is taken back.
     """
     depth = [each.misses(state).middle() for each in samples]
     here = _at(samples, state, depth, penalty, 2 * _DEPTH_STEPS)
@@ -64,7 +64,7 @@ def solve(
     basis = freedom.basis(here.state)
     hessian, gradient = _equations(samples, here, penalty, basis, bend)
     for _ in range(steps):
-        there = None
+        there: _Point | None = None
         while there is None and damping < _MOST:
             unknowns = _damped(hessian, gradient, damping)
             if unknowns is not None:
@@ -87,7 +87,7 @@ def solve(
 def _at(
     samples: Sequence[ImageSamples], state: State, depth: list[Tensor], penalty: Penalty, steps: int
 ) -> _Point:
-    """The loss at a state, the depths brought on from given ones; these also are what a relative cost measures by."""
+    """The loss at a state, the depths brought on from given ones, by which a relative cost measures."""
     loss, found = 0.0, list[Tensor]()
     for each, before in zip(samples, depth, strict=True):
         misses = each.misses(state)
@@ -101,7 +101,8 @@ def _equations(
     samples: Sequence[ImageSamples], here: _Point, penalty: Penalty, basis: csr_array, bend: float
 ) -> tuple[np.ndarray, np.ndarray]:
     images = PER_IMAGE * len(here.state.centre)
-    hessian, gradient = np.zeros((basis.shape[0], basis.shape[0])), np.zeros(basis.shape[0])
+    size = images + PER_EDGE * len(here.state.edge_scale)
+    hessian, gradient = np.zeros((size, size)), np.zeros(size)
     for each, depth in zip(samples, here.depth, strict=True):
         part = normal_equations(each, here.state, depth, penalty, bend)
         starts = [PER_IMAGE * each.image, *(images + PER_EDGE * edge for edge in each.edges)]

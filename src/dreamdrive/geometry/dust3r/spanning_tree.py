@@ -1,6 +1,5 @@
-"""A first guess of all cameras: pairs are joined along the tree of the most trusted ones (Wang et al. 2024)."""
+"""A first guess of all cameras: pairs are joined along the tree of the most trusted ones."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +7,7 @@ from jaxtyping import Float
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from dreamdrive.geometry.dust3r.focal import focal_px, focal_votes
+from dreamdrive.geometry.dust3r.focal import FocalVotes, focal_px, focal_votes
 from dreamdrive.geometry.dust3r.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.pnp import pose_by_pnp
@@ -41,7 +40,9 @@ class Start:
     unsure: tuple[int, ...] = ()
 
 
-def spanning_tree(maps: PairMaps, *, upstream: bool = False, stale_focals: bool = True) -> Start:
+def spanning_tree(
+    maps: PairMaps, votes: FocalVotes | None = None, *, upstream: bool = False, stale_focals: bool = True
+) -> Start:
     """Join pairs from the strongest on; then pose each image in what was joined.
 
     Pairs weigh by mean confidence of the first times that of the second image. Each next pair of the maximum
@@ -54,6 +55,7 @@ def spanning_tree(maps: PairMaps, *, upstream: bool = False, stale_focals: bool 
 
     Args:
         maps: The pairs.
+        votes: Focal lengths by the robust rule where they are known already; not looked at if ``upstream``.
         upstream: Do all of it as the authors' program does.
         stale_focals: As it does, take an image's focal length from the pair handled before; without effect
             unless ``upstream``.
@@ -62,7 +64,7 @@ def spanning_tree(maps: PairMaps, *, upstream: bool = False, stale_focals: bool 
         InputError: See ``graph.graph_of``.
     """
     graph = graph_of(maps)
-    tree = _Tree(maps, graph, upstream, stale_focals)
+    tree = _Tree(maps, graph, votes, upstream, stale_focals)
     tree.grow()
     tree.find_focals()
     tree.find_poses()
@@ -72,8 +74,10 @@ def spanning_tree(maps: PairMaps, *, upstream: bool = False, stale_focals: bool 
 class _Tree:
     """The state of the walk: points of placed images, and focal lengths and poses as far as known."""
 
-    def __init__(self, maps: PairMaps, graph: Graph, upstream: bool, stale_focals: bool) -> None:
-        self.maps, self.graph, self.upstream = maps, graph, upstream
+    def __init__(
+        self, maps: PairMaps, graph: Graph, votes: FocalVotes | None, upstream: bool, stale_focals: bool
+    ) -> None:
+        self.maps, self.graph, self.votes, self.upstream = maps, graph, votes, upstream
         self.stale_focals = stale_focals
         self.edge_of = {(int(i), int(j)): edge for edge, (i, j) in enumerate(maps.edges)}
         self.scores = self._scores()
@@ -143,7 +147,8 @@ class _Tree:
         """Focal lengths of all images."""
         count = len(self.graph)
         if not self.upstream:
-            self.focals = dict(enumerate(focal_votes(self.maps).per_image_px(count).tolist()))
+            votes = self.votes or focal_votes(self.maps)
+            self.focals = dict(enumerate(votes.per_image_px(count).tolist()))
             return
         for edge in self._by_strength():
             image = int(self.maps.edges[edge, 0])
@@ -191,7 +196,9 @@ class _Tree:
         )
 
     def _depth(self, points: Float[np.ndarray, "h w 3"], pose: np.ndarray) -> Float[np.ndarray, "h w"]:
-        z = ((points - pose[:3, 3].astype(points.dtype)) @ pose[:3, 2].astype(points.dtype)).astype(np.float32)
+        z = ((points - pose[:3, 3].astype(points.dtype)) @ pose[:3, 2].astype(points.dtype)).astype(
+            np.float32
+        )
         if self.upstream:
             return np.where(z > 0, z, np.float32(1))
         valid = z[z > 0]
@@ -203,5 +210,3 @@ def _rigid(similarity: Similarity) -> Float[np.ndarray, "4 4"]:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = similarity.rotation, similarity.translation
     return pose
-
-
