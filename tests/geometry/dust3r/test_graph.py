@@ -58,9 +58,9 @@ def test_pointmaps_that_are_not_finite(maps: PairMaps, value: float) -> None:
 
 
 def test_a_size_that_changes_and_a_pair_of_one(maps: PairMaps) -> None:
-    points = (tuple(side[:-1] for side in maps.points[0]), *maps.points[1:])
+    shorter = [(tuple(side[:-1] for side in part[0]), *part[1:]) for part in (maps.points, maps.confidence)]
     with pytest.raises(InputError, match="an image has one size"):
-        graph_of(replace(maps, points=points))
+        graph_of(PairMaps(maps.edges, shorter[0], shorter[1]))
     edges = maps.edges.copy()
     edges[0] = 2
     with pytest.raises(InputError, match="two different images"):

@@ -18,7 +18,7 @@ from dreamdrive.geometry.dust3r.spanning_tree import spanning_tree
 from dreamdrive.geometry.dust3r.state import State
 from dreamdrive.splat.torch_threads import one_torch_thread
 
-_STEPS = 100
+_STEPS = 60
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +62,7 @@ def test_the_gradient_is_that_of_the_loss_at_the_best_depth(
         middle = samples.misses(state).depth(middle, penalty, middle, 10)
     gradient = normal_equations(samples, state, middle, penalty).gradient.numpy()
     size = 1e-5
-    for index in range(len(gradient)):
+    for index in range(0, len(gradient), 2):
         after, before = (
             loss(samples, own_part(samples, state, index, sign * size), penalty, middle) for sign in (1, -1)
         )
@@ -105,7 +105,7 @@ def test_depth_is_the_least_along_each_ray() -> None:
     weight[2] = 0
     misses = RayMisses.of(rays, points, weight)
     penalty = Distance(1e-9)
-    found = misses.depth(misses.middle(), penalty, misses.middle(), 2000)
+    found = misses.depth(misses.middle(), penalty, misses.middle(), 400)
 
     def cost(depth: torch.Tensor) -> torch.Tensor:
         distance = (depth[None, :, None] * rays - points).norm(dim=-1)

@@ -34,17 +34,13 @@ def test_loss_gradient_and_first_steps_are_upstreams(golden_dir: Path, name: str
             np.testing.assert_allclose(moved, wanted[f"step{steps}.{part}"], atol=1e-4, err_msg=part)
 
 
-@pytest.mark.parametrize(("name", "steps"), [("A", 300), ("B", 60)])
-def test_the_loss_falls_as_upstreams_does(golden_dir: Path, name: str, steps: int) -> None:
+@pytest.mark.parametrize("name", ["A", "B"])
+def test_the_loss_falls_as_upstreams_does(golden_dir: Path, name: str) -> None:
     """Rounding alone parts the curves: misses that are 0 but for rounding have a direction all the same."""
     maps, _, wanted = scene(golden_dir, name)
     with one_torch_thread():
-        losses = descend(Objective(maps, graph_of(maps)), raw(wanted), steps, of=300)
-    ratio = np.abs(losses / wanted["cosine.loss"][:steps] - 1)
-    assert ratio[:60].max() < 5e-5
-    assert ratio.max() < 3e-2
-    if steps == 300:
-        assert ratio[-1] < 1e-3
+        losses = descend(Objective(maps, graph_of(maps)), raw(wanted), 60, of=300)
+    assert np.abs(losses / wanted["cosine.loss"][:60] - 1).max() < 5e-5
 
 
 @pytest.mark.parametrize(

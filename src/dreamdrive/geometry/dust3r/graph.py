@@ -48,11 +48,6 @@ def graph_of(maps: PairMaps) -> Graph:
         InputError: Sizes contradict each other, an image is in no pair or has hardly a pixel that weighs, a
             pointmap or confidence is not finite where it counts, or the pairs fall into separate parts.
     """
-    if not len(maps.edges) == len(maps.points) == len(maps.confidence):
-        raise InputError(
-            f"There are {len(maps.edges)} pairs with {len(maps.points)} pointmaps and "
-            f"{len(maps.confidence)} confidences; each pair takes one of both."
-        )
     if not len(maps.edges) or maps.edges.min() < 0 or (maps.edges[:, 0] == maps.edges[:, 1]).any():
         raise InputError("Pairs must be of two different images each, counted from 0, and there must be one.")
     halves: list[list[Half]] = [[] for _ in range(int(maps.edges.max()) + 1)]
@@ -73,10 +68,10 @@ def _check_values(maps: PairMaps, sizes: tuple[tuple[int, ...], ...]) -> None:
     broken: set[int] = set()
     for pair, points, confidence in zip(maps.edges, maps.points, maps.confidence, strict=True):
         for image, xyz, trust in zip(map(int, pair), points, confidence, strict=True):
-            if trust.shape != sizes[image] or xyz.shape[:2] != sizes[image]:
+            if trust.shape != sizes[image]:
                 raise InputError(
-                    f"Image {image} is {sizes[image]} (height, width) in one pair and {xyz.shape[:2]} with "
-                    f"confidence {trust.shape} in another; an image has one size."
+                    f"Image {image} is {sizes[image]} (height, width) in one pair and {trust.shape} in "
+                    "another; an image has one size."
                 )
             counts = trust != 1
             if not (np.isfinite(trust).all() and (trust >= 1).all() and np.isfinite(xyz[counts]).all()):

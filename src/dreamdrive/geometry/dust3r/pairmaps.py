@@ -1,4 +1,4 @@
-"""What the network says about pairs of images, before anything is brought together."""
+"""What the network says of pairs of frames."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,30 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True)
 class PairMaps:
-    """Pointmaps of directed pairs (i, j), all in the frame of camera i: x right, y down, z forward.
+    """Points and confidences of both images of each pair.
 
-    Pixels are counted as the network does: the grid is that of integers, the principal point is (W/2, H/2).
-    Images may differ in size, so the sizes below hold for one entry each.
+    Images may differ in shape, also within a pair.
 
     Attributes:
-        edges: Indices (E, 2) of the first and the second image.
-        points: For each edge the points of its first image (H, W, 3) and of its second one (U, V, 3), in a
-            unit of length that is the edge's own.
-        confidence: For each edge the confidences of both, (H, W) and (U, V), at least 1. Exactly 1 weighs
-            nothing: that pixel is masked out.
+        edges: For each pair (E, 2) the indices i and j of its images.
+        points: For each pair the points of image i and of image j, (H, W, 3) and (U, V, 3), both in the frame
+            of camera i (x right, y down, z forward), up to a scale of each pair's own.
+        confidence: Their confidences (H, W) and (U, V), at least 1 in the published models.
     """
 
     edges: Int[np.ndarray, "e 2"]
     points: tuple[tuple[Float[np.ndarray, "_ _ 3"], Float[np.ndarray, "_ _ 3"]], ...]
     confidence: tuple[tuple[Float[np.ndarray, "_ _"], Float[np.ndarray, "_ _"]], ...]
+
+    def __post_init__(self) -> None:
+        if not len(self.edges) == len(self.points) == len(self.confidence):
+            raise ValueError(
+                f"{len(self.edges)} pairs, but points of {len(self.points)} "
+                f"and confidences of {len(self.confidence)}"
+            )
+        for edge, points, confidence in zip(self.edges, self.points, self.confidence, strict=True):
+            if any(p.shape[:2] != c.shape for p, c in zip(points, confidence, strict=True)):
+                raise ValueError(f"pair {tuple(edge.tolist())}: points and confidence differ in shape")
+
+    def __len__(self) -> int:
+        return len(self.edges)
