@@ -9,10 +9,10 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.freedom import Freedom
-from dreamdrive.geometry.dust3r.normal import ImageSamples, normal_equations
-from dreamdrive.geometry.dust3r.penalty import Penalty
-from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE, State
+from dreamdrive.geometry.dust3r.align.freedom import Freedom
+from dreamdrive.geometry.dust3r.align.normal import ImageSamples, normal_equations
+from dreamdrive.geometry.dust3r.align.penalty import Penalty
+from dreamdrive.geometry.dust3r.align.state import PER_EDGE, PER_IMAGE, State
 
 _DAMPING = 1e-4
 _LESS, _MORE, _MOST = 0.3, 8.0, 1e6

@@ -7,19 +7,19 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.aligned import Aligned, Found, report
-from dreamdrive.geometry.dust3r.focal import FocalVotes, focal_votes
-from dreamdrive.geometry.dust3r.freedom import FocalFreedom, Freedom
-from dreamdrive.geometry.dust3r.graph import Graph, graph_of
-from dreamdrive.geometry.dust3r.known import onto_known
-from dreamdrive.geometry.dust3r.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.dust3r.objective import Normalisation
+from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
+from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_votes
+from dreamdrive.geometry.dust3r.align.freedom import FocalFreedom, Freedom
+from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
+from dreamdrive.geometry.dust3r.align.known import onto_known
+from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
+from dreamdrive.geometry.dust3r.align.objective import Normalisation
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.penalty import Cauchy, Distance, Penalty
-from dreamdrive.geometry.dust3r.samples import draw_samples, solve_depth
-from dreamdrive.geometry.dust3r.solver import solve
-from dreamdrive.geometry.dust3r.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.dust3r.state import State
+from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
+from dreamdrive.geometry.dust3r.align.solver import solve
+from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.dust3r.align.state import State
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.splat.torch_threads import one_torch_thread
 

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.penalty import Penalty
+from dreamdrive.geometry.dust3r.align.penalty import Penalty
 
 _NEAREST = 1e-3  # of the median depth: the least that a depth may be
 _TINY = 1e-30

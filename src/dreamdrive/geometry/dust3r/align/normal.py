@@ -7,9 +7,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.penalty import Distance, Penalty
-from dreamdrive.geometry.dust3r.rays import RayMisses, pixel_rays
-from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE, State
+from dreamdrive.geometry.dust3r.align.penalty import Distance, Penalty
+from dreamdrive.geometry.dust3r.align.rays import RayMisses, pixel_rays
+from dreamdrive.geometry.dust3r.align.state import PER_EDGE, PER_IMAGE, State
 
 _TINY = 1e-30
 

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from safetensors.numpy import load_file
 
-from dreamdrive.geometry.dust3r.objective import Raw
+from dreamdrive.geometry.dust3r.align.objective import Raw
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.dust3r.pairs import Noise, pair_maps, path_error, window
-from tests.geometry.dust3r.world import street_truth
+from tests.geometry.dust3r.align.pairs import Noise, pair_maps, path_error, window
+from tests.geometry.dust3r.align.world import street_truth
 
-from dreamdrive.geometry.dust3r.alignment import AlignOptions, align
+from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, align
 
 
 @pytest.mark.slow

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-from tests.geometry.dust3r.goldens import scene
+from tests.geometry.dust3r.align.goldens import scene
 
-from dreamdrive.geometry.dust3r.clean import clean, world_points
+from dreamdrive.geometry.dust3r.align.clean import clean, world_points
 
 
 def test_it_is_upstreams(golden_dir: Path) -> None:

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.dust3r.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
 
-from dreamdrive.geometry.dust3r.freedom import Freedom
-from dreamdrive.geometry.dust3r.graph import graph_of
-from dreamdrive.geometry.dust3r.normal import ImageSamples, normal_equations
-from dreamdrive.geometry.dust3r.penalty import Cauchy, Distance, Penalty
-from dreamdrive.geometry.dust3r.rays import RayMisses
-from dreamdrive.geometry.dust3r.samples import draw_samples
-from dreamdrive.geometry.dust3r.spanning_tree import spanning_tree
-from dreamdrive.geometry.dust3r.state import State
+from dreamdrive.geometry.dust3r.align.freedom import Freedom
+from dreamdrive.geometry.dust3r.align.graph import graph_of
+from dreamdrive.geometry.dust3r.align.normal import ImageSamples, normal_equations
+from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.dust3r.align.rays import RayMisses
+from dreamdrive.geometry.dust3r.align.samples import draw_samples
+from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.dust3r.align.state import State
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 _STEPS = 60

@@ -14,10 +14,10 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.graph import Graph
+from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.registration import Similarity
-from dreamdrive.geometry.dust3r.spanning_tree import BASE_SCALE, Start
+from dreamdrive.geometry.dust3r.align.registration import Similarity
+from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
 
 Normalisation = Literal["pooled", "modular"]
 _FOCAL_BREAK = 20.0

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.geometry.dust3r.goldens import config, raw, scene
-from tests.geometry.dust3r.pairs import path_error
+from tests.geometry.dust3r.align.goldens import config, raw, scene
+from tests.geometry.dust3r.align.pairs import path_error
 
-from dreamdrive.geometry.dust3r.adam import descend
-from dreamdrive.geometry.dust3r.graph import graph_of
-from dreamdrive.geometry.dust3r.objective import Objective, raw_parameters
-from dreamdrive.geometry.dust3r.spanning_tree import spanning_tree
+from dreamdrive.geometry.dust3r.align.adam import descend
+from dreamdrive.geometry.dust3r.align.graph import graph_of
+from dreamdrive.geometry.dust3r.align.objective import Objective, raw_parameters
+from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE
+from dreamdrive.geometry.dust3r.align.state import PER_EDGE, PER_IMAGE
 
 _SAMPLE_BYTES = 32  # a point and a weight in float64
 _WORK_BYTES = 1000  # of the normal equations, for each edge at each sample of one image

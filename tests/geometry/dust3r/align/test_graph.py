@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.dust3r.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.graph import graph_of
+from dreamdrive.geometry.dust3r.align.graph import graph_of
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 
 

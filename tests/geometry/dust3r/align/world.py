@@ -1,7 +1,7 @@
 """True depth, poses and moving cars of a drawn street, as pairs are made from."""
 
 import numpy as np
-from tests.geometry.dust3r.pairs import Truth
+from tests.geometry.dust3r.align.pairs import Truth
 
 from dreamdrive.data.world import make_street
 

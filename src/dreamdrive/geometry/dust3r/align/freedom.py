@@ -5,7 +5,7 @@ from typing import Literal
 
 from scipy.sparse import coo_array, csr_array
 
-from dreamdrive.geometry.dust3r.state import PER_EDGE, PER_IMAGE, State
+from dreamdrive.geometry.dust3r.align.state import PER_EDGE, PER_IMAGE, State
 
 FocalFreedom = Literal["shared", "each", "fixed"]
 _FOCAL = 6
