@@ -1,0 +1,150 @@
+"""Global alignment: from pairwise pointmaps to one world (Wang et al. 2024, section 3.4)."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
+from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_votes
+from dreamdrive.geometry.dust3r.align.freedom import FocalFreedom, Freedom
+from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
+from dreamdrive.geometry.dust3r.align.known import onto_known
+from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
+from dreamdrive.geometry.dust3r.align.objective import Normalisation
+from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
+from dreamdrive.geometry.dust3r.align.solver import solve
+from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.scene.camera import check_rigid
+from dreamdrive.splat.torch_threads import one_torch_thread
+
+_FLOOR = 1e-4  # of the median depth: distances below it weigh no more
+_COARSE = 1e-3  # gain of a step at which the paper's loss is left for the robust one
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """How pairs are brought together.
+
+    Attributes:
+        objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
+            with relative misses under a cost that forgives outliers, and counts those across the ray more
+            than those along it.
+        normalisation: How the paper's loss divides, see ``objective.half_areas``.
+        focal: One focal length for all images, which one camera took; one for ``each``; or ``fixed`` where it
+            starts.
+        samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
+        outlier: Relative miss from which on the robust cost grows slowly.
+        sharper: How much more a miss across the ray counts than one along it, in the robust cost.
+        steps: Most steps of the solver.
+        memory_gb: What may be used, pointmaps included.
+        seed: Of the choice of pixels.
+    """
+
+    objective: Literal["distance", "robust"] = "robust"
+    normalisation: Normalisation = "pooled"
+    focal: FocalFreedom = "shared"
+    samples_per_image: int = 2000
+    outlier: float = 0.05
+    sharper: float = 3.0
+    steps: int = 60
+    memory_gb: float = 4.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Known:
+    """What need not be found.
+
+    Attributes:
+        focals_px: Focal length of each image (N,), or None.
+        world_from_camera: Poses (N, 4, 4), or None. The scene then is given in their world and unit.
+    """
+
+    focals_px: Float[np.ndarray, " n"] | None = None
+    world_from_camera: Float[np.ndarray, "n 4 4"] | None = None
+
+
+def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | None = None) -> Aligned:
+    """Bring pairwise pointmaps into one world.
+
+    Without known poses the world is the camera of image 0, in a unit in which the scales of the pairs have a
+    geometric mean of 0.5. Confidences of exactly 1 mask pixels out.
+
+    Args:
+        maps: Pairs that link all images, directed.
+        options: None are the defaults.
+        known: Focal lengths or poses to keep.
+
+    Raises:
+        InputError: The pairs or what is known cannot be used, or memory would not do.
+    """
+    options, known = options or AlignOptions(), known or Known()
+    graph = graph_of(maps)
+    _check_known(known, len(graph))
+    storage = max(side.dtype.itemsize for pair in maps.points for side in pair)
+    predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
+    check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
+    with one_torch_thread():
+        return _solved(maps, graph, options, known)
+
+
+def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
+    votes = focal_votes(maps)
+    start = spanning_tree(maps, votes)
+    start = replace(start, focals_px=_first_focals(start, votes, options, known))
+    poses = start.world_from_camera
+    if known.world_from_camera is not None:
+        start, poses = onto_known(start, known.world_from_camera)
+    state = State.of(poses, start.focals_px, start.pairs)
+    freedom = Freedom(
+        "fixed" if known.focals_px is not None else options.focal, poses=known.world_from_camera is None
+    )
+    samples = draw_samples(maps, graph, options.samples_per_image, options.normalisation, options.seed)
+    penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
+    if options.objective == "distance":
+        found = solve(samples, state, penalty, freedom, steps=options.steps)
+    else:
+        found = solve(samples, state, penalty, freedom, steps=options.steps, tolerance=_COARSE)
+        penalty = Cauchy(options.outlier, options.sharper)
+        found = solve(samples, found.state, penalty, freedom, steps=options.steps)
+    dense = solve_depth(maps, graph, found.state, penalty, options.normalisation)
+    return report(
+        maps,
+        graph,
+        Found(found.state, dense, samples, found.losses),
+        votes,
+        focal_known=known.focals_px is not None,
+        known_poses=known.world_from_camera,
+    )
+
+
+def _first_focals(
+    start: Start, votes: FocalVotes, options: AlignOptions, known: Known
+) -> Float[np.ndarray, " n"]:
+    if known.focals_px is not None:
+        return known.focals_px.astype(np.float64)
+    if options.focal == "shared":
+        return np.full(len(start.focals_px), votes.shared_px)
+    return start.focals_px
+
+
+def _check_known(known: Known, images: int) -> None:
+    focals, poses = known.focals_px, known.world_from_camera
+    if focals is not None and (len(focals) != images or not (np.isfinite(focals) & (focals > 0)).all()):
+        raise InputError(
+            f"{images} images take {images} positive focal lengths in pixels; got {focals.tolist()}."
+        )
+    if poses is None:
+        return
+    if len(poses) != images:
+        raise InputError(f"{images} images take {images} poses; got {len(poses)}.")
+    try:
+        check_rigid(poses, "world_from_camera")
+    except ValueError as error:
+        raise InputError(f"The known poses cannot be used: {error}.") from error
