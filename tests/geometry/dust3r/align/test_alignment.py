@@ -15,8 +15,8 @@ from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, alig
 from dreamdrive.geometry.dust3r.align.graph import graph_of
 from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
 from dreamdrive.geometry.dust3r.align.objective import Objective, raw_parameters
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)

@@ -10,8 +10,8 @@ from tests.geometry.dust3r.network.golden import Golden, relative, tiny
 from torch import Tensor, nn
 
 from dreamdrive.geometry.dust3r.network.config import NetworkConfig
-from dreamdrive.geometry.dust3r.network.heads import Pointmap, pointmap
 from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
+from dreamdrive.geometry.dust3r.network.heads import Pointmap, pointmap
 from dreamdrive.geometry.dust3r.network.rope import Rotation, grid_positions, rotate, rotation
 
 LIMIT = 3e-5

@@ -14,12 +14,12 @@ from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.known import onto_known
 from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
 from dreamdrive.geometry.dust3r.align.objective import Normalisation
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
 from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.dust3r.align.solver import solve
 from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.splat.torch_threads import one_torch_thread
 

@@ -10,10 +10,10 @@ from torch import Tensor
 from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.dust3r.align.objective import Normalisation, half_areas
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.align.penalty import Penalty
 from dreamdrive.geometry.dust3r.align.rays import RayMisses, pixel_rays
 from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 
 _CHUNK = 8192  # pixels at a time, so that their arrays stay in the cache
 _FULL_STEPS = 12

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int, UInt8
 
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r, Tokens
 from dreamdrive.geometry.dust3r.network.heads import Pointmap
 from dreamdrive.geometry.dust3r.network.images import as_input
 from dreamdrive.geometry.dust3r.network.memory import Size, plan_memory
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r, Tokens
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 
 BUDGET_BYTES = 8 * 10**9
