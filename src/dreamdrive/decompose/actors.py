@@ -30,9 +30,8 @@ class ActorOptions:
 
     Attributes:
         lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames.
-        lasting: Whether copies of what no other frame sees live on, see ``lives``. 2 m beside the
-            path of a drawn street with a car near the camera 19.1 dB with it, 18.4 without; without such a car
-            nothing changes.
+        lasting: Whether copies of what no other frame sees live on, see ``lives``. 2 m beside the path of a
+            drawn street with a car near the camera 19.1 dB with it, 18.4 without; else it changes nothing.
         contact_weight: Trust in one frame's depth against that in the change of size between two frames; a
             frame that shows more of the actor weighs more.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
