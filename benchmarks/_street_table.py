@@ -138,6 +138,8 @@ def markdown(report: dict[str, Any]) -> str:
     parts += [_consistency_lines(table) for table in report.get("consistency", [])]
     if report.get("recording"):
         parts.append(_recording_lines(report["recording"]))
+    if report.get("claims"):
+        parts.append(_claim_lines(report["claims"]))
     return "\n".join(parts)
 
 
@@ -157,6 +159,13 @@ def _consistency_lines(table: dict[str, Any]) -> str:
     )
     title = f"## Consistency of hybrid's drive along the recorded path, {table['geometry']} geometry\n"
     return "\n".join([title, grid(lines), count])
+
+
+def _claim_lines(rows: list[dict[str, Any]]) -> str:
+    verdicts = {True: "yes", False: "no", None: "undecided"}
+    lines = [["claim", "asked", "measured", "holds"]]
+    lines += [[row["about"], row["asked"], row["measured"], verdicts[row["holds"]]] for row in rows]
+    return "## What was asked of hybrid\n\n" + grid(lines)
 
 
 def _recording_lines(rows: list[dict[str, Any]]) -> str:

@@ -11,7 +11,7 @@ second table gives all the seconds of hybrid, a third gives the others five time
 are found by the classical geometry, with true poses, with true intrinsics alone, or with nothing known;
 references are clean, or corrupted as generated video is. Every view is compared with the clean truth. Beside
 them stand how consistent a rendered drive is with itself and its path, against its references, and the same
-five fits of a recorded clip (``DREAMDRIVE_DATA``).
+five fits of a recorded clip (``DREAMDRIVE_DATA``); at the end, what was asked of hybrid and what it reached.
 
 Each fit is a file below ``--runs``; with ``--resume`` those that are there count. ``--workers`` makes that
 many fits side by side, each on its share of the cores. Seconds are the processor's, so that equal time does
@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from _street_case import FRAMES, Poses, References
+from _street_claims import claims
 from _street_consistency import consistency_tables
 from _street_fit import load, load_features
 from _street_jobs import (
@@ -68,7 +69,7 @@ def report_of(
     records = [record for job in there if (record := load(job.result)) is not None]
     features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
     truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
-    return {
+    report = {
         "frames": FRAMES,
         "machine": native_info(),
         "weights": toolbox.weights,
@@ -78,6 +79,7 @@ def report_of(
         "consistency": consistency_tables(records),
         **summary(records, features, truth),
     }
+    return {**report, "claims": claims(report)}
 
 
 def options_of(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -184,3 +184,42 @@ def test_the_report_of_a_full_run_is_small_enough_to_commit(street: ModuleType) 
     assert len(text) < 500_000
     assert "21.1235" in text
     assert "21.12345" not in text
+
+
+def test_each_claim_is_told_with_its_figure(street: ModuleType) -> None:
+    records = [record(s, "hybrid", 25.6, street) | {"mask_iou": 0.8, "fake_m": 0.003} for s in range(3)]
+    records += [record(s, "deformable", 25.0, street) | {"fake_m": 0.01} for s in range(3)]
+    corrupted = [{**row, "references": "corrupted"} for row in records]
+    tables = street.summary([*records, *corrupted], {}, {})["tables"]
+    found = {row["about"]: row for row in street.claims({"tables": tables})}
+    holds = {about: row["holds"] for about, row in found.items()}
+    assert holds == {
+        "true geometry, clean references: the worst view": True,
+        "true geometry, clean references: IoU of the moving mask": True,
+        "true geometry, clean references: fake motion": False,
+        "true geometry, corrupted references: PSNR of held_out less the best other's": True,
+        "true geometry, corrupted references: PSNR of novel less the best other's": True,
+        "true geometry, corrupted references: the worst view": True,
+        "true geometry, corrupted references: fake motion": False,
+    }
+    assert found["true geometry, clean references: fake motion"]["measured"] == "3 mm of 10 mm"
+
+
+@pytest.mark.parametrize(("low", "holds"), [(0.1, True), (-0.1, False)])
+def test_a_gain_has_to_be_sure(street: ModuleType, low: float, holds: bool) -> None:
+    gain = {"best_other": "static", "db": 0.6, "low": low, "high": 1.0}
+    about = {"geometry": "true", "references": "corrupted", "budget": "equal_steps"}
+    empty = {"distances_compared": [], "means": []}
+    table = {**about, **empty, "against_best_other": {"held_out": gain, "novel": gain}}
+    assert street.claims({"tables": [table]})[0]["holds"] is holds
+
+
+def test_an_undecided_ratio_is_neither_kept_nor_broken(street: ModuleType) -> None:
+    ratio = {"network": "fid", "against": "best other", "ours_over_this": 0.8, "ratio_low": 0.6}
+    row = {**ratio, "ratio_high": 1.1, "undecided": True}
+    about = {"geometry": "true", "references": "corrupted", "budget": "equal_steps"}
+    table = {**about, "distances_compared": [row], "means": [], "against_best_other": {}}
+    (claim,) = street.claims({"tables": [table]})
+    assert claim["holds"] is None
+    text = street.markdown({"tables": [], "claims": [claim]})
+    assert "| at most 0.85 | 0.80 (0.60 to 1.10) | undecided |" in text
