@@ -29,6 +29,8 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.stages import STAGES, Progress, StageProgress, Stages, Storage, file_digest, stage_seed
 from dreamdrive.workspace import Workspace, open_workspace
 
+_OF_GEOMETRY = ("geometry-files", "weights")
+
 
 def generate(
     control: Control,
@@ -37,6 +39,7 @@ def generate(
     prior: str | None = None,
     geometry_method: str = "classical",
     geometry_files: Path | None = None,
+    weights: Path | None = None,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
     camera_height_m: float | None = None,
@@ -55,6 +58,7 @@ def generate(
         prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
         geometry_files: Folder with cameras and depth to use, see ``geometry.files``.
+        weights: The network of that geometry method: a file, or the folder of its hub form.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
@@ -83,13 +87,17 @@ def generate(
         "camera_height_m": camera_height_m,
         **_reading(control),
     }
-    request = {"digests": _digests(control, geometry_files), "options": options, "seed": control.seed}
+    request = {
+        "digests": _digests(control, geometry_files, weights),
+        "options": options,
+        "seed": control.seed,
+    }
     recompute = recompute_from is not None
     workspace = open_workspace(out, request, force=force, recompute=recompute)
     if workspace is None:
         return False
     stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-    _publish(workspace, stages, control, _make(stages, control, geometry_files, request))
+    _publish(workspace, stages, control, _make(stages, control, geometry_files, weights, request))
     return True
 
 
@@ -103,13 +111,20 @@ class _Made:
     scored: Scored | None
 
 
-def _make(stages: Stages, control: Control, geometry_files: Path | None, request: dict[str, Any]) -> _Made:
+def _make(
+    stages: Stages,
+    control: Control,
+    geometry_files: Path | None,
+    weights: Path | None,
+    request: dict[str, Any],
+) -> _Made:
     """The stages in their order, each with the results it depends on and the options that change it."""
     chosen, height_m = request["options"], request["options"]["camera_height_m"]
     quality = QUALITIES[chosen["quality"]]
     seed = {name: stage_seed(control.seed, name) for name in STAGES}
 
-    files = {name: value for name, value in request["digests"].items() if name != "geometry-files"}
+    of_geometry = [request["digests"].get(name) for name in _OF_GEOMETRY]
+    files = {name: value for name, value in request["digests"].items() if name not in _OF_GEOMETRY}
     reading = [chosen["prior"], _reading(control), files, control.seed]
     clip = stages.run("prior", (), reading, lambda _: choose_prior(chosen["prior"])(control))
 
@@ -117,12 +132,13 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
     geometry = stages.run(
         "geometry",
         ("prior",),
-        [method, height_m, request["digests"].get("geometry-files"), seed["geometry"]],
+        [method, height_m, *of_geometry, seed["geometry"]],
         lambda _: reconstruct(
             clip if geometry_files is None else attach(clip, geometry_files),
             camera_height_m=height_m,
             seed=seed["geometry"],
             method=method,
+            weights=weights,
         ),
     )
     seeds = stages.run(
@@ -255,13 +271,14 @@ def _reading(control: Control) -> dict[str, Any]:
     return {k: v for k, v in asdict(control).items() if k not in ("path", "intrinsics", "poses", "seed")}
 
 
-def _digests(control: Control, geometry_files: Path | None) -> dict[str, str]:
+def _digests(control: Control, geometry_files: Path | None, weights: Path | None) -> dict[str, str]:
     """Digests of the given files: they count by their content, not by their place."""
     given = {
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
         "geometry-files": (geometry_files, "a folder with cameras.json"),
+        "weights": (weights, "a file of weights or its folder"),
     }
     digests: dict[str, str] = {}
     for name, (path, expected) in given.items():

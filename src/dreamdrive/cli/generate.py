@@ -18,7 +18,8 @@ def generate(
     prior: Annotated[
         Literal["replay", "street-world"] | None, arg(metavar="NAME", help_behavior_hint="")
     ] = None,
-    geometry: Annotated[Literal["classical"], arg(metavar="NAME")] = "classical",
+    geometry: Annotated[Literal["classical", "dust3r"], arg(metavar="NAME")] = "classical",
+    weights: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
@@ -44,7 +45,8 @@ def generate(
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
             it the input decides.
-        geometry: How cameras and depth are found.
+        geometry: How cameras and depth are found; dust3r takes --weights.
+        weights: Weights of the geometry's network; nothing is ever downloaded.
         quality: How many steps the fits take.
         frames: Frames of the input to use, counted from 0.
         fps: Rate of the input, before the step of --frames.
@@ -85,6 +87,7 @@ def generate(
             prior=prior,
             geometry_method=geometry,
             geometry_files=geometry_files,
+            weights=weights,
             quality=quality,
             representation=representation,
             camera_height_m=camera_height,

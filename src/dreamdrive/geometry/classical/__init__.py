@@ -1,15 +1,26 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
-from dreamdrive.geometry.classical.dense import densify
-from dreamdrive.geometry.classical.poses import pose_clip
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical.dense import Dense, densify
+from dreamdrive.geometry.classical.poses import Posed, pose_clip
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 
-def reconstruct(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Geometry:
+def reconstruct(
+    clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+) -> Geometry:
     """Pose a clip and find its depth, see ``geometry.protocol``."""
+    if weights is not None:
+        raise InputError(f"geometry classical has no network and takes no weights; got {weights}")
     posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
-    dense = densify(clip, posed)
+    return assemble(clip, posed, densify(clip, posed))
+
+
+def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
+    """What both halves found, as the next stages take it."""
     used = ~clip.held_out
     shares = {
         "depth_share": float((dense.depth_m[used] > 0).mean()),

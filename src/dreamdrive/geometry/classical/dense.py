@@ -32,7 +32,20 @@ class Dense:
     moving: Float[np.ndarray, "f h w"]
 
 
-def densify(clip: Clip, posed: Posed) -> Dense:
+@dataclass(frozen=True)
+class StaticDepth:
+    """Depth that was measured as if nothing moved, as the plane sweep measures it.
+
+    Attributes:
+        depth_m: Depth along z (F, H, W); 0 where there is none.
+        confidence: Trust in it (F, H, W) in [0, 1].
+    """
+
+    depth_m: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+
+
+def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None) -> Dense:
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
@@ -40,6 +53,11 @@ def densify(clip: Clip, posed: Posed) -> Dense:
     fallback) from the road plane and a backdrop at 40 m, little trusted. What moves is found against the
     parallax of a moving camera or against the temporal median of a standing one; from fallback poses no such
     evidence is drawn.
+
+    Args:
+        clip: The frames.
+        posed: Their cameras.
+        measured: Depth to take in place of the plane sweep's, such as a network's.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground)
     given = clip.known.depth_m is not None
@@ -49,6 +67,9 @@ def densify(clip: Clip, posed: Posed) -> Dense:
         if clip.known.depth_m is not None:
             inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
             confidence = (inverse > 0).astype(np.float32)
+        elif measured is not None:
+            inverse = _inverse(np.where(view.used[:, None, None], measured.depth_m, 0))
+            confidence = np.where(inverse > 0, measured.confidence, 0).astype(np.float32)
         elif rough:
             inverse, confidence = _plane_and_backdrop(view)
         else:

@@ -119,7 +119,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     if placed < len(clip):
         notes.append(f"{len(clip) - placed} of {len(clip)} frames were placed between their neighbours")
     details = {**outcome.figures, "residual_radial": float(model.lens[4]), "metres_per_unit": metric.factor}
-    return _posed(clip, evidence, poses, camera, metric, observed, notes, details)
+    return as_posed(clip, evidence, poses, camera, metric, observed, notes, details)
 
 
 def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
@@ -144,7 +144,7 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
         notes.append(
             f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m"
         )
-    posed = _posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, {})
+    posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, {})
     return replace(posed, standing=evidence.motion.standing and _path_m(poses) < 0.5)
 
 
@@ -161,7 +161,7 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     if clip.known.depth_m is not None:
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
         metric = replace(metric, ground=ground, scale=Scale("depth", 0.0))
-    posed = _posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
+    posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
     return replace(posed, standing=True, fallback=reason)
 
 
@@ -183,7 +183,7 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
         )
     details = {**outcome.figures, "odometry_measured": path.measured}
     observed = clip.known.intrinsics
-    posed = _posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
+    posed = as_posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
     return replace(posed, fallback=reason)
 
 
@@ -193,7 +193,7 @@ def _level_road(height_m: float | None, spread: float) -> Metric:
     return Metric(1.0, Ground(np.array([0.0, -1.0, 0.0]), wanted), Scale(source, spread), ())
 
 
-def _posed(
+def as_posed(
     clip: Clip,
     evidence: Evidence,
     poses: Float[np.ndarray, "f 4 4"],
@@ -203,6 +203,18 @@ def _posed(
     notes: list[str],
     details: dict[str, Any],
 ) -> Posed:
+    """The cameras of all frames, and what was noticed before and by posing them.
+
+    Args:
+        clip: The frames; the first camera of the rig is replaced by ``camera``.
+        evidence: The first look at them.
+        poses: World-from-camera (F, 4, 4) in metres, the first the identity.
+        camera: Pinhole of the clip's size.
+        metric: Scale and road.
+        observed: Whether the focal length was seen or given.
+        notes: What posing them showed, a sentence each.
+        details: Figures of the method.
+    """
     rig = [camera, *clip.rig[1:]]
     cameras = tuple(rig[int(index)].at(pose) for index, pose in zip(clip.camera, poses, strict=True))
     figures = {

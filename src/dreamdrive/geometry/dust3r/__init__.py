@@ -3,3 +3,7 @@
 Written from the architecture as published; the weights are a file that the user has. Those of the authors
 are for research only (CC BY-NC-SA 4.0, and the terms of the data they were trained with).
 """
+
+from dreamdrive.geometry.dust3r.reconstruct import reconstruct
+
+__all__ = ["reconstruct"]

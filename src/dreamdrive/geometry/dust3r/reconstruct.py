@@ -1,0 +1,133 @@
+"""A clip through DUSt3R: pairs, pointmaps, alignment."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.stats import rankdata
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical.evidence import Evidence, look
+from dreamdrive.geometry.dust3r.align.aligned import Aligned
+from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
+from dreamdrive.geometry.dust3r.network.images import Fitting, fitting, prepare
+from dreamdrive.geometry.dust3r.network.inference import infer
+from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
+from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.measured import Measured
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+LICENCE = "CC BY-NC-SA 4.0 and the terms of the data it was trained with: research only"
+_MOST_RESIDUAL = 0.2  # median relative miss of the pairs
+
+
+def reconstruct(
+    clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+) -> Geometry:
+    """Pointmaps of pairs of frames, aligned, brought to metres; see ``geometry.protocol``.
+
+    Held-out frames take part in the alignment, which poses them; their depth is not handed on.
+
+    Args:
+        clip: Frames of one camera.
+        camera_height_m: Height of the camera above the road; None assumes 1.5 m.
+        seed: Seed of everything random.
+        weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
+
+    Raises:
+        InputError: Without weights, for fewer than two frames or several cameras, or where the weights or
+            what the network makes of the frames cannot be used.
+    """
+    if weights is None:
+        raise InputError(f"geometry dust3r needs --weights FILE, a model of DUSt3R ({LICENCE})")
+    if len(clip) < 2 or len(clip.rig) > 1:
+        raise InputError(
+            f"geometry dust3r takes two frames or more of one camera; got {len(clip)} of {len(clip.rig)}"
+        )
+    network = load_dust3r(weights)
+    evidence = look(clip)
+    how = fitting(*clip.size, network.config.image_size)
+    pictures = [prepare(frame, how) for frame in clip.frames]
+    maps = infer(network, pictures, make_pairs(len(clip), video_graph(len(clip))))
+    aligned = align(masked(maps, _usable(clip, evidence, how)), _options(clip, seed), _known(clip, how))
+    return finish(clip, measured(clip, aligned, how), evidence, camera_height_m=camera_height_m, seed=seed)
+
+
+def masked(maps: PairMaps, usable: Bool[np.ndarray, "n h w"]) -> PairMaps:
+    """The pairs with a confidence of 1, which weighs nothing, where an image (N, H, W) is not usable."""
+    confidence = tuple(
+        (np.where(usable[i], first, np.float32(1)), np.where(usable[j], second, np.float32(1)))
+        for (i, j), (first, second) in zip(maps.edges.tolist(), maps.confidence, strict=True)
+    )
+    return replace(maps, confidence=confidence)
+
+
+def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
+    """The alignment in pixels of the clip; confidence becomes the share of pixels that are trusted less."""
+    width, height = how.size
+    focal_px = float(np.median(aligned.focals_px))
+    # The network counts pixels from 0 and has its principal point at half the size.
+    picture = Camera(focal_px, focal_px, width / 2 + 0.5, height / 2 + 0.5, width, height)
+    camera = clip.rig[0] if clip.known.intrinsics else how.frame_camera(picture)
+    depth, trust = (_in_frames(part, how) for part in (aligned.depth, aligned.confidence))
+    there = (trust > 1) & ~clip.held_out[:, None, None]
+    confidence = np.zeros(trust.shape, np.float32)
+    if there.any():
+        confidence[there] = rankdata(trust[there]) / np.count_nonzero(there)
+    notes = [] if aligned.path_observed else ["the pairs do not agree on a path: it is not to be believed"]
+    if not aligned.focal_observed:
+        notes.append("the pairs do not agree on a focal length")
+    return Measured(
+        world_from_camera=aligned.world_from_camera,
+        camera=replace(camera, world_from_camera=np.eye(4)),
+        focal_observed=aligned.focal_observed,
+        depth=np.where(there, depth, 0).astype(np.float32),
+        confidence=confidence,
+        unit=None if clip.known.world_from_camera is None else "poses",
+        notes=tuple(notes),
+        details={
+            "pairs_residual": float(np.median(aligned.residual)),
+            "focal_spread": aligned.focal_spread,
+            "pair_spread": aligned.pair_spread,
+            "masked_share": float(aligned.masked_share.mean()),
+        },
+    )
+
+
+def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n h w"]:
+    """Pixels of the pictures that show the street; something that keeps its place in the image is none."""
+    free = clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
+    return np.stack(
+        [prepare(np.repeat(255 * one[..., None].astype(np.uint8), 3, 2), how)[..., 0] > 250 for one in free]
+    )
+
+
+def _options(clip: Clip, seed: int) -> AlignOptions:
+    return AlignOptions(focal="fixed" if clip.known.intrinsics else "shared", seed=seed)
+
+
+def _known(clip: Clip, how: Fitting) -> Known:
+    focals = None
+    if clip.known.intrinsics:
+        focals = np.full(len(clip), how.picture_camera(clip.rig[0]).fx_px)
+    return Known(focals, clip.known.world_from_camera)
+
+
+def _in_frames(pictures: tuple[np.ndarray, ...], how: Fitting) -> Float[np.ndarray, "f h w"]:
+    """Values of the pictures at the pixels of the frames; 0 beyond their edge."""
+    width, height = how.frame_size
+    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    at = how.to_picture(np.stack([columns, rows], axis=-1)).astype(np.float32) - np.float32(0.5)
+    # Nearest: an average across a depth edge is a depth at which there is nothing.
+    return np.stack(
+        [
+            cv2.remap(values.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderValue=0)
+            for values in pictures
+        ]
+    )

@@ -1,0 +1,41 @@
+"""Cameras and depth as a network or another program found them, in a unit of their own."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.scene.camera import Camera
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is measured of a clip before it is brought to metres and told what is road, sky and traffic.
+
+    Attributes:
+        world_from_camera: Poses (F, 4, 4) in any world.
+        camera: Pinhole of the clip's size.
+        focal_observed: Whether the focal length is calibrated or was seen, rather than assumed.
+        depth: Depth along z (F, H, W) in the unit of the poses; 0 where there is none.
+        confidence: Trust in it (F, H, W) in [0, 1].
+        unit: What says that the unit is the metre, in words; None where nothing does.
+        notes: What was noticed, a sentence each.
+        details: Figures for the report, as JSON values.
+    """
+
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    camera: Camera
+    focal_observed: bool
+    depth: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+    unit: str | None = None
+    notes: tuple[str, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        size = self.camera.height_px, self.camera.width_px
+        shape = (len(self.world_from_camera), *size)
+        for name in ("depth", "confidence"):
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"measured: {name} has the shape {getattr(self, name).shape}, not {shape}")

@@ -1,0 +1,101 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.geometry.dust3r.network.golden import tiny
+from tests.geometry.dust3r.network.test_checkpoint import save_pth
+
+from dreamdrive.data.select import held_out_mask
+from dreamdrive.data.world import make_street
+from dreamdrive.errors import InputError
+from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.measured import Measured
+from dreamdrive.scene.clip import Clip, Known
+
+FRAMES, SIZE = 6, (160, 96)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return make_street(5, FRAMES, 5.0, SIZE, movers=0)
+
+
+@pytest.fixture(scope="module")
+def clip(drive) -> Clip:
+    return Clip(
+        frames=drive.frames,
+        times_s=drive.times_s,
+        camera=np.zeros(FRAMES, np.int64),
+        rig=(drive.cameras[0].at(np.eye(4)),),
+        valid=np.ones(drive.depth_m.shape, bool),
+        held_out=held_out_mask(FRAMES, 4),
+        source_index=np.arange(FRAMES),
+        known=Known(intrinsics=True),
+    )
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return save_pth(tmp_path_factory.mktemp("weights") / "tiny.pth", tiny(), img_size=(160, 160))
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.05])
+def test_true_geometry_in_any_unit_comes_back_in_metres(drive, clip: Clip, factor: float):
+    poses = drive.trajectory.world_from_camera.copy()
+    poses[:, :3, 3] *= factor
+    depth = (np.where(clip.held_out[:, None, None], 0, drive.depth_m) * factor).astype(np.float32)
+    confidence = (depth > 0).astype(np.float32)
+    found = finish(
+        clip, Measured(poses, clip.rig[0], True, depth, confidence), look(clip), camera_height_m=1.5
+    )
+    truth = drive.trajectory.world_from_camera[-1, :3, 3]
+    assert found.cameras[-1].world_from_camera[:3, 3] == pytest.approx(
+        truth, abs=0.05 * np.linalg.norm(truth)
+    )
+    assert "ground plane" in found.scale.source
+    assert not found.depth_m[clip.held_out].any()
+    assert found.ground is not None
+
+
+def test_a_unit_that_is_the_metre_is_kept(drive, clip: Clip):
+    depth = np.where(clip.held_out[:, None, None], 0, drive.depth_m).astype(np.float32)
+    poses = drive.trajectory.world_from_camera
+    given = Measured(poses, clip.rig[0], True, depth, (depth > 0).astype(np.float32), unit="a metric network")
+    found = finish(clip, given, look(clip), camera_height_m=3.0)
+    assert found.cameras[-1].world_from_camera == pytest.approx(poses[-1], abs=1e-6)
+    assert found.scale.source == "a metric network"
+    assert any("m above the road" in note for note in found.detected)
+
+
+def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip, weights: Path):
+    found = reconstruct(clip, method="dust3r", weights=weights, camera_height_m=1.5)
+    assert len(found.cameras) == FRAMES
+    assert found.depth_m.shape == clip.frames.shape[:3]
+    assert np.isfinite(found.depth_m).all()
+    assert (found.depth_m[~clip.held_out] > 0).any()
+    assert any("not to be believed" in note for note in found.detected)
+    assert found.details["pairs_residual"] > 0
+
+
+def test_weights_and_method_have_to_fit(clip: Clip, weights: Path, tmp_path: Path):
+    with pytest.raises(InputError, match="--weights FILE"):
+        reconstruct(clip, method="dust3r")
+    with pytest.raises(InputError, match="takes no weights"):
+        reconstruct(clip, weights=weights)
+    with pytest.raises(InputError, match="does not exist"):
+        reconstruct(clip, method="dust3r", weights=tmp_path / "none.pth")
+
+
+def test_one_frame_is_too_few(clip: Clip, weights: Path):
+    alone = replace(
+        clip,
+        **{
+            name: getattr(clip, name)[:1]
+            for name in ("frames", "times_s", "camera", "valid", "held_out", "source_index")
+        },
+    )
+    with pytest.raises(InputError, match="two frames or more"):
+        reconstruct(alone, method="dust3r", weights=weights)
