@@ -10,6 +10,7 @@ from math import isfinite, tan
 from pathlib import Path
 from typing import Any, cast
 
+from dreamdrive.data.colmap_binary import check_binary
 from dreamdrive.data.distortion import Distortion
 from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
@@ -72,6 +73,8 @@ def read_colmap(folder: Path) -> Any:
             f"{folder}: {', '.join(missing[ending])} is missing; a COLMAP model is cameras, images and "
             "points3D, all .bin or all .txt"
         )
+    if ending == ".bin":
+        check_binary(folder)
     model = pycolmap.Reconstruction()
     try:
         (model.read_binary if ending == ".bin" else model.read_text)(str(folder))

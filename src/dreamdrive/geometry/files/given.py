@@ -56,8 +56,8 @@ class Given:
 
     world_from_camera: Float[np.ndarray, "f 4 4"]
     metric: bool
-    cameras: tuple[LensCamera, ...] = ()
-    camera: Int[np.ndarray, " f"] = field(default_factory=lambda: np.zeros(0, np.intp))
+    cameras: tuple[LensCamera, ...]
+    camera: Int[np.ndarray, " f"]
     depth: DepthFiles = field(default_factory=DepthFiles)
     sparse: SparsePoints | None = None
     notes: tuple[str, ...] = ()

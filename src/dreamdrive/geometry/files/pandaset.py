@@ -36,18 +36,19 @@ def read_pandaset(path: Path, wanted: Wanted) -> Given:
             f"{path} has the cameras {', '.join(cameras)}, none called {name!r}: name the input folder "
             f'like its camera, or write {{"camera": NAME}} into {NAME} beside it'
         )
+    camera = _camera(cameras[name], f"{path}: {name}")
     poses, notes = read_poses(path, name, wanted.index, wanted.times_s, wanted.count, OPTION)
     return Given(
         poses,
         metric=declared.metric is not False,
-        cameras=(LensCamera(_camera(cameras[name], f"{path}: {name}"), None),),
+        cameras=(LensCamera(camera, None),),
         camera=np.zeros(len(wanted.index), np.intp),
         depth=find_depth(path.parent / "depth", wanted.labels, declared),
         notes=notes,
     )
 
 
-def _camera(entry: dict[str, Any], where: str) -> Camera:
+def _camera(entry: Any, where: str) -> Camera:
     try:
         matrix = np.array(entry["K"], np.float64)
         size = int(entry["width"]), int(entry["height"])

@@ -47,7 +47,7 @@ def read_pose_list(path: Path, wanted: Wanted) -> Given:
         poses,
         metric=declared.metric is not False,
         cameras=cameras,
-        camera=np.zeros(len(wanted.index) if cameras else 0, np.intp),
+        camera=np.zeros(len(wanted.index), np.intp),
         depth=find_depth(path.parent / "depth", wanted.labels, declared),
         notes=notes,
     )
