@@ -148,7 +148,8 @@ def _lens_camera(
     if not all(map(isfinite, numbers.values())):
         raise InputError(f"{where}: the intrinsics hold NaN or infinite numbers")
     try:
-        camera = Camera(*(numbers[key] for key in ("fx", "fy", "cx", "cy")), *size)
+        fx, fy, cx, cy = (numbers[key] for key in ("fx", "fy", "cx", "cy"))
+        camera = Camera(fx, fy, cx, cy, *size)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from error
     if fisheye:  # equidistant: bent even with all coefficients 0
@@ -196,7 +197,11 @@ def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
     transforms = path / "transforms.json" if path.is_dir() else path
     if transforms.suffix.lower() == ".json" and transforms.is_file():
         values = read_json(transforms, option)
-        if "frames" not in values or "world_from_camera" in values:
+        if (
+            not isinstance(values.get("frames"), list)
+            or "intrinsics" in values
+            or "world_from_camera" in values
+        ):
             return None
         where = f"{option} {transforms}"
         cameras = [from_nerfstudio(frame, where) for frame in transforms_frames(values, where)]

@@ -98,7 +98,7 @@ def _read_png(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
 def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
     # OpenCV's wheels come without OpenEXR since 5.0, and before only read it when told by the environment.
     try:
-        import OpenEXR
+        import OpenEXR  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise InputError(
             f"{path}: EXR files are read by the package OpenEXR, which is not installed; "

@@ -115,7 +115,7 @@ class Wanted:
             meant, chosen = "frame of the input", order[self.index]
         else:
             like = f", none of them called like the input's, such as {self.names[0]}" if self.names else ""
-            few = ", ".join(names[row] for row in order[:3])
+            few = ", ".join(names[int(row)] for row in order[:3])
             raise InputError(
                 f"{where} has poses for {len(names)} pictures ({few}){like}; expected one for each of the "
                 f"{self.count()} frames of the input or of the {len(self.index)} selected ones"
