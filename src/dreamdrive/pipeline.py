@@ -13,7 +13,7 @@ from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.options import QUALITIES, Quality, QualityName
@@ -26,7 +26,16 @@ from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.stages import STAGES, Progress, StageProgress, Stages, Storage, file_digest, stage_seed
+from dreamdrive.stages import (
+    STAGES,
+    Progress,
+    StageProgress,
+    Stages,
+    Storage,
+    digest,
+    file_digest,
+    stage_seed,
+)
 from dreamdrive.workspace import Workspace, open_workspace
 
 
@@ -54,7 +63,7 @@ def generate(
         out: The output folder, see ``workspace``.
         prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
-        geometry_files: Folder with cameras and depth to use, see ``geometry.files``.
+        geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.files``.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
@@ -75,6 +84,7 @@ def generate(
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
+    control = _with_lens(control, geometry_files)
     options = {
         "prior": prior,
         "geometry": geometry_method,
@@ -118,12 +128,7 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
         "geometry",
         ("prior",),
         [method, height_m, request["digests"].get("geometry-files"), seed["geometry"]],
-        lambda _: reconstruct(
-            clip if geometry_files is None else attach(clip, geometry_files),
-            camera_height_m=height_m,
-            seed=seed["geometry"],
-            method=method,
-        ),
+        lambda _: _reconstructed(clip, control, geometry_files, height_m, seed["geometry"], method),
     )
     seeds = stages.run(
         "initialise",
@@ -147,6 +152,25 @@ def _make(stages: Stages, control: Control, geometry_files: Path | None, request
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
     )
     return _Made(clip, geometry, scene, scored)
+
+
+def _reconstructed(
+    clip: Clip, control: Control, files: Path | None, height_m: float | None, seed: int, method: str
+) -> Geometry:
+    """F_MVS (eq. 4), on top of what the user's files say; what was noticed about these is kept."""
+    if files is None:
+        return reconstruct(clip, camera_height_m=height_m, seed=seed, method=method)
+    attached = attach(clip, files, control.path)
+    geometry = reconstruct(attached, camera_height_m=height_m, seed=seed, method=method)
+    noticed = attached.provenance["notes"][len(clip.provenance.get("notes", [])) :]
+    return replace(geometry, detected=(*noticed, *geometry.detected))
+
+
+def _with_lens(control: Control, geometry_files: Path | None) -> Control:
+    """A lens in the geometry files has to be taken out of the frames when they are read."""
+    if geometry_files is None or control.intrinsics is not None or control.hfov_deg is not None:
+        return control
+    return replace(control, intrinsics=bent_model(geometry_files))
 
 
 def _seen(clip: Clip, geometry: Geometry) -> Geometry:
@@ -261,7 +285,7 @@ def _digests(control: Control, geometry_files: Path | None) -> dict[str, str]:
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
-        "geometry-files": (geometry_files, "a folder with cameras.json"),
+        "geometry-files": (geometry_files, EXPECTED),
     }
     digests: dict[str, str] = {}
     for name, (path, expected) in given.items():
@@ -271,6 +295,9 @@ def _digests(control: Control, geometry_files: Path | None) -> dict[str, str]:
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
         digests[name] = file_digest(path, deep=name == "geometry-files")
+        beside = companions(path) if name == "geometry-files" else []
+        if beside:
+            digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
     return digests
 
 

@@ -1,6 +1,7 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
 from dreamdrive.geometry.classical.dense import densify
+from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import pose_clip
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -9,7 +10,7 @@ from dreamdrive.scene.geometry import Geometry
 def reconstruct(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Geometry:
     """Pose a clip and find its depth, see ``geometry.protocol``."""
     posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
-    dense = densify(clip, posed)
+    dense = densify(in_metres(clip, posed.metres_per_unit), posed)
     used = ~clip.held_out
     shares = {
         "depth_share": float((dense.depth_m[used] > 0).mean()),
