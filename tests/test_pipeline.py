@@ -192,3 +192,24 @@ def _size(path: Path) -> tuple[int, int, int]:
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         return sum(1 for _ in container.decode(stream)), stream.width, stream.height
+
+
+def test_the_lens_of_a_model_is_taken_out_of_the_frames(tmp_path: Path) -> None:
+    frames = [{"file_path": f"{i}.png", "transform_matrix": np.eye(4).tolist()} for i in range(2)]
+    shared = {"w": 64, "h": 40, "fl_x": 60.0, "k1": -0.1}
+    path = tmp_path / "transforms.json"
+    path.write_text(json.dumps({**shared, "frames": frames}))
+    assert pipeline._with_lens(Control(), path).intrinsics == path
+    assert pipeline._with_lens(Control(), tmp_path).intrinsics == path
+    own = Control(intrinsics=tmp_path / "own.json")
+    assert pipeline._with_lens(own, path) == own
+    path.write_text(json.dumps({**shared, "k1": 0.0, "frames": frames}))
+    assert pipeline._with_lens(Control(), path) == Control()
+
+
+def test_all_that_decides_over_the_geometry_decides_over_the_result(tmp_path: Path) -> None:
+    path = tmp_path / "poses.txt"
+    path.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    before = pipeline._digests(Control(), path)
+    (tmp_path / "geometry.json").write_text("{}")
+    assert pipeline._digests(Control(), path) != before

@@ -13,7 +13,7 @@ from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.options import QUALITIES, Quality, QualityName
@@ -26,7 +26,16 @@ from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.stages import STAGES, Progress, StageProgress, Stages, Storage, file_digest, stage_seed
+from dreamdrive.stages import (
+    STAGES,
+    Progress,
+    StageProgress,
+    Stages,
+    Storage,
+    digest,
+    file_digest,
+    stage_seed,
+)
 from dreamdrive.workspace import Workspace, open_workspace
 
 _OF_GEOMETRY = ("geometry-files", "weights")
@@ -57,7 +66,7 @@ def generate(
         out: The output folder, see ``workspace``.
         prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
-        geometry_files: Folder with cameras and depth to use, see ``geometry.files``.
+        geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.files``.
         weights: The network of that geometry method: a file, or the folder of its hub form.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
@@ -79,6 +88,7 @@ def generate(
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
+    control = _with_lens(control, geometry_files)
     options = {
         "prior": prior,
         "geometry": geometry_method,
@@ -133,8 +143,9 @@ def _make(
         "geometry",
         ("prior",),
         [method, height_m, *of_geometry, seed["geometry"]],
-        lambda _: reconstruct(
-            clip if geometry_files is None else attach(clip, geometry_files),
+        lambda _: _reconstructed(
+            clip if geometry_files is None else attach(clip, geometry_files, control.path),
+            clip,
             camera_height_m=height_m,
             seed=seed["geometry"],
             method=method,
@@ -163,6 +174,20 @@ def _make(
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
     )
     return _Made(clip, geometry, scene, scored)
+
+
+def _reconstructed(attached: Clip, clip: Clip, **how: Any) -> Geometry:
+    """F_MVS (eq. 4), on top of what the user's files say; what was noticed about these is kept."""
+    geometry = reconstruct(attached, **how)
+    noticed = attached.provenance.get("notes", [])[len(clip.provenance.get("notes", [])) :]
+    return replace(geometry, detected=(*noticed, *geometry.detected))
+
+
+def _with_lens(control: Control, geometry_files: Path | None) -> Control:
+    """A lens in the geometry files has to be taken out of the frames when they are read."""
+    if geometry_files is None or control.intrinsics is not None or control.hfov_deg is not None:
+        return control
+    return replace(control, intrinsics=bent_model(geometry_files))
 
 
 def _seen(clip: Clip, geometry: Geometry) -> Geometry:
@@ -277,7 +302,7 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
-        "geometry-files": (geometry_files, "a folder with cameras.json"),
+        "geometry-files": (geometry_files, EXPECTED),
         "weights": (weights, "a file of weights or its folder"),
     }
     digests: dict[str, str] = {}
@@ -288,6 +313,9 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
         digests[name] = file_digest(path, deep=name == "geometry-files")
+        beside = companions(path) if name == "geometry-files" else []
+        if beside:
+            digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
     return digests
 
 

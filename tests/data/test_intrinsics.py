@@ -139,3 +139,41 @@ def test_golden_every_clip_with_calibration_is_accepted(data_dir):
         else:
             with pytest.raises(InputError, match="holds no calibration"):
                 read_intrinsics(path, (meta["width"], meta["height"]))
+
+
+def test_a_transforms_json_is_a_calibration(tmp_path):
+    shared = {
+        "w": 1280,
+        "h": 720,
+        "fl_x": 1000.0,
+        "fl_y": 990.0,
+        "cx": 640.0,
+        "cy": 360.0,
+        "k1": -0.1,
+        "k3": 0.01,
+    }
+    path = tmp_path / "transforms.json"
+    path.write_text(json.dumps({**shared, "frames": [{"file_path": "a"}, {"file_path": "b"}]}))
+    for given_as in (path, tmp_path):
+        found = read_intrinsics(given_as, (640, 360))
+        assert (found.camera.fx_px, found.camera.cx_px, found.camera.cy_px) == (500.0, 320.0, 180.0)
+        assert found.distortion == Distortion("opencv", (-0.1, 0.0, 0.0, 0.0, 0.01))
+        assert found.known
+    path.write_text(json.dumps({**shared, "frames": [{"fl_x": 900.0}, {}]}))
+    with pytest.raises(InputError, match="2 different cameras"):
+        read_intrinsics(path, (640, 360))
+    path.write_text(json.dumps({**shared, "frames": [{}]}))
+    with pytest.raises(InputError, match=r"for 1280x720 images, but the input is 640x300"):
+        read_intrinsics(path, (640, 300))
+
+
+def test_a_colmap_model_is_a_calibration(tmp_path):
+    (tmp_path / "cameras.txt").write_text("1 FULL_OPENCV 1280 720 1000 990 640 360 1 2 3 4 5 6 7 8\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.jpg\n\n")
+    (tmp_path / "points3D.txt").write_text("")
+    found = read_intrinsics(tmp_path, (1280, 720))
+    assert (found.camera.fy_px, found.camera.cx_px) == (990.0, 640.0)
+    assert found.distortion == Distortion("opencv", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0))
+    (tmp_path / "points3D.txt").unlink()
+    with pytest.raises(InputError, match=r"points3D\.txt is missing"):
+        read_intrinsics(tmp_path, (1280, 720))

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests.geometry.toy_drive import HEIGHT, HEIGHT_M, WIDTH, make_clip, straight, turning
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.paths import fill, rebase
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
 from dreamdrive.scene.clip import Clip, Known
@@ -42,6 +43,37 @@ def test_known_poses_are_used_untouched(clip: Clip) -> None:
     assert posed.fallback is None
     assert posed.ground is not None
     assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)
+
+
+def test_known_poses_in_an_unknown_unit_are_scaled_by_the_road(clip: Clip) -> None:
+    path = turning(8, 0.4, 2.0)
+    small = path.copy()
+    small[:, :3, 3] /= 7.3
+    rendered = make_clip(path)
+    depth = np.ones(rendered.valid.shape, np.float32)
+    known = Known(world_from_camera=small, intrinsics=True, metric=False, depth_m=depth)
+    # The road shows the scale, not the depth, whose points lie on a wall in front of each camera.
+    posed = pose_clip(replace(rendered, known=known), camera_height_m=HEIGHT_M)
+    assert posed.metres_per_unit == pytest.approx(7.3, rel=0.03)
+    np.testing.assert_allclose(stack(posed)[:, :3, :3], path[:, :3, :3], atol=1e-9)
+    np.testing.assert_allclose(stack(posed)[:, :3, 3], path[:, :3, 3], atol=0.1)
+    assert posed.scale.source.startswith("ground plane")
+    assert 0 < posed.scale.spread < 0.1
+    scaled = in_metres(replace(rendered, known=known), posed.metres_per_unit).known.depth_m
+    assert scaled is not None
+    assert scaled.max() == pytest.approx(7.3, rel=0.03)
+
+
+def test_poses_in_an_unknown_unit_are_left_out_where_the_camera_stands() -> None:
+    still = make_clip(straight([0.0] * 7))
+    noise = np.tile(np.eye(4), (8, 1, 1))
+    noise[:, 0, 3] = 0.01 * np.arange(8)
+    known = Known(world_from_camera=noise, metric=False, depth_m=np.ones(still.valid.shape, np.float32))
+    posed = pose_clip(replace(still, known=known))
+    assert posed.standing
+    assert posed.fallback is not None
+    assert "not used" in posed.fallback
+    assert in_metres(replace(still, known=known), posed.metres_per_unit).known.depth_m is None
 
 
 def test_known_depth_gives_scale_and_ground(clip: Clip) -> None:

@@ -9,12 +9,14 @@ from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Suppress, subcomm
 
 from dreamdrive.cli.evaluate_consistency import consistency
 from dreamdrive.cli.evaluate_decomposition import decomposition
+from dreamdrive.cli.evaluate_geometry import geometry
 from dreamdrive.cli.evaluate_video import evaluate_video
 
 EVALUATIONS: dict[str, Callable[..., None]] = {
     "video": evaluate_video,
     "consistency": consistency,
     "decomposition": decomposition,
+    "geometry": geometry,
 }
 
 # As tyro does for the commands themselves; a union needs a second member where there is one command only.

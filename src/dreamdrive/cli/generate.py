@@ -26,7 +26,7 @@ def generate(
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     poses: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    geometry_files: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    geometry_files: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
@@ -51,9 +51,10 @@ def generate(
         frames: Frames of the input to use, counted from 0.
         fps: Rate of the input, before the step of --frames.
         size: Size of the frames; without it 480 wide.
-        intrinsics: Calibration of the camera as JSON, for the size of the input.
+        intrinsics: Calibration of the camera: JSON for the size of the input, COLMAP model, transforms.json.
         poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
-        geometry_files: Folder with known cameras and depth: cameras.json and depth/NNNN.npz or .png.
+        geometry_files: Known cameras, poses and depth, a file or its folder: COLMAP model, nerfstudio's
+            transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see docs/geometry_files.md.
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         hold_out: Withhold every N-th frame to measure how well it is predicted.

@@ -6,7 +6,9 @@ from math import isfinite, radians, tan
 from pathlib import Path
 from typing import Any, Literal, cast
 
+from dreamdrive.data.camera_models import LensCamera, model_cameras
 from dreamdrive.data.distortion import Distortion
+from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -59,21 +61,25 @@ def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibr
 def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
     """Read a calibration file: JSON with ``width``, ``height``, ``intrinsics`` and optional ``distortion``.
 
-    The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy.
+    The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy. A
+    COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``camera_models``.
 
     Args:
-        path: The file; a clip's ``meta.json`` is one.
+        path: The file, such as a clip's ``meta.json``, or a folder with a COLMAP model.
         size: Width and height of the source; another size of the same aspect scales the calibration.
 
     Raises:
         InputError: The file is missing, malformed, or for images of another shape.
     """
+    cameras = model_cameras(path, "--intrinsics")
+    if cameras is not None:
+        return _of_model(cameras, path, size)
     values = read_json(path, "--intrinsics")
     pinhole = values.get("intrinsics")
     if not isinstance(pinhole, dict):
         raise InputError(
             f"--intrinsics {path} holds no calibration; expected JSON with width, height and "
-            'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
+            'intrinsics {"fx", "fy", "cx", "cy"} in pixels, a COLMAP model or a transforms.json'
         )
     pinhole = cast("dict[str, Any]", pinhole)
     width, height = (_number(path, values, name) for name in ("width", "height"))
@@ -83,35 +89,35 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
             f"--intrinsics {path}: expected positive sizes and focal lengths and a principal point inside "
             f"the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}"
         )
-    notes: list[str] = []
-    if (width, height) != size:
-        if abs(width / height * size[1] / size[0] - 1) > _ASPECT_TOLERANCE:
-            raise InputError(
-                f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
-                f"{size[0]}x{size[1]}, another shape; give the calibration of this input"
-            )
-        notes.append(f"The calibration is scaled from {width:g}x{height:g} to {size[0]}x{size[1]}.")
+    notes = _scaled(path, (width, height), size)
     sx, sy = size[0] / width, size[1] / height
     camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
     distortion = _distortion(path, values.get("distortion"), notes)
     return Calibration(camera, distortion, True, tuple(notes))
 
 
-def read_json(path: Path, option: str) -> dict[str, Any]:
-    """The JSON object in a file.
+def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> Calibration:
+    if len(cameras) > 1:
+        raise InputError(
+            f"--intrinsics {path} holds {len(cameras)} different cameras; expected one for all frames: let "
+            "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
+        )
+    camera = cameras[0].camera
+    notes = _scaled(path, (camera.width_px, camera.height_px), size)
+    return Calibration(camera.resized(*size), cameras[0].distortion, True, tuple(notes))
 
-    Raises:
-        InputError: The file is missing or holds something else.
-    """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{option} {path} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"{option} {path} is not JSON: {error}") from error
-    if not isinstance(values, dict):
-        raise InputError(f"{option} {path}: expected a JSON object, got a {type(values).__name__}")
-    return cast("dict[str, Any]", values)
+
+def _scaled(path: Path, made_for: tuple[float, float], size: tuple[int, int]) -> list[str]:
+    """What to say where a calibration is for images of another size."""
+    (width, height), (wide, high) = made_for, size
+    if made_for == size:
+        return []
+    if abs(width / height * high / wide - 1) > _ASPECT_TOLERANCE:
+        raise InputError(
+            f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
+            f"{wide}x{high}, another shape; give the calibration of this input"
+        )
+    return [f"The calibration is scaled from {width:g}x{height:g} to {wide}x{high}."]
 
 
 def _number(path: Path, values: dict[str, Any], name: str) -> float:

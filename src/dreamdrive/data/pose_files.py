@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.data.intrinsics import read_json
+from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 
 FORMATS = (
@@ -110,7 +110,7 @@ def _table(text: str, where: str) -> PoseRows:
     if table.shape[1] == 12:
         poses = np.tile(np.eye(4), (len(table), 1, 1))
         poses[:, :3] = table.reshape(-1, 3, 4)
-        return PoseRows(_rigid(poses, where, name), None)
+        return PoseRows(clean_poses(poses, where, name), None)
     return PoseRows(_from_quaternions(table[:, 1:], where, name), _times(table[:, 0], where, name))
 
 
@@ -123,11 +123,11 @@ def _from_quaternions(
     poses = np.tile(np.eye(4), (len(table), 1, 1))
     poses[:, :3, :3] = Rotation.from_quat(table[:, 3:]).as_matrix()
     poses[:, :3, 3] = table[:, :3]
-    return _rigid(poses, where, name)
+    return clean_poses(poses, where, name)
 
 
 def _trajectory(values: dict[str, Any], where: str) -> PoseRows:
-    poses = _rigid(_array(values["world_from_camera"], where), where, _pose_name)
+    poses = clean_poses(_array(values["world_from_camera"], where), where, _pose_name)
     times = _array(values.get("times_s", []), where)
     if times.shape != (len(poses),):
         raise InputError(
@@ -144,7 +144,7 @@ def _pandaset(values: dict[str, Any], where: str, camera: str | None) -> PoseRow
             "name the input folder like its camera"
         )
     entry = cast("dict[str, Any]", cameras[camera] if isinstance(cameras[camera], dict) else {})
-    poses = _rigid(_array(entry.get("camera_to_world", []), where), where, _pose_name)
+    poses = clean_poses(_array(entry.get("camera_to_world", []), where), where, _pose_name)
     frames = _array(entry.get("frames", list(range(len(poses)))), where)
     if frames.ndim != 1 or not len(frames) or not np.isin(frames, np.arange(len(poses))).all():
         raise InputError(f"{where}: frames of {camera}: expected a list of indices of its {len(poses)} poses")
@@ -169,10 +169,19 @@ def _times(times: Float[np.ndarray, " n"], where: str, name: Callable[[int], str
     return times
 
 
-def _rigid(
+def clean_poses(
     poses: Float[np.ndarray, "..."], where: str, name: Callable[[int], str]
 ) -> Float[np.ndarray, "n 4 4"]:
-    """Check each pose and take the rounding of the file out of its rotation."""
+    """Check each pose and take the rounding of the file out of its rotation.
+
+    Args:
+        poses: As they stand in the file.
+        where: How messages call the file.
+        name: How messages call a pose, by its row.
+
+    Raises:
+        InputError: They are no 4x4 matrices, or one holds NaN or is not rigid.
+    """
     if poses.ndim != 3 or poses.shape[1:] != (4, 4) or not len(poses):
         raise InputError(f"{where}: the poses have the shape {poses.shape}; expected (N, 4, 4), N at least 1")
     for index in np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2))).tolist():

@@ -43,6 +43,7 @@ def read_poses(
     index: Int[np.ndarray, " f"],
     times_s: Float[np.ndarray, " f"],
     count: Callable[[], int],
+    option: str = "--poses",
 ) -> tuple[Float[np.ndarray, "f 4 4"], tuple[str, ...]]:
     """The poses of the selected frames, in the frame of the first of them, and notes for the report.
 
@@ -55,11 +56,12 @@ def read_poses(
         index: Index of each selected frame in the source.
         times_s: Time of each selected frame since frame 0 of the source.
         count: Number of frames in the source; called only where it decides.
+        option: How messages call the file.
 
     Raises:
         InputError: The file is malformed or its poses fit the frames in no way.
     """
-    rows = read_pose_file(path, "--poses", camera)
+    rows = read_pose_file(path, option, camera)
     notes: tuple[str, ...] = ()
     if len(rows) == len(index):
         chosen = np.arange(len(index))
@@ -67,11 +69,11 @@ def read_poses(
         chosen = np.asarray(index)
     elif rows.times_s is None:
         raise InputError(
-            f"--poses {path} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of them "
-            "selected; expected one pose per frame of the input or per selected frame"
+            f"{option} {path} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of "
+            "them selected; expected one pose per frame of the input or per selected frame"
         )
     else:
-        chosen, notes = _by_time(path, rows.times_s, index, times_s)
+        chosen, notes = _by_time(f"{option} {path}", rows.times_s, index, times_s)
     return to_first(rows.world_from_camera[chosen]), notes
 
 
@@ -87,7 +89,7 @@ def to_first(poses: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "f 4 4"]:
 
 
 def _by_time(
-    path: Path,
+    where: str,
     rows_s: Float[np.ndarray, " n"],
     index: Int[np.ndarray, " f"],
     times_s: Float[np.ndarray, " f"],
@@ -102,7 +104,7 @@ def _by_time(
             return chosen, notes
         worst = min(worst, float(gap.max()))
     raise InputError(
-        f"--poses {path}: its {len(rows_s)} poses (times {rows_s[0]:g} to {rows_s[-1]:g} s) do not meet the "
+        f"{where}: its {len(rows_s)} poses (times {rows_s[0]:g} to {rows_s[-1]:g} s) do not meet the "
         f"{len(index)} selected frames ({times_s[0]:g} to {times_s[-1]:g} s): a frame lies {worst:.3g} s "
         f"from the nearest pose, at most half a frame ({period_s / 2:.3g} s) is allowed; is --fps right?"
     )

@@ -15,16 +15,20 @@ class Known:
     """What the input itself says about the geometry; each field may be absent.
 
     Attributes:
-        world_from_camera: Poses (F, 4, 4) in metres.
+        world_from_camera: Poses (F, 4, 4) in metres, unless ``metric`` says otherwise.
         intrinsics: Whether the rig's focal length and principal point are calibrated (not guessed).
         depth_m: Depth along z (F, H, W) in metres; 0 where unknown.
         sky: Sky masks (F, H, W).
+        metric: Whether poses, depth and points are in metres; otherwise all share a unit that is not known.
+        points: Sparse points of the street (P, 3), in the world of the poses.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
     intrinsics: bool = False
     depth_m: Float[np.ndarray, "f h w"] | None = None
     sky: Bool[np.ndarray, "f h w"] | None = None
+    metric: bool = True
+    points: Float[np.ndarray, "p 3"] | None = None
 
 
 @dataclass(frozen=True)

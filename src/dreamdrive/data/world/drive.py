@@ -68,7 +68,7 @@ class Drive:
         flow_px: Way of each point to its place in the next frame (F, H, W, 2), the last to one not drawn.
         boxes: Hulls of all road users.
         ground: The road plane.
-        world: The street, for views from elsewhere.
+        layout: What the street is made from.
         world_from_map: Pose (4, 4) of the layout's frame.
     """
 
@@ -82,7 +82,7 @@ class Drive:
     flow_px: Float[np.ndarray, "f h w 2"]
     boxes: tuple[WorldBox, ...]
     ground: Ground
-    world: World
+    layout: Layout
     world_from_map: Float[np.ndarray, "4 4"]
 
     @property
@@ -94,6 +94,11 @@ class Drive:
     def trajectory(self) -> Trajectory:
         """The path of the camera."""
         return Trajectory(np.stack([c.world_from_camera for c in self.cameras]), self.times_s)
+
+    @cached_property
+    def world(self) -> World:
+        """The street, for views from elsewhere; one that was read is built when it is first looked at."""
+        return World(self.layout)
 
     @cached_property
     def map_from_world(self) -> Float[np.ndarray, "4 4"]:
@@ -170,7 +175,7 @@ def drive(
     world_from_map = np.linalg.inv(poses[0])
     # The product of the first pose with its inverse is the identity only up to rounding; say it exactly.
     cameras = [pinhole, *(pinhole.at(world_from_map @ pose) for pose in poses[1:-1])]
-    return Drive(
+    made = Drive(
         frames=np.stack([v.frame for v in seen]),
         times_s=times[:-1],
         cameras=tuple(cameras),
@@ -181,9 +186,11 @@ def drive(
         flow_px=np.stack([v.flow_px for v in seen]),
         boxes=_boxes(world, times[:-1], world_from_map),
         ground=road_plane(world_from_map),
-        world=world,
+        layout=layout,
         world_from_map=world_from_map,
     )
+    vars(made)["world"] = world  # it is there already
+    return made
 
 
 def make_street(

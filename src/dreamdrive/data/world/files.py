@@ -13,7 +13,6 @@ from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
 from dreamdrive.data.world.drive import Drive, WorldBox, road_plane
 from dreamdrive.data.world.materials import Semantic
-from dreamdrive.data.world.world import World
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.camera import Camera
@@ -43,9 +42,9 @@ def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = Fals
     if len(first.boxes) > 255:
         raise ValueError(f"world: {len(first.boxes)} boxes do not fit 8-bit labels")
     with new_folder(path, replace=replace, mark="layout.json") as folder:
-        write_layout(first.world.layout, folder / "layout.json")
+        write_layout(first.layout, folder / "layout.json")
         seconds = float(first.times_s[-1])
-        _write_png(folder / "layout.png", draw_layout(first.world.layout, seconds)[..., ::-1])
+        _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
         _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
@@ -95,7 +94,7 @@ def _read_camera(folder: Path, layout: Layout) -> Drive:
         flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
         boxes=tuple(_box(values, len(times_s)) for values in hulls["boxes"]),
         ground=road_plane(world_from_map),
-        world=World(layout),
+        layout=layout,
         world_from_map=world_from_map,
     )
 

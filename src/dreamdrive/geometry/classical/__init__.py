@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical.dense import Dense, densify
+from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -16,7 +17,7 @@ def reconstruct(
     if weights is not None:
         raise InputError(f"geometry classical has no network and takes no weights; got {weights}")
     posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
-    return assemble(clip, posed, densify(clip, posed))
+    return assemble(clip, posed, densify(in_metres(clip, posed.metres_per_unit), posed))
 
 
 def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:

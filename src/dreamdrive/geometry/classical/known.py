@@ -1,5 +1,7 @@
 """What known depth says about scale and road."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -51,3 +53,11 @@ def depth_ratios(
         ratios.append((known / local[inside, 2])[known > 0])
     joined = np.concatenate(ratios)
     return joined if len(joined) >= MIN_RATIOS else np.zeros(0)
+
+
+def in_metres(clip: Clip, metres_per_unit: float | None) -> Clip:
+    """The clip with its known depth in metres; without depth where nothing makes metres of its unit."""
+    if metres_per_unit == 1 or clip.known.depth_m is None:
+        return clip
+    depth = None if metres_per_unit is None else clip.known.depth_m * np.float32(metres_per_unit)
+    return replace(clip, known=replace(clip.known, depth_m=depth))

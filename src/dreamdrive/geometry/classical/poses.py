@@ -37,6 +37,7 @@ class Posed:
         fallback: Why structure from motion was not used, in words, or None.
         detected: What was noticed, a sentence each.
         details: Figures, as JSON values.
+        metres_per_unit: What makes metres of known depth; ``None`` where its unit stays unknown.
     """
 
     cameras: tuple[Camera, ...]
@@ -49,6 +50,7 @@ class Posed:
     fallback: str | None
     detected: tuple[str, ...]
     details: dict[str, Any] = field(default_factory=dict)
+    metres_per_unit: float | None = 1.0
 
 
 def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Posed:
@@ -70,6 +72,8 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
     if clip.known.world_from_camera is not None:
+        if not clip.known.metric:
+            return _from_unscaled(clip, evidence, camera_height_m, seed)
         return _from_known(clip, evidence, camera_height_m, seed)
     if evidence.motion.tracks < MIN_TRACKS and len(clip) > 1:
         reason = "the frames are too dark or too blank to follow anything: the camera is taken to stand still"
@@ -124,18 +128,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
 
 def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
     """The user's poses, moved so that the first frame's camera is the world; the road is only looked for."""
-    assert clip.known.world_from_camera is not None
-    points = depth_points(clip)
-    poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    one_camera = clip.camera == clip.camera[0]
-    street = Street(
-        evidence.grey[one_camera],
-        evidence.street[one_camera],
-        clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px),
-        poses[one_camera],
-        points,
-        clip.times_s[one_camera],
-    )
+    street = _known_street(clip, evidence)
     plane, _ = scale.find_ground(street, seed, scale.KNOWN_HEIGHTS_M)
     ground = None if plane is None else Ground(plane.normal, plane.offset)
     metric = Metric(1.0, ground, Scale("poses", 0.0), ())
@@ -144,7 +137,51 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
         notes.append(
             f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m"
         )
-    posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, {})
+    return _with_known(clip, evidence, metric, notes)
+
+
+def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
+    """The user's poses in an unknown unit: the road, or an assumed speed, makes metres of it.
+
+    Of a camera that stands still the path is noise, and no scale can be read from it: neither poses nor depth
+    are used.
+    """
+    if evidence.motion.standing:
+        known = replace(clip.known, world_from_camera=None, depth_m=None, points=None)
+        reason = "the camera stands still: the given poses and depth, in an unknown unit, are not used"
+        posed = _standing(replace(clip, known=known), evidence, height_m, reason)
+        return replace(posed, metres_per_unit=None)
+    street = _known_street(clip, evidence)
+    metric = scale.from_ground(street, height_m, clip.known.intrinsics, seed)
+    notes = ["the given poses are used; their unit is not known and scaled to metres", *metric.notes]
+    posed = _with_known(clip, evidence, metric, notes)
+    return replace(posed, metres_per_unit=metric.factor)
+
+
+def _known_street(clip: Clip, evidence: Evidence) -> Street:
+    """The frames of the first frame's camera with the known poses, in these poses' unit."""
+    assert clip.known.world_from_camera is not None
+    points = depth_points(clip)
+    if clip.known.points is not None:
+        points = np.concatenate([points, clip.known.points])
+    poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
+    one_camera = clip.camera == clip.camera[0]
+    return Street(
+        evidence.grey[one_camera],
+        evidence.street[one_camera],
+        clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px),
+        poses[one_camera],
+        points,
+        clip.times_s[one_camera],
+    )
+
+
+def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
+    assert clip.known.world_from_camera is not None
+    poses, _ = rebase(clip.known.world_from_camera.astype(np.float64), np.zeros((0, 3)))
+    poses[:, :3, 3] *= metric.factor
+    details = {} if clip.known.metric else {"metres_per_unit": metric.factor}
+    posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, details)
     return replace(posed, standing=evidence.motion.standing and _path_m(poses) < 0.5)
 
 

@@ -89,7 +89,7 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
         focal_observed=aligned.focal_observed,
         depth=np.where(there, depth, 0).astype(np.float32),
         confidence=confidence,
-        unit=None if clip.known.world_from_camera is None else "poses",
+        unit="poses" if clip.known.metric and clip.known.world_from_camera is not None else None,
         notes=tuple(notes),
         details={
             "pairs_residual": float(np.median(aligned.residual)),

@@ -105,7 +105,7 @@ SCALED = (2 * np.tile(np.eye(4), (20, 1, 1))).tolist()
         (broken(frames="all"), "cameras.json"),
         (broken(frames=[float("inf")] * 20), "cameras.json"),
         (broken(width=float("inf")), "cameras.json"),
-        ([1, 2], "expected an object"),
+        ([1, 2], "expected a JSON object"),
     ],
 )
 def test_bad_cameras_are_refused_with_a_reason(tmp_path, content, words):

@@ -1,0 +1,199 @@
+"""What a recording knows of its own geometry: poses, calibration, lidar points, boxes of what moves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.data.intrinsics import read_json
+from dreamdrive.data.pose_files import read_pose_file
+from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import Camera
+
+_PNG_PER_M = 256.0
+"""Grey levels a metre in KITTI's 16-bit depth pictures."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points of one frame with known depth.
+
+    Attributes:
+        place_px: Column and row (N, 2) at the recording's size; the centre of the first pixel is (0.5, 0.5).
+        depth_m: Depth along z (N,), positive.
+        moving: Whether each lies in the box of something that moves (N,).
+    """
+
+    place_px: Float[np.ndarray, "n 2"]
+    depth_m: Float[np.ndarray, " n"]
+    moving: Bool[np.ndarray, " n"]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a recording's folder says about the geometry of its frames.
+
+    Attributes:
+        world_from_camera: One pose a frame (N, 4, 4).
+        size: Width and height of the frames in pixels.
+        pinhole: Their calibration; None where there is none.
+        depth_files: File with the points of a frame, by its index.
+        boxes: Boxes of what moves, by the index of the frame; None where nothing says what moves.
+    """
+
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    size: tuple[int, int]
+    pinhole: Camera | None
+    depth_files: Mapping[int, Path]
+    boxes: Mapping[int, Sequence[Mapping[str, Any]]] | None
+
+    def points(self, frame: int) -> Points:
+        """The points of a frame, from its file.
+
+        Raises:
+            InputError: The file is damaged or holds something else.
+        """
+        path = self.depth_files[frame]
+        u, v, depth_m = _picture(path, self.size) if path.suffix == ".png" else _table(path)
+        place_px = np.column_stack([u, v]) + 0.5
+        moving = np.zeros(len(depth_m), dtype=bool)
+        if self.boxes is not None and self.pinhole is not None:
+            camera = self.pinhole.at(self.world_from_camera[frame])
+            points = _lifted(camera, place_px, depth_m)
+            for box in self.boxes.get(frame, ()):
+                moving |= _inside(points, box)
+        return Points(place_px, depth_m, moving)
+
+
+def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
+    """A folder like PandaSet's: ``cameras.json``, and ``lidar_depth_NAME`` and ``cuboids.json`` where given.
+
+    Args:
+        folder: The recording.
+        camera: The one whose frames are asked for, ``NAME_camera``: the name of the scene's input.
+
+    Raises:
+        InputError: The file is damaged or knows no such camera.
+    """
+    file = folder / "cameras.json"
+    poses = read_pose_file(file, "--truth", camera).world_from_camera
+    try:
+        entry: dict[str, Any] = read_json(file, "--truth")["cameras"][camera]
+        size = int(entry["width"]), int(entry["height"])
+        (fx, _, cx), (_, fy, cy), _ = np.array(entry["K"], dtype=np.float64).tolist()
+        pinhole = _pinhole(fx, fy, cx, cy, size)
+        sweeps = [int(i) for i in entry.get("frames", range(len(poses)))]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"--truth {file}: {camera} has no usable width, height and K ({error!r}); expected pixels and a "
+            "3x3 matrix"
+        ) from error
+    place = {sweep: frame for frame, sweep in enumerate(sweeps)}
+    lidar = _numbered(folder / f"lidar_depth_{str(camera).removesuffix('_camera')}")
+    files = {place[sweep]: path for sweep, path in lidar.items() if sweep in place}
+    return Recorded(poses, size, pinhole, files, _boxes(folder / "cuboids.json", sweeps))
+
+
+def read_poses_txt(folder: Path) -> Recorded:
+    """A folder with ``poses.txt`` (KITTI or TUM), ``meta.json`` and, where there is one, ``lidar_depth``.
+
+    Raises:
+        InputError: A file is missing, damaged or holds something else.
+    """
+    poses = read_pose_file(folder / "poses.txt", "--truth").world_from_camera
+    file = folder / "meta.json"
+    meta = read_json(file, "--truth")
+    try:
+        size, k = (int(meta["width"]), int(meta["height"])), meta.get("intrinsics")
+        pinhole = None if k is None else _pinhole(k["fx"], k["fy"], k["cx"], k["cy"], size)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"--truth {file} is unusable ({error!r}); expected JSON with width, height and, where known, "
+            'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
+        ) from error
+    return Recorded(poses, size, pinhole, _numbered(folder / "lidar_depth"), None)
+
+
+def _pinhole(fx: float, fy: float, cx: float, cy: float, size: tuple[int, int]) -> Camera:
+    """Files count pixels by integer index: the centre of the first one is 0."""
+    return Camera(float(fx), float(fy), float(cx) + 0.5, float(cy) + 0.5, *size)
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
+    """Files with points by the number that is their name; none where there is no folder."""
+    files = sorted(folder.glob("*")) if folder.is_dir() else []
+    return {int(f.stem): f for f in files if f.suffix in (".npz", ".png") and f.stem.isdecimal()}
+
+
+def _boxes(path: Path, sweeps: Sequence[int]) -> dict[int, list[dict[str, Any]]] | None:
+    """Boxes of what moves, by frame: so labelled, or without a label of motion but not stationary."""
+    if not path.is_file():
+        return None
+    try:
+        frames = read_json(path, "--truth")["frames"]
+        found = {frame: [b for b in frames[sweep] if _moves(b)] for frame, sweep in enumerate(sweeps)}
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InputError(
+            f"--truth {path} is damaged ({error!r}); expected frames, each a list of boxes with motion, "
+            "position, size_wlh and yaw: take it away to do without what moves"
+        ) from error
+    return found
+
+
+def _moves(box: Mapping[str, Any]) -> bool:
+    for name in ("position", "size_wlh", "yaw"):
+        np.asarray(box[name], dtype=np.float64)
+    motion = box.get("motion")
+    return motion == "Moving" or (motion is None and box.get("stationary") is False)
+
+
+def _inside(points: Float[np.ndarray, "n 3"], box: Mapping[str, Any]) -> Bool[np.ndarray, " n"]:
+    """Which points in the world, z up, lie in a box; its length lies along y at yaw 0."""
+    c, s = np.cos(box["yaw"]), np.sin(box["yaw"])
+    world_from_box = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    local = (points - np.asarray(box["position"])) @ world_from_box
+    within = np.abs(local) <= np.asarray(box["size_wlh"]) / 2
+    return within[:, 0] & within[:, 1] & within[:, 2]
+
+
+def _lifted(
+    camera: Camera, place_px: Float[np.ndarray, "n 2"], depth_m: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3"]:
+    """Points in the world from their places in the picture."""
+    x = (place_px[:, 0] - camera.cx_px) / camera.fx_px
+    y = (place_px[:, 1] - camera.cy_px) / camera.fy_px
+    local = np.column_stack([x, y, np.ones_like(x)]) * depth_m[:, None]
+    return local @ camera.world_from_camera[:3, :3].T + camera.world_from_camera[:3, 3]
+
+
+def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns, rows and depths as stored, places by integer pixel index."""
+    try:
+        with np.load(path) as stored:
+            u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
+    except (OSError, KeyError, ValueError, BadZipFile) as error:
+        raise InputError(f"{path} cannot be read ({error}); expected arrays u, v and depth") from error
+    usable = u.ndim == 1 and u.shape == v.shape == depth.shape and np.isfinite([u, v, depth]).all()
+    if not usable or not (depth > 0).all():
+        raise InputError(
+            f"{path} holds u, v and depth of shapes {u.shape}, {v.shape} and {depth.shape}; expected three "
+            "equally long lists of finite numbers, depths above 0"
+        )
+    return u, v, depth
+
+
+def _picture(path: Path, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of a picture of depth, 0 where there is none."""
+    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if picture is None or picture.dtype != np.uint16 or picture.shape != (size[1], size[0]):
+        got = "nothing readable" if picture is None else f"{picture.dtype} of shape {picture.shape}"
+        raise InputError(
+            f"{path} holds {got}; expected 16 bits of grey, 256 levels a metre, {size[0]}x{size[1]} pixels"
+        )
+    v, u = np.nonzero(picture)
+    return u.astype(np.float64), v.astype(np.float64), picture[v, u] / _PNG_PER_M

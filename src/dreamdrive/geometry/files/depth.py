@@ -1,0 +1,121 @@
+"""Depth files: npz, npy, EXR and 16-bit PNG.
+
+All hold depth along z (not along the ray), 0 where it is unknown, the first row at the top.
+"""
+
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Shaped
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.files.declared import NAME, Declared
+from dreamdrive.geometry.files.given import DepthFiles
+
+ENDINGS = (".npz", ".npy", ".exr", ".png")
+_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R", "RGB", "RGBA")
+_MILLIMETRE = 0.001
+
+
+def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> DepthFiles:
+    """The depth files in ``folder``, called like ``labels``, one label for each selected frame."""
+    of: dict[int, Path] = {}
+    for row, label in enumerate(labels):
+        found = next((path for end in ENDINGS if (path := folder / f"{label}{end}").is_file()), None)
+        if found is not None:
+            of[row] = found
+    return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit)
+
+
+def read_depth(path: Path, unit: float | None) -> tuple[Float[np.ndarray, "h w"], str | None]:
+    """Depth in metres, or in the unit of the poses, and the unit that was taken without being declared.
+
+    Args:
+        path: The file.
+        unit: What the stored number 1 means; ``None`` is millimetres for a PNG, metres for floats.
+
+    Raises:
+        InputError: The file is damaged, or no depth: negative, NaN, infinite, whole numbers without a unit.
+    """
+    stored, sure = _READERS[path.suffix.lower()](path)
+    if stored.ndim != 2 or stored.size == 0 or stored.dtype.kind not in "fiu":
+        raise InputError(f"{path}: holds {stored.dtype} of shape {stored.shape}, expected (height, width)")
+    said = None
+    if sure:
+        unit = 1.0
+    elif unit is None:
+        unit, said = _usual_unit(path, stored)
+    depth = stored.astype(np.float32)
+    if not np.isfinite(depth).all() or (depth < 0).any():
+        raise InputError(f"{path}: holds negative, NaN or infinite depth; write 0 where there is none")
+    return depth * np.float32(unit), said
+
+
+def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"]) -> tuple[float, str]:
+    if path.suffix.lower() == ".png":
+        return _MILLIMETRE, "millimetres"
+    if np.issubdtype(stored.dtype, np.floating):
+        return 1.0, "metres"
+    raise InputError(
+        f"{path}: holds whole numbers ({stored.dtype}), whose unit cannot be known; write "
+        f'{{"depth_unit": "mm"}} (or "m", "1/256 m") into {NAME} beside the poses'
+    )
+
+
+def _read_npz(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
+    """The array ``depth_m`` (in metres for sure) or ``depth``."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            name = "depth" if "depth" in archive and "depth_m" not in archive else "depth_m"
+            return np.asarray(archive[name]), name == "depth_m"
+    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
+        raise InputError(
+            f"{path}: cannot be read as an npz with an array depth_m or depth ({error})"
+        ) from error
+
+
+def _read_npy(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
+    try:
+        stored = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: cannot be read as an npy ({error})") from error
+    if not isinstance(stored, np.ndarray):
+        raise InputError(f"{path}: is an npz called npy; call it .npz")
+    return (stored[..., 0] if stored.ndim == 3 and stored.shape[2] == 1 else stored), False
+
+
+def _read_png(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint16 or image.ndim != 2:
+        raise InputError(f"{path}: expected a grey PNG of 16 bits with depth, 0 where unknown")
+    return np.asarray(image), False
+
+
+def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
+    # OpenCV's wheels come without OpenEXR since 5.0, and before only read it when told by the environment.
+    try:
+        import OpenEXR  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            f"{path}: EXR files are read by the package OpenEXR, which is not installed; "
+            "pip install 'dreamdrive[exr]', or give the depth as .npz"
+        ) from None
+    try:
+        with OpenEXR.File(str(path)) as file:
+            channels: dict[str, Any] = {name: each.pixels for name, each in file.channels().items()}
+    except (OSError, RuntimeError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: cannot be read as EXR ({error})") from error
+    name = next((name for name in _EXR_CHANNELS if name in channels), None)
+    if name is None and len(channels) == 1:
+        name = next(iter(channels))
+    if name is None:
+        raise InputError(f"{path}: has the channels {', '.join(channels)}; expected Z, V, Y or a single one")
+    pixels = np.asarray(channels[name])
+    return (pixels[..., 0] if pixels.ndim == 3 else pixels), False
+
+
+_READERS = {".npz": _read_npz, ".npy": _read_npy, ".exr": _read_exr, ".png": _read_png}

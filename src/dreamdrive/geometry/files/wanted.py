@@ -1,0 +1,123 @@
+"""The selected frames of a clip, as readers look for them in a file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.data.images import ImageFolder, natural_key
+from dreamdrive.data.source import open_source
+from dreamdrive.errors import InputError
+from dreamdrive.scene.clip import Clip
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is known of the frames for which geometry is wanted.
+
+    Attributes:
+        index: Index of each selected frame in the source (F,).
+        times_s: Time of each selected frame since frame 0 of the source (F,).
+        names: File name of each selected frame, where the source is a folder of images.
+        folder: Name of the source.
+        picture: Width and height of the source's pictures; the clip's own where they are not known.
+        count: Number of frames in the source; may take as long as decoding it.
+    """
+
+    index: Int[np.ndarray, " f"]
+    times_s: Float[np.ndarray, " f"]
+    names: tuple[str, ...] | None
+    folder: str
+    picture: tuple[int, int]
+    count: Callable[[], int]
+
+    @staticmethod
+    def of(clip: Clip, source: Path | None) -> "Wanted":
+        """The frames of a clip.
+
+        Args:
+            clip: The clip.
+            source: The recording that it was read from; ``None`` looks where the clip says that it came from.
+        """
+        about = clip.provenance
+        index = np.asarray(clip.source_index)
+        period = float(np.median(np.diff(clip.times_s) / np.diff(index))) if len(index) > 1 else 0.0
+        picture = tuple(map(int, about.get("source_size", clip.size)))
+        times_s = clip.times_s + period * index[0]
+        # A drawn clip has no recording: its frames are all there are.
+        if about.get("kind") not in ("video", "images"):
+            return Wanted(index, times_s, None, "", (picture[0], picture[1]), lambda: int(index.max()) + 1)
+        path = source or Path(about["input"])
+        names = None
+        if about["kind"] == "images":
+            folder = open_source(path)
+            assert isinstance(folder, ImageFolder)
+            names = tuple(folder.files[int(i)].name for i in index)
+        return Wanted(
+            index,
+            times_s,
+            names,
+            path.resolve().name,
+            (picture[0], picture[1]),
+            lambda: open_source(path).count(),
+        )
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """How files that belong to single frames are called: as the image, or its index in four digits."""
+        if self.names is None:
+            return tuple(f"{int(i):04d}" for i in self.index)
+        return tuple(PurePosixPath(name).stem for name in self.names)
+
+    def rows(self, names: Sequence[str], where: str) -> tuple[Int[np.ndarray, " f"], tuple[str, ...]]:
+        """The row of each selected frame in a list of named pictures, and what to say about it.
+
+        Names decide, without their folders and then without their endings. Where none is that of a selected
+        frame the natural order of the names counts, if there is one for each frame of the source or for each
+        selected frame.
+
+        Raises:
+            InputError: Some frames are not in the list, or it has neither of these lengths.
+        """
+        found = [self._named(names, name, where) for name in self.names or ()]
+        if not any(row is not None for row in found):
+            return self._in_order(names, where)
+        missing = [name for name, row in zip(self.names or (), found, strict=True) if row is None]
+        if missing:
+            more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+            raise InputError(
+                f"{where} has no pose for {len(missing)} of the {len(found)} selected frames: "
+                f"{', '.join(missing[:8])}{more}; add them to the model or leave them out with --frames"
+            )
+        return np.array(found, np.intp), ()
+
+    def _named(self, names: Sequence[str], wanted: str, where: str) -> int | None:
+        paths = [PurePosixPath(name.replace("\\", "/")) for name in names]
+        rows = [row for row, path in enumerate(paths) if path.name == wanted]
+        stem = PurePosixPath(wanted).stem
+        rows = rows or [row for row, path in enumerate(paths) if path.stem == stem]
+        if len(rows) > 1:
+            rows = [row for row in rows if paths[row].parent.name == self.folder] or rows
+        if len(rows) > 1:
+            raise InputError(
+                f"{where} has several pictures called {wanted}: {', '.join(names[row] for row in rows[:4])}; "
+                "name the input folder like one of their folders"
+            )
+        return rows[0] if rows else None
+
+    def _in_order(self, names: Sequence[str], where: str) -> tuple[Int[np.ndarray, " f"], tuple[str, ...]]:
+        order = np.array(sorted(range(len(names)), key=lambda row: natural_key(names[row])), np.intp)
+        if len(order) == len(self.index):
+            meant, chosen = "selected frame", order
+        elif len(order) == self.count():
+            meant, chosen = "frame of the input", order[self.index]
+        else:
+            like = f", none of them called like the input's, such as {self.names[0]}" if self.names else ""
+            few = ", ".join(names[int(row)] for row in order[:3])
+            raise InputError(
+                f"{where} has poses for {len(names)} pictures ({few}){like}; expected one for each of the "
+                f"{self.count()} frames of the input or of the {len(self.index)} selected ones"
+            )
+        return chosen, (f"The pictures of {where} count in the order of their names, one for each {meant}.",)
