@@ -212,10 +212,10 @@ def _merge(
     log_scales = chosen.log_scales.numpy().copy()
     opacity = torch.full_like(chosen.logit_opacities, math.log(options.opacity / (1 - options.opacity)))
     actor = np.full(len(means), -1, dtype=np.int64)
-    short_s = np.full(len(means), 0.5 * interval)
-    lifespan = np.column_stack([clip.times_s[chosen.source_frame.numpy()], short_s])
-    translations, pivots, actors = [], [], []
     frames = chosen.source_frame.numpy()
+    lifespan = np.column_stack([clip.times_s[frames], np.full(len(means), 0.5 * interval)])
+    deviation_s = options.lifespan_frames * interval
+    translations, pivots, actors = [], [], []
     for c, path in enumerate(paths):
         if len(path.frames) < options.least_frames:
             continue
@@ -229,11 +229,11 @@ def _merge(
         means[rows] = centres + (means[rows] - centres) * stretch[:, None] - (places - places[middle])[where]
         log_scales[rows] += np.log(stretch)[:, None]
         actor[rows] = len(actors)
-        lifespan[rows, 1] = options.lifespan_frames * interval
+        lifespan[rows, 1] = deviation_s
         if options.lasting:
             glimpses = _glimpses(clip, geometry, path, places - places[middle], pixels[rows], frames[rows])
             span_s = float(clip.times_s[0]), float(clip.times_s[-1])
-            lifespan[rows] = lives(means[rows], where, glimpses, span_s, options.lifespan_frames * interval)
+            lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s)
         translations.append(offsets)
         pivots.append(places[middle])
         name = f"actor {len(actors)}"
