@@ -210,6 +210,6 @@ def test_the_lens_of_a_model_is_taken_out_of_the_frames(tmp_path: Path) -> None:
 def test_all_that_decides_over_the_geometry_decides_over_the_result(tmp_path: Path) -> None:
     path = tmp_path / "poses.txt"
     path.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
-    before = pipeline._digests(Control(), path)
+    before = pipeline._digests(Control(), path, None)
     (tmp_path / "geometry.json").write_text("{}")
-    assert pipeline._digests(Control(), path) != before
+    assert pipeline._digests(Control(), path, None) != before

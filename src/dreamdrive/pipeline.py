@@ -12,10 +12,11 @@ from dreamdrive.data import read_clip
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import backend_of, reconstruct
 from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
+from dreamdrive.hub import find_weights
 from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
@@ -48,7 +49,7 @@ def generate(
     prior: str | None = None,
     geometry_method: str = "classical",
     geometry_files: Path | None = None,
-    weights: Path | None = None,
+    weights: str | Path | None = None,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
     camera_height_m: float | None = None,
@@ -67,7 +68,7 @@ def generate(
         prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
         geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.files``.
-        weights: The network of that geometry method: a file, or the folder of its hub form.
+        weights: The network of that geometry method: a file or folder, or a name, see ``hub.find_weights``.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
@@ -84,6 +85,8 @@ def generate(
     """
     prior = prior or prior_of(control.path)
     choose_prior(prior)
+    network = None if weights is None else find_weights(weights)
+    backend_of(geometry_method, network)
     if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
     if control.path is not None and out.resolve() == control.path.resolve():
@@ -98,7 +101,7 @@ def generate(
         **_reading(control),
     }
     request = {
-        "digests": _digests(control, geometry_files, weights),
+        "digests": _digests(control, geometry_files, network),
         "options": options,
         "seed": control.seed,
     }
@@ -107,7 +110,7 @@ def generate(
     if workspace is None:
         return False
     stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-    _publish(workspace, stages, control, _make(stages, control, geometry_files, weights, request))
+    _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
     return True
 
 

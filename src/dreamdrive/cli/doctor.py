@@ -36,6 +36,7 @@ def doctor() -> None:
     table.add_row("GPU", _gpu())
     console = Console()
     console.print(table)
+    _geometry(console)
     missing += trouble
     for line in missing:
         console.print(f"missing: {line}", soft_wrap=True)
@@ -52,6 +53,24 @@ def _native() -> tuple[str, list[str]]:
         return "missing", [f"the native core cannot be loaded ({error}): run make install, which compiles it"]
     use_all_cores()
     return ", ".join(f"{name} {value}" for name, value in native_info().items()), []
+
+
+def _geometry(console: Console) -> None:
+    """What ``generate --geometry`` offers: nothing of it is needed but classical."""
+    try:
+        from dreamdrive.geometry import BACKENDS
+    except ImportError:
+        return
+    for backend in BACKENDS.values():
+        takes = "ready" if backend.weights is None else f"give --weights, {backend.weights}"
+        console.print(f"\n geometry {backend.name}: {backend.about}", highlight=False, soft_wrap=True)
+        for name, value in (
+            ("to use it", backend.missing_package() or takes),
+            ("memory", backend.memory),
+            ("licence", backend.licence),
+        ):
+            console.print(f"   {name}: {value}", highlight=False, soft_wrap=True)
+    console.print()
 
 
 def _gpu() -> str:

@@ -19,7 +19,7 @@ def generate(
         Literal["replay", "street-world"] | None, arg(metavar="NAME", help_behavior_hint="")
     ] = None,
     geometry: Annotated[Literal["classical", "dust3r"], arg(metavar="NAME")] = "classical",
-    weights: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
+    weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
@@ -46,7 +46,8 @@ def generate(
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
             it the input decides.
         geometry: How cameras and depth are found; dust3r takes --weights.
-        weights: Weights of the geometry's network; nothing is ever downloaded.
+        weights: Weights of the geometry's network: a file, a folder, or the name of a model that the hub's
+            cache holds. Nothing is ever downloaded.
         quality: How many steps the fits take.
         frames: Frames of the input to use, counted from 0.
         fps: Rate of the input, before the step of --frames.

@@ -3,12 +3,26 @@
 from pathlib import Path
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry import classical, dust3r
-from dreamdrive.geometry.protocol import Reconstruct
+from dreamdrive.geometry.classical import CLASSICAL
+from dreamdrive.geometry.dust3r import DUST3R
+from dreamdrive.geometry.protocol import Backend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-METHODS: dict[str, Reconstruct] = {"classical": classical.reconstruct, "dust3r": dust3r.reconstruct}
+BACKENDS: dict[str, Backend] = {backend.name: backend for backend in (CLASSICAL, DUST3R)}
+
+
+def backend_of(method: str, weights: Path | None = None) -> Backend:
+    """A way of getting geometry by its name, if it could start with these weights.
+
+    Raises:
+        InputError: The method is unknown, lacks weights or its package, or takes no weights.
+    """
+    if method not in BACKENDS:
+        raise InputError(f"Unknown geometry method {method!r}; choose from: {', '.join(BACKENDS)}.")
+    backend = BACKENDS[method]
+    backend.check(weights)
+    return backend
 
 
 def reconstruct(
@@ -19,18 +33,17 @@ def reconstruct(
     method: str = "classical",
     weights: Path | None = None,
 ) -> Geometry:
-    """Reconstruct a clip by a method of ``METHODS``; geometry given as files comes in by ``files.attach``.
+    """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
 
     Args:
-        clip: The frames and what is known of them.
+        clip: Frames, with what is known of their geometry.
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
         method: Name of the method.
         weights: The network's file or folder, for methods that have one.
 
     Raises:
-        InputError: The method is unknown, or lacks weights, or takes none.
+        InputError: See ``backend_of``; or the clip or the weights cannot be used.
     """
-    if method not in METHODS:
-        raise InputError(f"Unknown geometry method {method!r}; choose from: {', '.join(METHODS)}.")
-    return METHODS[method](clip, camera_height_m=camera_height_m, seed=seed, weights=weights)
+    backend = backend_of(method, weights)
+    return backend.reconstruct(clip, camera_height_m=camera_height_m, seed=seed, weights=weights)

@@ -81,7 +81,7 @@ def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip
 
 
 def test_weights_and_method_have_to_fit(clip: Clip, weights: Path, tmp_path: Path):
-    with pytest.raises(InputError, match="--weights FILE"):
+    with pytest.raises(InputError, match="--weights PATH"):
         reconstruct(clip, method="dust3r")
     with pytest.raises(InputError, match="takes no weights"):
         reconstruct(clip, weights=weights)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical.dense import Dense, densify
 from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
+from dreamdrive.geometry.protocol import Backend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -13,9 +13,7 @@ from dreamdrive.scene.geometry import Geometry
 def reconstruct(
     clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
 ) -> Geometry:
-    """Pose a clip and find its depth, see ``geometry.protocol``."""
-    if weights is not None:
-        raise InputError(f"geometry classical has no network and takes no weights; got {weights}")
+    """Pose a clip and find its depth, see ``geometry.protocol``; there is no network."""
     posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
     return assemble(clip, posed, densify(in_metres(clip, posed.metres_per_unit), posed))
 
@@ -44,3 +42,12 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         fallback=posed.fallback,
         details={**posed.details, **shares},
     )
+
+
+CLASSICAL = Backend(
+    name="classical",
+    reconstruct=reconstruct,
+    about="structure from motion (pycolmap), plane sweep, optical flow: no weights, no GPU",
+    licence="BSD-3-Clause (COLMAP), Apache-2.0 (OpenCV)",
+    memory="1.3 GB for 24 frames at 480x270",
+)

@@ -1,9 +1,17 @@
-"""DUSt3R (Wang et al. 2024): two images in, the points of both in the frame of the first out.
+"""DUSt3R (Wang et al., CVPR 2024): pointmaps of pairs of images, and one world from all of them.
 
 Written from the architecture as published; the weights are a file that the user has. Those of the authors
 are for research only (CC BY-NC-SA 4.0, and the terms of the data they were trained with).
 """
 
 from dreamdrive.geometry.dust3r.reconstruct import reconstruct
+from dreamdrive.geometry.protocol import Backend
 
-__all__ = ["reconstruct"]
+DUST3R = Backend(
+    name="dust3r",
+    reconstruct=reconstruct,
+    about="pointmaps of pairs of frames (DUSt3R), aligned",
+    licence="weights CC BY-NC-SA 4.0 and the terms of the data they were trained with: research only",
+    memory="2.3 GB of weights (512 models) and 25 MB a pair at 512x288; told before it starts",
+    weights="a model of DUSt3R, such as naver/DUSt3R_ViTLarge_BaseDecoder_512_dpt or its .pth",
+)

@@ -23,7 +23,6 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-LICENCE = "CC BY-NC-SA 4.0 and the terms of the data it was trained with: research only"
 _MOST_RESIDUAL = 0.2  # median relative miss of the pairs
 
 
@@ -41,11 +40,11 @@ def reconstruct(
         weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
 
     Raises:
-        InputError: Without weights, for fewer than two frames or several cameras, or where the weights or
-            what the network makes of the frames cannot be used.
+        InputError: No weights, fewer than two frames, several cameras, or weights or pointmaps that cannot be
+            used.
     """
     if weights is None:
-        raise InputError(f"geometry dust3r needs --weights FILE, a model of DUSt3R ({LICENCE})")
+        raise InputError("geometry dust3r needs the weights of its network")
     if len(clip) < 2 or len(clip.rig) > 1:
         raise InputError(
             f"geometry dust3r takes two frames or more of one camera; got {len(clip)} of {len(clip.rig)}"
