@@ -12,6 +12,7 @@ MIN_REGISTERED = 0.9
 MIN_POINTS, MIN_POINTS_A_FRAME = 600, 25
 MIN_SEEN = 60
 MAX_REPROJECTION_PX = 0.5
+WOBBLING_PX, STRETCH = 1.0, 3
 MIN_FORWARD = 0.9
 MAX_VARIATION = 0.6
 
@@ -30,6 +31,11 @@ class Verdict:
     figures: dict[str, Any]
     backwards: bool
 
+    @property
+    def wobbling(self) -> bool:
+        """Whether the frames are not quite pictures of one street, as those of generated video are not."""
+        return self.figures.get("reprojection_px", 0.0) > MAX_REPROJECTION_PX
+
 
 def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     """Test registration, support, fit and the plausibility of the steps.
@@ -37,18 +43,19 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
     steady
     length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise and its
-    length is far below the mean.
+    length is far below the mean. Where the frames wobble, their poses do: the direction is then that of
+    stretches of three steps.
     """
     registered = model.registered
     share = float(registered.mean())
     if not registered.any():
         return Verdict(("structure from motion placed no frame",), {"registered_share": 0.0}, False)
     seen = model.seen[registered].sum(axis=1)
+    wobbling = model.reprojection_px > MAX_REPROJECTION_PX
     forward, length = _steps(model.world_from_camera)
     judged = moving & np.isfinite(forward)
     backwards = bool(judged.any() and np.median(forward[judged]) < 0)
-    ahead = -forward if backwards else forward
-    least = float(ahead[judged].min()) if judged.any() else 1.0
+    least = _least_ahead(model.world_from_camera, moving, STRETCH if wobbling else 1, backwards)
     variation = _variation(length[judged])
     figures = {
         "registered_share": share,
@@ -65,7 +72,7 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     enough = min(MIN_POINTS, MIN_POINTS_A_FRAME * len(registered))
     if len(model.points) < enough and seen.min() < MIN_SEEN:
         reasons.append(f"only {len(model.points)} points, {seen.min()} in the poorest frame")
-    if model.reprojection_px > MAX_REPROJECTION_PX:
+    if model.reprojection_px > WOBBLING_PX:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")
     if least < MIN_FORWARD:
         reasons.append(
@@ -74,6 +81,18 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     if variation > MAX_VARIATION:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
     return Verdict(tuple(reasons), figures, backwards)
+
+
+def _least_ahead(
+    poses: Float[np.ndarray, "f 4 4"], moving: Bool[np.ndarray, " s"], stretch: int, backwards: bool
+) -> float:
+    """Least cosine of a stretch of so many moving steps with the optical axis."""
+    forward, _ = _steps(poses, stretch)
+    steps = np.lib.stride_tricks.sliding_window_view(moving, stretch).all(axis=1)
+    judged = forward[steps & np.isfinite(forward)]
+    if not len(judged):
+        return 1.0
+    return float((-judged if backwards else judged).min())
 
 
 def _variation(length: Float[np.ndarray, " s"]) -> float:
@@ -85,10 +104,10 @@ def _variation(length: Float[np.ndarray, " s"]) -> float:
     return float((length - trend * time).std() / length.mean())
 
 
-def _steps(poses: Float[np.ndarray, "f 4 4"]) -> tuple[np.ndarray, np.ndarray]:
-    """Cosine of each step with the optical axis, and its length."""
-    step = np.diff(poses[:, :3, 3], axis=0)
+def _steps(poses: Float[np.ndarray, "f 4 4"], apart: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Cosine of each way between frames so far apart with the optical axis, and its length."""
+    step = poses[apart:, :3, 3] - poses[:-apart, :3, 3]
     length = np.linalg.norm(step, axis=1)
-    axis = poses[:-1, :3, 2] + poses[1:, :3, 2]
+    axis = poses[:-apart, :3, 2] + poses[apart:, :3, 2]
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
     return (step * axis).sum(axis=1) / np.maximum(length, 1e-12), length

@@ -11,6 +11,7 @@ from jaxtyping import Bool, UInt8
 from dreamdrive.geometry.classical import features, gate, sfm
 from dreamdrive.geometry.classical.features import Features
 from dreamdrive.geometry.classical.focal import Settled, settle
+from dreamdrive.geometry.classical.sfm import Model
 from dreamdrive.scene.camera import Camera
 
 MIN_FRAMES = 3
@@ -77,6 +78,7 @@ def reconstruct(
                 if not failed:
                     notes += [settled.note] if settled.note else []
                     notes += ["the camera drives backwards"] if verdict.backwards else []
+                    notes += [_wobbling(settled.model)] if verdict.wobbling else []
                     notes += [f"{reasons[0]}: mapped again, frame by frame"] if reasons else []
                     return Outcome(settled, (), tuple(notes), figures)
             reasons = reasons or failed
@@ -85,6 +87,13 @@ def reconstruct(
 
 def _refused(reason: str) -> Outcome:
     return Outcome(None, (reason,), (), {})
+
+
+def _wobbling(model: Model) -> str:
+    return (
+        f"points miss their pixels by {model.reprojection_px:.2f} px on average: the frames are not quite "
+        "pictures of one street, and poses and depth are as exact as they are"
+    )
 
 
 def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[Features]]:
