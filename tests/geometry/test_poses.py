@@ -40,6 +40,8 @@ def test_known_poses_are_used_untouched(clip: Clip) -> None:
     posed = pose_clip(replace(rendered, known=Known(world_from_camera=moved @ path, intrinsics=True)))
     np.testing.assert_allclose(stack(posed), path, atol=1e-9)
     assert posed.scale.source == "poses"
+    # The road is found at the true height; a car's camera would be at 1.5 m.
+    assert posed.scale.others == {"camera height 1.50 m (assumed)": pytest.approx(1.5 / HEIGHT_M, rel=0.03)}
     assert posed.fallback is None
     assert posed.ground is not None
     assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)
@@ -84,6 +86,7 @@ def test_known_depth_gives_scale_and_ground(clip: Clip) -> None:
     known = Known(intrinsics=True, depth_m=np.repeat(depth[None], len(clip), axis=0))
     posed = pose_clip(replace(clip, known=known))
     assert posed.scale.source == "depth"
+    assert list(posed.scale.others.values()) == [pytest.approx(1.5 / HEIGHT_M, rel=0.1)]
     assert posed.cameras[-1].world_from_camera[2, 3] == pytest.approx(3.5, rel=0.02)
 
 

@@ -69,13 +69,14 @@ def _metric(
     poses, points = rebase(poses, points)
     small = measured.camera.resized(evidence.small.width_px, evidence.small.height_px)
     street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
-    by_ground = scales.from_ground(street, height_m, measured.focal_observed, seed)
     if measured.unit is None:
-        return by_ground
+        return scales.from_ground(street, height_m, measured.focal_observed, seed)
     plane, _ = scales.find_ground(street, seed, scales.KNOWN_HEIGHTS_M)
     ground = None if plane is None else Ground(plane.normal, plane.offset)
     notes: tuple[str, ...] = ()
-    spread = abs(by_ground.factor - 1) if by_ground.ground is not None else 0.0
-    if height_m is not None and spread > _AGREES:
-        notes = (f"by {measured.unit} the camera is {height_m / by_ground.factor:.2f} m above the road",)
-    return Metric(1.0, ground, Scale(measured.unit, spread), notes)
+    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > _AGREES:
+        notes = (
+            f"by {measured.unit} the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m",
+        )
+    others = scales.by_height(plane, 1.0, height_m)
+    return Metric(1.0, ground, Scale(measured.unit, measured.unit_spread, others), notes)

@@ -20,6 +20,7 @@ class Measured:
         depth: Depth along z (F, H, W) in the unit of the poses; 0 where there is none.
         confidence: Trust in it (F, H, W) in [0, 1].
         unit: What says that the unit is the metre, in words; None where nothing does.
+        unit_spread: How far that metre may be off, as a fraction.
         notes: What was noticed, a sentence each.
         details: Figures for the report, as JSON values.
     """
@@ -30,6 +31,7 @@ class Measured:
     depth: Float[np.ndarray, "f h w"]
     confidence: Float[np.ndarray, "f h w"]
     unit: str | None = None
+    unit_spread: float = 0.0
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 

@@ -16,10 +16,17 @@ class Scale:
     Attributes:
         source: ``"poses"``, ``"depth"``, ``"ground plane, camera height 1.50 m"``, ``"none: ..."``: in words.
         spread: Relative spread of the scale, as a fraction; infinite when there is no metric scale.
+        others: What else tells metres, by its source: its metres for one of this scale, 1 where both agree.
     """
 
     source: str
     spread: float
+    others: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def disagreement(self) -> float | None:
+        """How far the others are from this scale at most, as a fraction; None where there are none."""
+        return max((abs(ratio - 1) for ratio in self.others.values()), default=None)
 
 
 @dataclass(frozen=True)

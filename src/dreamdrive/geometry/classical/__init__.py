@@ -1,10 +1,12 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from dreamdrive.geometry.classical.dense import Dense, densify
 from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
+from dreamdrive.geometry.classical.traffic import compared_with_traffic
 from dreamdrive.geometry.protocol import Backend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -27,7 +29,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         "sky_share": float(dense.sky[used].mean()),
         "moving_share": float((dense.moving[used] >= 0.5).mean()),
     }
-    return Geometry(
+    geometry = Geometry(
         cameras=posed.cameras,
         depth_m=dense.depth_m,
         confidence=dense.confidence,
@@ -42,6 +44,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         fallback=posed.fallback,
         details={**posed.details, **shares},
     )
+    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 CLASSICAL = Backend(

@@ -114,7 +114,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
     ratios = depth_ratios(clip, camera, poses, points, model.seen)
     if len(ratios):
-        metric = scale.from_depth(ratios, street, seed)
+        metric = scale.from_depth(ratios, street, height_m, seed)
     else:
         metric = scale.from_ground(street, height_m, observed, seed)
     poses[:, :3, 3] *= metric.factor
@@ -131,7 +131,7 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
     street = _known_street(clip, evidence)
     plane, _ = scale.find_ground(street, seed, scale.KNOWN_HEIGHTS_M)
     ground = None if plane is None else Ground(plane.normal, plane.offset)
-    metric = Metric(1.0, ground, Scale("poses", 0.0), ())
+    metric = Metric(1.0, ground, Scale("poses", 0.0, scale.by_height(plane, 1.0, height_m)), ())
     notes = ["the given poses are used"]
     if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > 0.15:
         notes.append(
@@ -197,7 +197,9 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     metric = _level_road(height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
-        metric = replace(metric, ground=ground, scale=Scale("depth", 0.0))
+        metric = replace(
+            metric, ground=ground, scale=Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
+        )
     posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
     return replace(posed, standing=True, fallback=reason)
 
@@ -225,8 +227,8 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
 
 
 def _level_road(height_m: float | None, spread: float) -> Metric:
-    wanted, word = (scale.USUAL_HEIGHT_M, "assumed") if height_m is None else (height_m, "given")
-    source = f"level road assumed, camera height {wanted:.2f} m ({word})"
+    wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
+    source = f"level road assumed, {scale.height_words(height_m)}"
     return Metric(1.0, Ground(np.array([0.0, -1.0, 0.0]), wanted), Scale(source, spread), ())
 
 

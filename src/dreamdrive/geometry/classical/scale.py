@@ -95,20 +95,39 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
         USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
         0.0 if focal_observed else FOCAL_SPREAD,
     )
-    word = "assumed" if height_m is None else "given"
-    source = f"ground plane ({how}), camera height {wanted:.2f} m ({word})"
+    source = f"ground plane ({how}), {height_words(height_m)}"
     return Metric(
         factor, Ground(plane.normal, plane.offset * factor), Scale(source, float(np.linalg.norm(terms))), ()
     )
 
 
-def from_depth(ratios: Float[np.ndarray, " n"], street: Street, seed: int) -> Metric:
+def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:
     """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
     factor = float(np.median(ratios))
     spread = float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
     plane, _ = find_ground(street, seed)
     ground = None if plane is None else Ground(plane.normal, plane.offset * factor)
-    return Metric(factor, ground, Scale("depth", spread), ())
+    return Metric(factor, ground, Scale("depth", spread, by_height(plane, factor, height_m)), ())
+
+
+def by_height(plane: Plane | None, factor: float, height_m: float | None) -> dict[str, float]:
+    """What the camera's height above the road says of a scale, for ``Scale.others``.
+
+    Args:
+        plane: The road in units of the poses, where found.
+        factor: Metres per unit by that scale.
+        height_m: Camera height that the user gave; None assumes 1.5 m.
+    """
+    if plane is None:
+        return {}
+    wanted = USUAL_HEIGHT_M if height_m is None else height_m
+    return {height_words(height_m): wanted / (plane.height * factor)}
+
+
+def height_words(height_m: float | None) -> str:
+    """The camera's height above the road and where it comes from."""
+    wanted, word = (USUAL_HEIGHT_M, "assumed") if height_m is None else (height_m, "given")
+    return f"camera height {wanted:.2f} m ({word})"
 
 
 def _from_speed(street: Street, problem: str) -> Metric:
