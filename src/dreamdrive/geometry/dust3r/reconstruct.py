@@ -8,7 +8,7 @@ from jaxtyping import Bool
 from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical.evidence import Evidence, look
+from dreamdrive.geometry.classical.evidence import Evidence, free_pixels, look
 from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
 from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
@@ -100,9 +100,8 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
 
 
 def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n h w"]:
-    """Pixels of the pictures that show the street; something that keeps its place in the image is none."""
-    free = clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
-    return np.stack([prepare_mask(one, how) for one in free])
+    """Pixels of the pictures that show the street."""
+    return np.stack([prepare_mask(one, how) for one in free_pixels(clip, evidence)])
 
 
 def _options(clip: Clip, seed: int) -> AlignOptions:
