@@ -47,8 +47,8 @@ def generate(
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
             it the input decides.
-        geometry: How cameras and depth are found; all but classical are networks and take --weights, and
-            but dust3r a package of their own: dreamdrive doctor, docs/geometry_networks.md.
+        geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
+            them a package as well, which dreamdrive doctor names.
         weights: Weights of the geometry's network: a file, a folder, or the name of a model that the hub's
             cache holds. Nothing is ever downloaded.
         quality: How many steps the fits take.

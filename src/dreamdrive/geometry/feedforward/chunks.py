@@ -10,11 +10,11 @@ from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.feedforward.network import Seen
-from dreamdrive.geometry.registration import Similarity, register
+from dreamdrive.geometry.registration import Similarity
+from dreamdrive.geometry.weighted import weighted_median
 from dreamdrive.scene.camera import Camera
 
 _PIXELS = 4_000  # of a frame that take part in joining; more do not make it better
-_ROBUST_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def chunks(count: int, length: int, overlap: int) -> list[range]:
 
 
 def join(parts: Sequence[tuple[range, Seen]], camera: Camera, usable: Bool[np.ndarray, "f h w"]) -> Joined:
-    """Bring each chunk onto the one before by the similarity of the pixels they share.
+    """Bring each chunk onto the one before by the frames they share.
 
     Where two chunks overlap, a frame is taken from the one whose edge is further away.
 
@@ -95,39 +95,53 @@ def _middle(before: range, after: range) -> int:
 def _onto(
     before: tuple[range, Seen], after: tuple[range, Seen], camera: Camera, usable: Bool[np.ndarray, "f h w"]
 ) -> tuple[Similarity, float]:
-    """The similarity from the world of a chunk to that of the one before, and how far it misses."""
+    """The similarity from the world of a chunk to that of the one before, and how far it misses.
+
+    A frame is the same camera in both, so the ratio of depths is the scale, whatever the poses; and the poses
+    give the rest. Registering points instead makes the path jump where chunks meet: a depth that is 1 % off
+    moves points further than the camera goes between two frames.
+    """
     shared = range(after[0].start, before[0].stop)
-    target, target_rank = _points(before, shared, camera)
-    source, source_rank = _points(after, shared, camera)
-    stride = _stride(camera)
-    depth = before[1].depth[shared.start - before[0].start :, ::stride, ::stride]
-    # A point's error grows with its depth.
-    weights = target_rank * source_rank / np.maximum(depth, np.finfo(np.float32).tiny)
-    weights = np.where(usable[shared.start : shared.stop, ::stride, ::stride], weights, 0)
-    counts = weights > 0
-    if np.count_nonzero(counts) < 3:
+    (target, target_depth, target_rank), (source, source_depth, source_rank) = (
+        _part(part, shared, camera) for part in (before, after)
+    )
+    weights = target_rank * source_rank
+    counts = (weights > 0) & usable[shared.start : shared.stop, :: _stride(camera), :: _stride(camera)]
+    if not counts.any():
         raise InputError(
             f"frames {shared.start} to {shared.stop - 1}: two chunks see nothing in common there"
         )
-    found = register(source, target, weights, robust_steps=_ROBUST_STEPS)
-    distance = np.linalg.norm(found(source[counts]) - target[counts], axis=-1)
-    return found, float(np.median(distance / depth[counts]))
+    ratio = np.log(target_depth[counts] / source_depth[counts])
+    scale = float(np.exp(weighted_median(ratio, weights[counts])))
+    turns = target[:, :3, :3] @ np.swapaxes(source[:, :3, :3], 1, 2)
+    left, _, right = np.linalg.svd(turns.sum(axis=0))
+    rotation = (left * np.array([1, 1, np.linalg.det(left @ right)])) @ right
+    translation = np.median(target[:, :3, 3] - scale * source[:, :3, 3] @ rotation.T, axis=0)
+    found = Similarity(scale, rotation, translation)
+    rays = camera.rays()[:: _stride(camera), :: _stride(camera)]
+    distance = found(_points(source, source_depth, rays)) - _points(target, target_depth, rays)
+    return found, float(np.median(np.linalg.norm(distance, axis=-1)[counts] / target_depth[counts]))
+
+
+def _part(
+    part: tuple[range, Seen], shared: range, camera: Camera
+) -> tuple[Float[np.ndarray, "n 4 4"], Float[np.ndarray, "n h w"], Float[np.ndarray, "n h w"]]:
+    """Poses of the shared frames, some of their depth, and the share of it trusted less; 0 without depth."""
+    frames, seen = part
+    own = slice(shared.start - frames.start, shared.stop - frames.start)
+    depth, trust = (
+        values[own, :: _stride(camera), :: _stride(camera)].astype(np.float64)
+        for values in (seen.depth, seen.confidence)
+    )
+    rank = rankdata(trust).reshape(trust.shape) / trust.size
+    return seen.world_from_camera[own], depth, np.where(depth > 0, rank, 0)
 
 
 def _points(
-    part: tuple[range, Seen], shared: range, camera: Camera
-) -> tuple[Float[np.ndarray, "n h w 3"], Float[np.ndarray, "n h w"]]:
-    """Some points of the shared frames, and the share of the chunk's pixels trusted less; 0 without depth."""
-    frames, seen = part
-    own = slice(shared.start - frames.start, shared.stop - frames.start)
-    stride = _stride(camera)
-    depth = seen.depth[own, ::stride, ::stride].astype(np.float64)
-    rays = camera.rays()[::stride, ::stride]
-    poses = seen.world_from_camera[own, None, None]
-    points = (poses[..., :3, :3] @ (rays * depth[..., None])[..., None])[..., 0] + poses[..., :3, 3]
-    trust = seen.confidence[own, ::stride, ::stride]
-    rank = rankdata(trust).reshape(trust.shape) / trust.size
-    return points, np.where(depth > 0, rank, 0)
+    poses: Float[np.ndarray, "n 4 4"], depth: Float[np.ndarray, "n h w"], rays: Float[np.ndarray, "h w 3"]
+) -> Float[np.ndarray, "n h w 3"]:
+    turns = poses[:, None, None, :3, :3]
+    return (turns @ (rays * depth[..., None])[..., None])[..., 0] + poses[:, None, None, :3, 3]
 
 
 def _stride(camera: Camera) -> int:

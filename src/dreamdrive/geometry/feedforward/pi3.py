@@ -20,10 +20,7 @@ from dreamdrive.geometry.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import Backend
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
-INSTALL = (
-    "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; "
-    "pip install huggingface_hub einops"
-)
+INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; pip install huggingface_hub"
 
 
 def load_pi3(path: Path) -> Network:
