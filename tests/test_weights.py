@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.weights import fill_network, load_network, read_torch
+from dreamdrive.weights import fill, fill_network, load_network, read_torch
 
 
 class Small(nn.Module):
@@ -88,3 +88,21 @@ def test_a_torchscript_archive_is_told_apart(tmp_path: Path) -> None:
     torch.jit.save(torch.jit.script(nn.Linear(2, 3)), str(tmp_path / "w.pth"))
     with pytest.raises(InputError, match="a TorchScript archive"):
         load(tmp_path / "w.pth")
+
+
+class Twice(nn.Module):
+    def __init__(self) -> None:
+        super().__init__()
+        self.layer = nn.Linear(2, 3)
+        self.same = self.layer
+        self.index = torch.arange(4)  # no buffer of the state: meta tensors would lose it
+
+
+def test_a_network_that_is_built_already_is_filled_and_shared_tensors_need_one_name() -> None:
+    state = {"layer.weight": torch.ones(3, 2), "same.bias": torch.zeros(3)}
+    network = fill(Twice(), state, "memory", "twice.pth")
+    assert network.layer is network.same
+    assert torch.equal(network.same.weight, torch.ones(3, 2))
+    assert network.index.tolist() == [0, 1, 2, 3]
+    with pytest.raises(InputError, match=r"memory does not fit \(2 missing: layer.bias, same.bias\)"):
+        fill(Twice(), {"layer.weight": torch.ones(3, 2)}, "memory", "twice.pth")

@@ -5,6 +5,7 @@ import pickle
 import re
 import warnings
 import zipfile
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -57,9 +58,24 @@ def fill_network(
     """
     with torch.device("meta"):
         network = make()
+    return fill(network, state, source, expected)
+
+
+def fill(network: Network, state: dict[str, Tensor], source: str, expected: str) -> Network:
+    """Fill a network that is already built, for inference in float32.
+
+    Args:
+        network: The network; its parameters and buffers are replaced.
+        state: Tensors by key; counters of batches may be missing, and all but one name of a shared tensor.
+        source: Where the tensors come from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: Keys are missing or left over, or shapes differ.
+    """
     wanted = network.state_dict()
     counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
-    state = counters | state
+    state = counters | _shared(wanted, state) | state
     _check_keys(wanted, state, source, expected)
     values = {key: value.float() if value.is_floating_point() else value for key, value in state.items()}
     network.load_state_dict(values, assign=True)
@@ -136,6 +152,16 @@ def sha256(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _shared(wanted: dict[str, Tensor], state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """By its other names what the state holds under one of them: a .safetensors keeps one name of each."""
+    names: dict[int, list[str]] = defaultdict(list)
+    for key, value in wanted.items():
+        if value.device.type != "meta":
+            names[value.data_ptr()].append(key)
+    held = {key: group for group in names.values() for key in group if len(group) > 1 and key in state}
+    return {name: state[key] for key, group in held.items() for name in group}
 
 
 def _check_keys(wanted: dict[str, Tensor], state: dict[str, Tensor], source: str, expected: str) -> None:

@@ -18,7 +18,9 @@ def generate(
     prior: Annotated[
         Literal["replay", "street-world"] | None, arg(metavar="NAME", help_behavior_hint="")
     ] = None,
-    geometry: Annotated[Literal["classical", "dust3r"], arg(metavar="NAME")] = "classical",
+    geometry: Annotated[
+        Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"], arg(metavar="NAME")
+    ] = "classical",
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
@@ -45,7 +47,8 @@ def generate(
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
             it the input decides.
-        geometry: How cameras and depth are found; dust3r takes --weights.
+        geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
+            them a package as well, which dreamdrive doctor names.
         weights: Weights of the geometry's network: a file, a folder, or the name of a model that the hub's
             cache holds. Nothing is ever downloaded.
         quality: How many steps the fits take.

@@ -5,11 +5,12 @@ from pathlib import Path
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical import CLASSICAL
 from dreamdrive.geometry.dust3r import DUST3R
+from dreamdrive.geometry.feedforward import FEED_FORWARD
 from dreamdrive.geometry.protocol import Backend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-BACKENDS: dict[str, Backend] = {backend.name: backend for backend in (CLASSICAL, DUST3R)}
+BACKENDS: dict[str, Backend] = {backend.name: backend for backend in (CLASSICAL, DUST3R, *FEED_FORWARD)}
 
 
 def backend_of(method: str, weights: Path | None = None) -> Backend:

@@ -74,8 +74,12 @@ def working_frames(
 ) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
     """Grey frames at the working size and the pixels in which features may lie."""
     size = (evidence.working.width_px, evidence.working.height_px)
-    free = clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
-    return features.to_grey(clip.frames, size), _resize(free, size)
+    return features.to_grey(clip.frames, size), _resize(free_pixels(clip, evidence), size)
+
+
+def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
+    """Pixels (F, H, W) that show the street: something that keeps its place in the image is none."""
+    return clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
 
 
 def _resize(mask: Bool[np.ndarray, "f _ _"], size: tuple[int, int]) -> Bool[np.ndarray, "f h w"]:

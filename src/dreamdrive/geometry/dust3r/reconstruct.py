@@ -3,21 +3,21 @@
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical.evidence import Evidence, look
+from dreamdrive.geometry.classical.evidence import Evidence, free_pixels, look
 from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
 from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
-from dreamdrive.geometry.dust3r.network.images import Fitting, fitting, prepare
+from dreamdrive.geometry.dust3r.network.images import fitting
 from dreamdrive.geometry.dust3r.network.inference import infer
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -74,7 +74,7 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
     # The network counts pixels from 0 and has its principal point at half the size.
     picture = Camera(focal_px, focal_px, width / 2 + 0.5, height / 2 + 0.5, width, height)
     camera = clip.rig[0] if clip.known.intrinsics else how.frame_camera(picture)
-    depth, trust = (_in_frames(part, how) for part in (aligned.depth, aligned.confidence))
+    depth, trust = (in_frames(part, how) for part in (aligned.depth, aligned.confidence))
     there = (trust > 1) & ~clip.held_out[:, None, None]
     confidence = np.zeros(trust.shape, np.float32)
     if there.any():
@@ -100,11 +100,8 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
 
 
 def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n h w"]:
-    """Pixels of the pictures that show the street; something that keeps its place in the image is none."""
-    free = clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
-    return np.stack(
-        [prepare(np.repeat(255 * one[..., None].astype(np.uint8), 3, 2), how)[..., 0] > 250 for one in free]
-    )
+    """Pixels of the pictures that show the street."""
+    return np.stack([prepare_mask(one, how) for one in free_pixels(clip, evidence)])
 
 
 def _options(clip: Clip, seed: int) -> AlignOptions:
@@ -116,17 +113,3 @@ def _known(clip: Clip, how: Fitting) -> Known:
     if clip.known.intrinsics:
         focals = np.full(len(clip), how.picture_camera(clip.rig[0]).fx_px)
     return Known(focals, clip.known.world_from_camera)
-
-
-def _in_frames(pictures: tuple[np.ndarray, ...], how: Fitting) -> Float[np.ndarray, "f h w"]:
-    """Values of the pictures at the pixels of the frames; 0 beyond their edge."""
-    width, height = how.frame_size
-    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    at = how.to_picture(np.stack([columns, rows], axis=-1)).astype(np.float32) - np.float32(0.5)
-    # Nearest: an average across a depth edge is a depth at which there is nothing.
-    return np.stack(
-        [
-            cv2.remap(values.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderValue=0)
-            for values in pictures
-        ]
-    )

@@ -9,7 +9,7 @@ from safetensors.numpy import load_file
 from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
 
 from dreamdrive.geometry.dust3r.align.focal import focal_px, focal_votes, median_px, robust_px, weiszfeld_px
-from dreamdrive.geometry.dust3r.align.weighted import weighted_median
+from dreamdrive.geometry.weighted import weighted_median
 
 CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "pp", "wide", "tele"]
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.network.images import Fitting, as_input, fitting, prepare
+from dreamdrive.geometry.dust3r.network.images import as_input, fitting
+from dreamdrive.geometry.fitting import Fitting, prepare
 from dreamdrive.scene.camera import Camera
 
 SIZES = {"down": 128, "up": 128, "square": 64, "port": 64, "s224": 224}

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.geometry.dust3r.align.weighted import weighted_median
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.weighted import weighted_median
 
 FocalRule = Literal["robust", "weiszfeld", "median"]
 _STEPS, _ROBUST_STEPS = 10, 6

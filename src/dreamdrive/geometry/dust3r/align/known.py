@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.dust3r.align.registration import Similarity, register
 from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
+from dreamdrive.geometry.registration import Similarity, register
 
 _STANDING = 1e-9
 

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from dreamdrive.geometry.dust3r.align.graph import Graph
-from dreamdrive.geometry.dust3r.align.registration import Similarity
 from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.registration import Similarity
 
 Normalisation = Literal["pooled", "modular"]
 _FOCAL_BREAK = 20.0

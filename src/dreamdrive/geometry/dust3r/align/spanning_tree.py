@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_px, focal_votes
 from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.pnp import pose_by_pnp
-from dreamdrive.geometry.dust3r.align.registration import Similarity, register
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.registration import Similarity, register
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
 PNP_CONFIDENCE = 3.0

@@ -1,0 +1,194 @@
+"""A clip through a network that sees many frames at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from scipy.stats import rankdata
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical.evidence import free_pixels, look
+from dreamdrive.geometry.feedforward.camera import SharedCamera, share
+from dreamdrive.geometry.feedforward.chunks import Joined, chunks, join
+from dreamdrive.geometry.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.feedforward.pictures import fit_patches, show
+from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
+from dreamdrive.geometry.measured import Measured
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+_FOCAL_SPREAD = 0.2  # of the logarithm; beyond it the frames speak of different cameras
+_FOCAL_APART = 0.1  # relative
+_CHUNK_MISS = 0.1  # relative to depth
+_STANDING = 1e-3  # relative to the median depth
+
+
+@dataclass(frozen=True)
+class FeedForward:
+    """Reconstruct by such a network; see ``geometry.protocol.Reconstruct``.
+
+    Attributes:
+        name: For messages.
+        load: From the file or folder of the weights to the network.
+        long_side_px: Of the pictures that it is shown, a multiple of 14.
+        chunk: Frames that it is shown at once.
+        overlap: Frames that two chunks share.
+    """
+
+    name: str
+    load: Callable[[Path], Network]
+    long_side_px: int
+    chunk: int = 24
+    overlap: int = 8
+
+    def __call__(
+        self, clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+    ) -> Geometry:
+        """Cameras and depth of the network, brought to metres.
+
+        Held-out frames are seen, which poses them; their depth is not handed on.
+
+        Args:
+            clip: Frames of one camera.
+            camera_height_m: Height of the camera above the road; None assumes 1.5 m.
+            seed: Seed of everything random.
+            weights: The network's file or folder.
+
+        Raises:
+            InputError: No weights, fewer than two frames, several cameras, or weights or results that cannot
+                be used.
+        """
+        if weights is None:
+            raise InputError(f"geometry {self.name} needs the weights of its network")
+        if len(clip) < 2 or len(clip.rig) > 1:
+            raise InputError(
+                f"geometry {self.name} takes two frames or more of one camera; "
+                f"got {len(clip)} of {len(clip.rig)}"
+            )
+        evidence = look(clip)
+        found = self.measure(clip, free_pixels(clip, evidence), weights, seed)
+        return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
+
+    def measure(self, clip: Clip, free: Bool[np.ndarray, "f h w"], weights: Path, seed: int = 0) -> Measured:
+        """Cameras and depth of the network, in its unit or that of known poses.
+
+        Args:
+            clip: Two frames or more of one camera.
+            free: Pixels (F, H, W) that show the street.
+            weights: The network's file or folder.
+            seed: Seed of everything random.
+
+        Raises:
+            InputError: The weights or results cannot be used.
+        """
+        how = fit_patches(*clip.size, self.long_side_px)
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            network = self.load(weights)
+            parts = [
+                (frames, _see(network, clip, frames, how))
+                for frames in chunks(len(clip), self.chunk, self.overlap)
+            ]
+        shared = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
+        usable = np.stack([prepare_mask(one, how) for one in free])
+        joined = join(parts, how.picture_camera(_camera(clip, shared)), usable)
+        return _measured(clip, joined, shared, free, how, network.unit)
+
+
+def _measured(
+    clip: Clip,
+    joined: Joined,
+    shared: SharedCamera,
+    free: Bool[np.ndarray, "f h w"],
+    how: Fitting,
+    unit: str | None,
+) -> Measured:
+    """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
+
+    Known poses are kept, and give the depth their unit.
+
+    Args:
+        clip: The frames.
+        joined: Their poses and depth on the grid of the pictures.
+        shared: Their camera as the network has it.
+        free: Pixels (F, H, W) of the frames that show the street.
+        how: How the pictures were made of the frames.
+        unit: What says that the network's unit is the metre.
+    """
+    poses, factor = joined.world_from_camera, 1.0
+    if clip.known.world_from_camera is not None:
+        poses = clip.known.world_from_camera.astype(np.float64)
+        factor = _unit_of(poses, joined, metric=clip.known.metric and unit is not None)
+        unit = "poses" if clip.known.metric else None
+    depth, trust = (in_frames(tuple(part), how) for part in (joined.depth, joined.confidence))
+    there = np.isfinite(depth) & (depth > 0) & free & ~clip.held_out[:, None, None]
+    confidence = np.zeros(depth.shape, np.float32)
+    if there.any():
+        confidence[there] = rankdata(trust[there]) / np.count_nonzero(there)
+    return Measured(
+        world_from_camera=poses,
+        camera=replace(_camera(clip, shared), world_from_camera=np.eye(4)),
+        focal_observed=clip.known.intrinsics or shared.spread <= _FOCAL_SPREAD,
+        depth=np.where(there, depth * np.float32(factor), 0).astype(np.float32),
+        confidence=confidence,
+        unit=unit,
+        notes=tuple(_notes(clip, joined, shared)),
+        details={
+            "focal_by_network_px": shared.camera.fx_px,
+            "focal_spread": shared.spread,
+            "chunk_scales": joined.scales.tolist(),
+            "chunk_miss": joined.miss.tolist(),
+        },
+    )
+
+
+def _camera(clip: Clip, shared: SharedCamera) -> Camera:
+    return clip.rig[0] if clip.known.intrinsics else shared.camera
+
+
+def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
+    """One chunk through the network."""
+    own = slice(frames.start, frames.stop)
+    poses = clip.known.world_from_camera
+    views = Views(
+        show(clip.frames[own], how),
+        how.picture_camera(clip.rig[0]) if clip.known.intrinsics else None,
+        None if poses is None else poses[own],
+        clip.known.metric,
+    )
+    with torch.inference_mode():
+        seen = network.look(views)
+    depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
+    return replace(seen, depth=depth)
+
+
+def _unit_of(poses: Float[np.ndarray, "f 4 4"], joined: Joined, *, metric: bool) -> float:
+    """The network's unit in that of known poses: by how far the camera goes from the middle of its path."""
+    known, own = (
+        float(np.linalg.norm(path - path.mean(axis=0)))
+        for path in (poses[:, :3, 3], joined.world_from_camera[:, :3, 3])
+    )
+    there = joined.depth[joined.depth > 0]
+    moves = own > _STANDING * (float(np.median(there)) if len(there) else 0.0)
+    if moves and known > 0:
+        return known / own
+    if metric:
+        return 1.0
+    raise InputError("the camera stands still: known poses cannot give the network's depth their unit")
+
+
+def _notes(clip: Clip, joined: Joined, shared: SharedCamera) -> list[str]:
+    notes = []
+    if shared.spread > _FOCAL_SPREAD:
+        notes.append("the frames do not agree on a focal length")
+    focal_px = clip.rig[0].fx_px
+    if clip.known.intrinsics and abs(shared.camera.fx_px / focal_px - 1) > _FOCAL_APART:
+        notes.append(f"the network sees a focal length of {shared.camera.fx_px:.0f} px, not {focal_px:.0f}")
+    if (joined.miss > _CHUNK_MISS).any():
+        notes.append(f"chunks of frames miss each other by {joined.miss.max():.0%} of the depth")
+    return notes
