@@ -25,26 +25,22 @@ class Verdict:
         reasons: Why the model is refused, in words; empty when it is accepted.
         figures: What was measured, as JSON values.
         backwards: Whether the camera consistently drives backwards.
+        wobbling: Whether the frames are not quite pictures of one street, as generated ones are not.
     """
 
     reasons: tuple[str, ...]
     figures: dict[str, Any]
     backwards: bool
-
-    @property
-    def wobbling(self) -> bool:
-        """Whether the frames are not quite pictures of one street, as those of generated video are not."""
-        return self.figures.get("reprojection_px", 0.0) > MAX_REPROJECTION_PX
+    wobbling: bool = False
 
 
 def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     """Test registration, support, fit and the plausibility of the steps.
 
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
-    steady
-    length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise and its
-    length is far below the mean. Where the frames wobble, their poses do: the direction is then that of
-    stretches of three steps.
+    steady length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise
+    and its length is far below the mean. Where the frames wobble, their poses do: the direction is then that
+    of stretches of three steps.
     """
     registered = model.registered
     share = float(registered.mean())
@@ -80,7 +76,7 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
         )
     if variation > MAX_VARIATION:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
-    return Verdict(tuple(reasons), figures, backwards)
+    return Verdict(tuple(reasons), figures, backwards, wobbling)
 
 
 def _least_ahead(
