@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.classical import assemble
+from dreamdrive.geometry.classical import assemble, contradiction
 from dreamdrive.geometry.classical import scale as scales
 from dreamdrive.geometry.classical.dense import StaticDepth, densify
 from dreamdrive.geometry.classical.evidence import Evidence
@@ -34,7 +34,12 @@ def finish(
         evidence: The first look at them.
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
+
+    Raises:
+        InputError: Known poses contradict the frames.
     """
+    if clip.known.world_from_camera is not None:
+        contradiction.check(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)
     poses = measured.world_from_camera.astype(np.float64)
     poses[:, :3, 3] *= factor

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical import contradiction, odometry, scale
 from dreamdrive.geometry.classical import evidence as looking
-from dreamdrive.geometry.classical import odometry, scale
 from dreamdrive.geometry.classical.evidence import Evidence
 from dreamdrive.geometry.classical.known import depth_points, depth_ratios
 from dreamdrive.geometry.classical.paths import fill, rebase
@@ -67,11 +67,12 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
 
     Raises:
         InputError: Without frames; for several cameras without poses; for a camera height that is not
-            positive.
+            positive; for known poses that contradict the frames.
     """
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
     if clip.known.world_from_camera is not None:
+        contradiction.check(clip, evidence)
         if not clip.known.metric:
             return _from_unscaled(clip, evidence, camera_height_m, seed)
         return _from_known(clip, evidence, camera_height_m, seed)

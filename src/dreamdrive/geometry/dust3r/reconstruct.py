@@ -18,6 +18,7 @@ from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
+from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -40,15 +41,12 @@ def reconstruct(
         weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
 
     Raises:
-        InputError: No weights, fewer than two frames, several cameras, or weights or pointmaps that cannot be
-            used.
+        InputError: No weights, frames as ``frames.check_frames`` refuses them, or weights or pointmaps that
+            cannot be used.
     """
     if weights is None:
         raise InputError("geometry dust3r needs the weights of its network")
-    if len(clip) < 2 or len(clip.rig) > 1:
-        raise InputError(
-            f"geometry dust3r takes two frames or more of one camera; got {len(clip)} of {len(clip.rig)}"
-        )
+    check_frames(clip, "dust3r")
     network = load_dust3r(weights)
     evidence = look(clip)
     how = fitting(*clip.size, network.config.image_size)

@@ -17,6 +17,7 @@ from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import fit_patches, show
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
+from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -60,16 +61,12 @@ class FeedForward:
             weights: The network's file or folder.
 
         Raises:
-            InputError: No weights, fewer than two frames, several cameras, or weights or results that cannot
-                be used.
+            InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
+                contradict them, or weights or results that cannot be used.
         """
         if weights is None:
             raise InputError(f"geometry {self.name} needs the weights of its network")
-        if len(clip) < 2 or len(clip.rig) > 1:
-            raise InputError(
-                f"geometry {self.name} takes two frames or more of one camera; "
-                f"got {len(clip)} of {len(clip.rig)}"
-            )
+        check_frames(clip, self.name)
         evidence = look(clip)
         found = self.measure(clip, free_pixels(clip, evidence), weights, seed)
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
