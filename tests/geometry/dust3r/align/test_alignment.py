@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.geometry.dust3r.align.goldens import config, scene
-from tests.geometry.dust3r.align.pairs import Noise, Truth, pair_maps, path_error, street, window
+from tests.geometry.dust3r.align.pairs import path_error, street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.adam import descend
@@ -17,6 +17,7 @@ from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
 from dreamdrive.geometry.dust3r.align.objective import Objective, raw_parameters
 from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.simulated import Noise, Truth, pair_maps
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)

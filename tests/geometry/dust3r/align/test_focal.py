@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.geometry.dust3r.align.focal import focal_px, focal_votes, median_px, robust_px, weiszfeld_px
 from dreamdrive.geometry.dust3r.align.weighted import weighted_median
+from dreamdrive.geometry.dust3r.simulated import Noise, pair_maps
 
 CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "pp", "wide", "tele"]
 

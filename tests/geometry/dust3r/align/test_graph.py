@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.graph import graph_of
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.simulated import Noise, pair_maps
 
 
 @pytest.fixture(scope="module")

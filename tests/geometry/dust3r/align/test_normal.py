@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.geometry.dust3r.align.freedom import Freedom
 from dreamdrive.geometry.dust3r.align.graph import graph_of
@@ -16,6 +16,7 @@ from dreamdrive.geometry.dust3r.align.rays import RayMisses
 from dreamdrive.geometry.dust3r.align.samples import draw_samples
 from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.dust3r.simulated import Noise, pair_maps
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 _STEPS = 60

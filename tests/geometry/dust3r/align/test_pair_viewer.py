@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.geometry.dust3r.align.goldens import scene
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, path_error, street
+from tests.geometry.dust3r.align.pairs import path_error, street
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.clean import world_points
 from dreamdrive.geometry.dust3r.align.pair_viewer import view_pair
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.simulated import Noise, pair_maps
 
 
 def test_it_is_upstreams(golden_dir: Path) -> None:
