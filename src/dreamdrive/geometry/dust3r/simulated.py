@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from dreamdrive.data.world import Drive
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
@@ -185,9 +185,10 @@ def _moved(points: Float[np.ndarray, "h w 3"], pose: Float[np.ndarray, "4 4"]) -
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
-def _looked_at(points: Float[np.ndarray, "h w 3"], truth: Truth) -> np.ndarray:
+def _looked_at(points: Float[np.ndarray, "h w 3"], truth: Truth) -> Bool[np.ndarray, "h w"]:
     """Which points (H, W) a camera at the origin has in its picture, behind other things or not."""
     height, width = points.shape[:2]
     x, y, z = np.moveaxis(points, -1, 0)
-    reach = np.maximum(z, 1e-9) / truth.focal_px
-    return (z > 0) & (np.abs(x) <= reach * width / 2) & (np.abs(y) <= reach * height / 2)
+    pixel = np.maximum(z, 1e-9) / truth.focal_px
+    # A pixel more on all sides: at the very edge rounding would decide.
+    return (z > 0) & (np.abs(x) <= pixel * (width / 2 + 1)) & (np.abs(y) <= pixel * (height / 2 + 1))
