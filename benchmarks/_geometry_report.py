@@ -1,6 +1,6 @@
 """The figures of geometry.py as Markdown and as a picture."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +142,8 @@ def _accuracy_cells(methods: dict[str, Row]) -> list[str]:
 def speed_table(rows: Sequence[Row]) -> str | None:
     """Our solver with the authors' loss and freedom against Adam, of which few steps tell the seconds."""
     cells = []
-    for found in by_case(rows, "world", "frames", "size", "graph", "noise").values():
+    smallest_first = sorted(rows, key=lambda row: row["size"])
+    for found in by_case(smallest_first, "world", "frames", "size", "graph", "noise").values():
         methods = _methods(found)
         if PAPER in methods and "upstream" in methods:
             cells.append(_speed_cells(methods[PAPER], methods["upstream"]))
@@ -249,27 +250,38 @@ def _scene_cells(row: Row) -> list[str]:
 def plot(report: dict[str, Any], path: Path) -> None:
     """Memory and seconds against frames, logarithmic; a line for each graph and kind of number."""
     from matplotlib.figure import Figure  # here: only this needs it
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     rows = sorted(report["rows"].get("MemoryRun", []), key=_size)
-    lines = by_case((row for row in rows if "refused" not in row), "graph", "dtype")
     figure = Figure(figsize=(9, 4), layout="constrained")
-    values: tuple[tuple[str, Callable[[Row], float]], ...] = (
-        ("peak memory of the process, GB", lambda row: row["peak_bytes"] / 1e9),
-        ("seconds of the processor", lambda row: row["seconds"]),
-    )
-    for axes, (name, value_of) in zip(figure.subplots(1, 2), values, strict=True):
-        for (graph, dtype), found in lines.items():
-            frames = [row["frames"] for row in found]
-            line = axes.loglog(frames, [value_of(row) for row in found], "o-", label=f"{graph}, {dtype}")[0]
-            if "memory" in name:
-                told = [row["predicted_bytes"] / 1e9 for row in found]
-                axes.loglog(frames, told, ":", color=line.get_color(), label="predicted, without libraries")
-        counts = sorted({row["frames"] for row in rows})
+    memory, seconds = figure.subplots(1, 2)
+    for (graph, dtype), found in by_case(rows, "graph", "dtype").items():
+        ran = [row for row in found if "refused" not in row]
+        frames = [row["frames"] for row in ran]
+        label = f"{graph}, {dtype}"
+        above = [(row["peak_bytes"] - row["before_bytes"]) / 1e9 for row in ran]
+        colour = memory.loglog(frames, above, "o-", label=label)[0].get_color()
+        told = [(row["frames"], row["predicted_bytes"] / 1e9) for row in found]
+        memory.loglog(*zip(*told, strict=True), ":", color=colour)
+        refused = [row for row in found if "refused" in row]
+        memory.loglog(
+            [row["frames"] for row in refused],
+            [row["predicted_bytes"] / 1e9 for row in refused],
+            "x",
+            color=colour,
+        )
+        seconds.loglog(frames, [row["seconds"] for row in ran], "o-", color=colour, label=label)
+    memory.set(ylabel="GB above the libraries", title="dotted: predicted; crosses: refused")
+    seconds.set(ylabel="seconds of the processor", title="one thread")
+    counts = sorted({row["frames"] for row in rows})
+    for axes in (memory, seconds):
         axes.set_xticks(counts, [str(count) for count in counts])
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.set(xlabel="frames", ylabel=name)
-        axes.grid(alpha=0.3, which="both")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set(xlabel="frames")
+        axes.grid(alpha=0.3)
         axes.legend(frameon=False, fontsize="x-small")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=100)
