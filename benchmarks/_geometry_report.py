@@ -20,7 +20,8 @@ def markdown(report: dict[str, Any]) -> str:
     machine = report["machine"]
     parts = [
         f"{machine['processor']}, torch {machine['torch']}, {machine['date']}; seconds of the processor on "
-        "one thread.",
+        f"one thread. {report['measured']} of {report['wanted']} measurements are made; a dash is "
+        "one that is not, or has no meaning.",
         _section("Ways of getting geometry", backends_table(rows.get("BackendRun", []))),
         _section("Alignment of noisy pairs", accuracy_table(aligned)),
         _section("Seconds to the same loss", speed_table(aligned)),

@@ -71,7 +71,17 @@ def report_of(wanted: Sequence[Measurement]) -> dict[str, Any]:
     for job in wanted:
         if job.result.exists():
             rows.setdefault(type(job).__name__, []).append(json.loads(job.result.read_text()))
-    return {"machine": describe_machine(), "rows": rows}
+    measured = sum(map(len, rows.values()))
+    return {"machine": describe_machine(), "wanted": len(wanted), "measured": measured, "rows": rows}
+
+
+def rounded(value: Any) -> Any:
+    """Six digits of every number: more is noise, and makes the file long."""
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [rounded(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -105,7 +115,7 @@ def main() -> int:
     text = markdown(report)
     print(text)
     if options.json:
-        options.json.write_text(json.dumps(report, indent=1) + "\n")
+        options.json.write_text(json.dumps(rounded(report)) + "\n")
     if options.markdown:
         options.markdown.write_text(text)
     if options.plot:

@@ -57,6 +57,11 @@ def test_patterns_choose_and_order() -> None:
     ]
 
 
+def test_numbers_keep_six_digits() -> None:
+    found = module("geometry").rounded({"a": [1 / 3, 2, None, True, "x"], "b": 123456789.0})
+    assert found == {"a": [0.333333, 2, None, True, "x"], "b": 123457000.0}
+
+
 def test_a_way_turns_a_quarter_of_a_circle() -> None:
     worlds = module("_geometry_worlds")
     way = worlds.turned(np.array([1.0, 2.0, 0.0]), 10.0, 1, 8.0, np.array([0.0, 10.0, 10 + 4 * np.pi, 50.0]))
