@@ -52,6 +52,12 @@ def with_lens(clip: str) -> list[str]:
 RUNS = {
     "pandaset": Run("pandaset_002", "front_camera", DRIVE, "pandaset"),
     "pandaset-draft": Run("pandaset_002", "front_camera", [*DRIVE, "--quality", "draft"], "pandaset"),
+    "pandaset-files-draft": Run(
+        "pandaset_002",
+        "front_camera",
+        [*DRIVE, "--quality", "draft", "--geometry-files", str(DATA / "clips/pandaset_002/cameras.json")],
+        "pandaset",
+    ),
     "pandaset-static": Run(
         "pandaset_002", "front_camera", [*DRIVE, "--representation", "static"], "pandaset"
     ),

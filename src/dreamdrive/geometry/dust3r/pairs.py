@@ -20,6 +20,10 @@ def video_graph(frames: int) -> str:
     """The graph for a clip: neighbours within three frames, or up to 16 frames apart where the clip is long.
 
     Windows do not close into a circle: the first and the last frame of a drive see nothing in common.
+
+    Of 48 frames round a bend noisy pairs, made by ``benchmarks/geometry.py``, leave the path 0.30 % of its
+    length off with ``swin-3`` (276 pairs) and 0.09 % with ``logwin-5`` (418 pairs) in 1.7 times the seconds;
+    of 24 frames 0.18 and 0.09 %. Those pairs are as good far apart as near, which a network's are not.
     """
     return "swin-3-noncyclic" if frames <= _SHORT else "logwin-5-noncyclic"
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.dust3r.align.goldens import config, scene
-from tests.geometry.dust3r.align.pairs import Noise, Truth, pair_maps, path_error, street, window
+from tests.geometry.dust3r.align.pairs import path_error, street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.adam import descend

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks._simulated_pairs import Noise, pair_maps
 from safetensors.numpy import load_file
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
+from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.geometry.dust3r.align.focal import focal_px, focal_votes, median_px, robust_px, weiszfeld_px
 from dreamdrive.geometry.weighted import weighted_median

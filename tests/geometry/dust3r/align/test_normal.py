@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, street, window
+from benchmarks._simulated_pairs import Noise, pair_maps
+from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.geometry.dust3r.align.freedom import Freedom
 from dreamdrive.geometry.dust3r.align.graph import graph_of

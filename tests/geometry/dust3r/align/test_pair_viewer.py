@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.goldens import scene
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, path_error, street
+from tests.geometry.dust3r.align.pairs import path_error, street
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.clean import world_points

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.goldens import scene
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, path_error, street, window
+from tests.geometry.dust3r.align.pairs import path_error, street, window
 
 from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps

@@ -4,16 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.dust3r.align.pairs import Noise, pair_maps, path_error, window
-from tests.geometry.dust3r.align.world import street_truth
+from benchmarks._simulated_pairs import Noise, pair_maps, truth_of
+from tests.geometry.dust3r.align.pairs import path_error, window
 
+from dreamdrive.data.world import make_street
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, align
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["distance", "robust"])
 def test_path_and_focal_length_of_a_street(objective: str) -> None:
-    truth = street_truth(1, 12, 5.0, (160, 96))
+    truth = truth_of(make_street(1, 12, 5.0, (160, 96)))
     assert truth.instance is not None
     assert truth.instance.any()
     maps = pair_maps(truth, window(12), Noise(), seed=1)
@@ -29,7 +30,7 @@ def test_path_and_focal_length_of_a_street(objective: str) -> None:
 
 @pytest.mark.slow
 def test_masking_what_moves_does_no_harm() -> None:
-    truth = street_truth(2, 10, 5.0, (160, 96))
+    truth = truth_of(make_street(2, 10, 5.0, (160, 96)))
     assert truth.instance is not None
     maps = pair_maps(truth, window(10), Noise(), seed=2)
     masked = tuple(

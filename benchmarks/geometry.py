@@ -1,0 +1,127 @@
+"""Which geometry is how good, and what DUSt3R's alignment costs.
+
+    python benchmarks/geometry.py [--quick] [--resume] [--runs runs/geometry] [--only PATTERN ...]
+                                  [--json FILE] [--markdown FILE] [--plot FILE.png]
+
+1. The ways of getting geometry that need no weights, on recorded clips and drawn streets of which cameras and
+   depth are known.
+2. DUSt3R's alignment of pointmaps that are made from drawn streets: the true points of each pair, with depth
+   5 % off in patches of an eighth of the width, a scale 10 % off, a focal length 5 % off, a tenth of gross
+   outliers, all drawn anew for each pair, and moving cars where they are at each frame. Beside it what the
+   authors' program makes of the same pairs: its initialisation with its defects, its loss, 300 steps of Adam,
+   a focal length for each image.
+3. Seconds of both to the same loss.
+4. Which pairs of frames are worth their time.
+
+At last memory and seconds against the number of frames, and a recorded clip through ``dreamdrive generate``
+with the true cameras and without. Seconds are those of the processor, on one thread, so that they depend
+little on what else the machine does. Each measurement is a file below ``--runs``; with ``--resume`` those
+that are there count.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import torch
+from _geometry_jobs import Measurement, everything
+from _geometry_report import markdown, plot
+from _machine import describe_machine
+
+from dreamdrive.splat import set_threads
+
+
+def measure_all(wanted: Sequence[Measurement]) -> list[Measurement]:
+    """Measure what is not there; returns what failed, which is printed and stops nothing else."""
+    failed: list[Measurement] = []
+    for job in wanted:
+        if job.result.exists():
+            continue
+        began = time.perf_counter()
+        try:
+            row = job.measure()
+        except Exception as error:  # noqa: BLE001  (whatever it is, the others go on)
+            print(f"{job.name} failed: {error!r}", file=sys.stderr, flush=True)
+            failed.append(job)
+            continue
+        job.result.parent.mkdir(parents=True, exist_ok=True)
+        job.result.write_text(json.dumps(row) + "\n")
+        print(f"{job.name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+    return failed
+
+
+def chosen(wanted: Sequence[Measurement], patterns: Sequence[str] | None) -> list[Measurement]:
+    """Those whose names match, in the order of the patterns; all without any."""
+    if not patterns:
+        return list(wanted)
+    return list(dict.fromkeys(job for p in patterns for job in wanted if fnmatch(job.name, p)))
+
+
+def report_of(wanted: Sequence[Measurement]) -> dict[str, Any]:
+    """Rows of what is there, by kind."""
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for job in wanted:
+        if job.result.exists():
+            rows.setdefault(type(job).__name__, []).append(json.loads(job.result.read_text()))
+    measured = sum(map(len, rows.values()))
+    return {"machine": describe_machine(), "wanted": len(wanted), "measured": measured, "rows": rows}
+
+
+def rounded(value: Any) -> Any:
+    """Six digits of every number: more is noise, and makes the file long."""
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [rounded(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="a little of each table")
+    parser.add_argument("--resume", action="store_true", help="keep measurements that are there")
+    parser.add_argument("--table-only", action="store_true", help="measure nothing, show what is there")
+    parser.add_argument("--only", nargs="+", metavar="PATTERN", help="names like 'memory-*', in this order")
+    parser.add_argument("--runs", type=Path, default=Path("runs/geometry"), metavar="DIR")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="where the tables go")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="a picture of memory and seconds")
+    return parser.parse_args(arguments)
+
+
+def main() -> int:
+    """Measure what is not there yet and print the tables."""
+    options = options_of()
+    torch.set_num_threads(1)
+    set_threads(1)
+    wanted = everything(options.runs, quick=options.quick)
+    todo = chosen(wanted, options.only)
+    if not options.resume and not options.table_only:
+        for job in todo:
+            job.result.unlink(missing_ok=True)
+    failed = [] if options.table_only else measure_all(todo)
+    report = report_of(wanted)
+    text = markdown(report)
+    print(text)
+    if options.json:
+        options.json.write_text(json.dumps(rounded(report)) + "\n")
+    if options.markdown:
+        options.markdown.write_text(text)
+    if options.plot:
+        plot(report, options.plot)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

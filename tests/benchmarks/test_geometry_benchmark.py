@@ -1,0 +1,157 @@
+"""The geometry benchmark's bookkeeping: which measurements there are, errors, tables."""
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks._simulated_pairs import Truth
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def _path(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(FOLDER))
+
+
+def module(name: str) -> ModuleType:
+    return importlib.import_module(name)
+
+
+@pytest.fixture
+def truth() -> Truth:
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    poses[:, 2, 3] = [0.0, 1.0, 2.0, 3.0]
+    return Truth(np.full((4, 6, 8), 10.0), poses, focal_px=7.0)
+
+
+def row(**other: Any) -> dict[str, Any]:
+    noise = {"depth": 0.05, "unseen": 1.0, "mistaken": False}
+    case = {"world": "bend a", "frames": 25, "size": [128, 80], "graph": "swin-3-noncyclic", "noise": noise}
+    found = {"path_percent": 0.5, "focal_percent": 1.0, "abs_rel": 0.02, "seconds": 10.0, "loss": 1.0}
+    told = {"path_observed": True, "focal_observed": True, "edges": 138, "steps": 300, "method": "ours"}
+    return {**case, **found, **told, **other}
+
+
+def test_each_measurement_has_a_file_of_its_own() -> None:
+    jobs = module("_geometry_jobs")
+    for quick in (False, True):
+        wanted = jobs.everything(Path("runs"), quick=quick)
+        assert len({job.result for job in wanted}) == len(wanted)
+        assert {type(job).__name__ for job in wanted} >= {"Alignment", "BackendRun", "MemoryRun"}
+    assert len(jobs.everything(Path("runs"), quick=True)) < 10
+
+
+def test_patterns_choose_and_order() -> None:
+    jobs = module("_geometry_jobs").everything(Path("runs"), quick=True)
+    chosen = module("geometry").chosen
+    assert chosen(jobs, None) == jobs
+    assert [job.name.split("-")[0] for job in chosen(jobs, ["memory-*", "backend-*"])] == [
+        "memory",
+        "backend",
+        "backend",
+    ]
+
+
+def test_numbers_keep_six_digits() -> None:
+    found = module("geometry").rounded({"a": [1 / 3, 2, None, True, "x"], "b": 123456789.0})
+    assert found == {"a": [0.333333, 2, None, True, "x"], "b": 123457000.0}
+
+
+def test_a_way_turns_a_quarter_of_a_circle() -> None:
+    worlds = module("_geometry_worlds")
+    way = worlds.turned(np.array([1.0, 2.0, 0.0]), 10.0, 1, 8.0, np.array([0.0, 10.0, 10 + 4 * np.pi, 50.0]))
+    np.testing.assert_allclose(way[:3], [[1, 2, 0], [11, 2, 0], [19, 10, np.pi / 2]], atol=1e-9)
+    np.testing.assert_allclose(way[3], [19, 10 + 40 - 4 * np.pi, np.pi / 2])
+    right = worlds.turned(np.zeros(3), 10.0, -1, 8.0, np.array([10 + 4 * np.pi]))
+    np.testing.assert_allclose(right, [[18, -8, -np.pi / 2]], atol=1e-9)
+
+
+def test_errors_know_neither_the_world_nor_the_unit(truth: Truth) -> None:
+    alignment = module("_geometry_alignment")
+    poses = truth.world_from_camera.copy()
+    poses[:, :3, 3] = 3 * poses[:, :3, 3] + 5
+    found = alignment.errors_of(poses, np.array([7.0, 7.0, 7.7, 7.0]), list(3 * truth.depth), truth)
+    assert found["path_percent"] == pytest.approx(0, abs=1e-9)
+    assert found["abs_rel"] == pytest.approx(0, abs=1e-9)
+    assert found["focal_percent"] == pytest.approx(10)
+
+
+def test_a_standing_camera_has_no_path_error(truth: Truth) -> None:
+    truth.world_from_camera[:, :3, 3] *= 0.1
+    poses = truth.world_from_camera
+    found = module("_geometry_alignment").errors_of(poses, np.full(4, 7.0), list(truth.depth), truth)
+    assert found["path_percent"] is None
+    assert found["abs_rel"] == 0
+
+
+def test_the_table_names_the_targets_that_are_missed() -> None:
+    report = module("_geometry_report")
+    assert report.misses(row()) == []
+    assert report.misses(row(path_percent=1.5, focal_percent=3.5)) == ["path", "focal"]
+    assert report.misses(row(path_percent=None)) == []
+    upstream = row(method="upstream", path_percent=8.0, focal_percent=9.0)
+    lines = report.accuracy_table([row(path_percent=1.5), upstream]).splitlines()
+    assert lines[2].startswith(
+        "| bend a | where they are | 1.50 | 1.00 | 0.020 | yes | yes | path | - | - | 8.00 |"
+    )
+
+
+def test_a_few_steps_of_adam_tell_seconds_and_nothing_else() -> None:
+    report = module("_geometry_report")
+    ours = row(method=module("_geometry_alignment").PAPER, seconds=20.0)
+    for steps, told in ((300, "| 100 | 2.0000 | 5.0 |"), (3, "| 100 (from 3 steps) | - | 5.0 |")):
+        adam = row(method="upstream", seconds=100.0, loss=2.0, steps=steps)
+        assert report.speed_table([ours, adam]).endswith(told)
+        cells = report.accuracy_table([row(), ours, adam]).splitlines()[2].split(" | ")
+        assert (cells[-3] == "-") == (steps == 3)
+
+
+def test_graphs_of_one_case_are_a_table() -> None:
+    report = module("_geometry_report")
+    other = row(graph="logwin-5-noncyclic", path_percent=0.2, edges=188)
+    assert report.graph_tables([row()]) == []
+    ((title, text),) = report.graph_tables([row(), other])
+    assert title == "Which pairs: 25 frames"
+    assert "| logwin-5-noncyclic | 188 | 0.20 | 1.00 | 10 |" in text
+    assert report.accuracy_table([row(), other]) is None
+
+
+def test_what_does_not_fit_is_refused_with_the_figure() -> None:
+    memory = module("_geometry_memory")
+    told = memory.measure(24, (128, 80), "swin-3-noncyclic", np.float32, 0.1)
+    assert "24 images in 132 pairs takes about" in told["refused"]
+    case = {
+        "frames": 24,
+        "size": [128, 80],
+        "graph": "swin-3-noncyclic",
+        "dtype": "float32",
+        "memory_gb": 0.1,
+    }
+    assert "refused: above 0.1 GB" in module("_geometry_report").memory_table([{**case, **told}])
+
+
+def test_a_drive_is_enlarged_by_blocks(truth: Truth) -> None:
+    truth.depth[0, 1, 2] = 20
+    found = module("_geometry_memory").enlarged(truth, 4)
+    assert found.depth.shape == (4, 24, 32)
+    assert (found.depth[0, 4:8, 8:12] == 20).all()
+    assert found.focal_px == 28
+
+
+def test_true_cameras_are_read_back_as_they_are(tmp_path: Path) -> None:
+    backends = module("_geometry_backends")
+    made = module("_geometry_worlds").world_of("straight a", 2, 10.0, (48, 32), 0)
+    file = tmp_path / "cameras.json"
+    backends.write_cameras(made, file)
+    clip = backends.clip_of(made)
+    attached = backends.attach(clip, file)
+    pinhole, true = attached.rig[0], made.cameras[0]
+    assert (pinhole.fx_px, pinhole.cx_px, pinhole.cy_px) == pytest.approx(
+        (true.fx_px, true.cx_px, true.cy_px)
+    )
+    moved = np.linalg.inv(true.world_from_camera) @ made.cameras[1].world_from_camera
+    np.testing.assert_allclose(attached.known.world_from_camera[1], moved, atol=1e-9)
