@@ -50,6 +50,7 @@ def generate(
     geometry_method: str = "classical",
     geometry_files: Path | None = None,
     weights: str | Path | None = None,
+    refine_poses: bool = False,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
     camera_height_m: float | None = None,
@@ -69,6 +70,7 @@ def generate(
         geometry_method: How cameras and depth are found.
         geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.files``.
         weights: The network of that geometry method: a file or folder, or a name, see ``hub.find_weights``.
+        refine_poses: Whether given poses tell only how long the path is, see ``geometry.refine``.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
@@ -98,6 +100,7 @@ def generate(
         "quality": quality,
         "representation": representation,
         "camera_height_m": camera_height_m,
+        "refine_poses": refine_poses,
         **_reading(control),
     }
     request = {
@@ -145,7 +148,7 @@ def _make(
     geometry = stages.run(
         "geometry",
         ("prior",),
-        [method, height_m, *of_geometry, seed["geometry"]],
+        [method, height_m, chosen["refine_poses"], *of_geometry, seed["geometry"]],
         lambda _: _reconstructed(
             clip if geometry_files is None else attach(clip, geometry_files, control.path),
             clip,
@@ -153,6 +156,7 @@ def _make(
             seed=seed["geometry"],
             method=method,
             weights=weights,
+            refine_poses=chosen["refine_poses"],
         ),
     )
     seeds = stages.run(

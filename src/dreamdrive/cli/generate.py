@@ -28,6 +28,7 @@ def generate(
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     poses: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    refine_poses: bool = False,
     geometry_files: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
@@ -59,6 +60,8 @@ def generate(
         poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
         geometry_files: Known cameras, poses and depth, a file or its folder: COLMAP model, nerfstudio's
             transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see docs/geometry_files.md.
+        refine_poses: Let given poses tell only how long the path is, and the frames how it runs: for poses of
+            a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         hold_out: Withhold every N-th frame to measure how well it is predicted.
@@ -92,6 +95,7 @@ def generate(
             prior=prior,
             geometry_method=geometry,
             geometry_files=geometry_files,
+            refine_poses=refine_poses,
             weights=weights,
             quality=quality,
             representation=representation,

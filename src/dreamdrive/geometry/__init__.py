@@ -1,5 +1,6 @@
 """F_MVS (eq. 4): from a clip to cameras, depth, confidence, sky and evidence of motion."""
 
+from functools import partial
 from pathlib import Path
 
 from dreamdrive.errors import InputError
@@ -7,6 +8,7 @@ from dreamdrive.geometry.classical import CLASSICAL
 from dreamdrive.geometry.dust3r import DUST3R
 from dreamdrive.geometry.feedforward import FEED_FORWARD
 from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.refine import refined
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -33,6 +35,7 @@ def reconstruct(
     seed: int = 0,
     method: str = "classical",
     weights: Path | None = None,
+    refine_poses: bool = False,
 ) -> Geometry:
     """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
 
@@ -42,9 +45,11 @@ def reconstruct(
         seed: Seed of everything random.
         method: Name of the method.
         weights: The network's file or folder, for methods that have one.
+        refine_poses: Whether known poses give the length of the path only, see ``refine``.
 
     Raises:
-        InputError: See ``backend_of``; or the clip or the weights cannot be used.
+        InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.
     """
     backend = backend_of(method, weights)
-    return backend.reconstruct(clip, camera_height_m=camera_height_m, seed=seed, weights=weights)
+    how = partial(backend.reconstruct, camera_height_m=camera_height_m, seed=seed, weights=weights)
+    return refined(clip, how) if refine_poses else how(clip)
