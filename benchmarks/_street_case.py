@@ -13,7 +13,6 @@ from dreamdrive.data.corruption import corrupt, parse_corruption
 from dreamdrive.data.intrinsics import guess_camera
 from dreamdrive.data.select import held_out_mask
 from dreamdrive.data.world import Drive, WorldBox, make_street
-from dreamdrive.evaluate.similarity import Similarity
 from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
@@ -23,6 +22,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.similarity import Similarity
 from dreamdrive.stages import Stages, stage_seed
 
 FRAMES, RATE_HZ, SIZE, HOLD_OUT = 24, 10.0, (320, 192), 8
@@ -129,7 +129,7 @@ def to_scene(camera: Camera, similarity: Similarity) -> Camera:
     """A camera of the true world in that of a scene; what it sees is the same."""
     pose = np.eye(4)
     pose[:3, :3] = similarity.rotation.T @ camera.world_from_camera[:3, :3]
-    away = camera.world_from_camera[:3, 3] - similarity.translation_m
+    away = camera.world_from_camera[:3, 3] - similarity.translation
     pose[:3, 3] = similarity.rotation.T @ away / similarity.scale
     return camera.at(pose)
 

@@ -15,7 +15,6 @@ from jaxtyping import Float, UInt8
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.evaluate.decomposition import evaluate_decomposition
 from dreamdrive.evaluate.extractors import Extractor
-from dreamdrive.evaluate.similarity import fit_similarity
 from dreamdrive.evaluate.truth import Truth
 from dreamdrive.evaluate.video import windows
 from dreamdrive.fit import Parts, Representation, fit
@@ -23,6 +22,7 @@ from dreamdrive.held_out import likeness
 from dreamdrive.options import Quality
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.splat.scene_view import render_scene
 from dreamdrive.stages import Progress, stage_seed
 

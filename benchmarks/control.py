@@ -27,7 +27,6 @@ from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.evaluate.actor_places import offset_m
-from dreamdrive.evaluate.similarity import Similarity, fit_similarity
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.pipeline import generate
 from dreamdrive.scene.camera import Camera
@@ -35,6 +34,7 @@ from dreamdrive.scene.control import Control
 from dreamdrive.scene.folder import load_scene
 from dreamdrive.scene.layout import Layout
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.similarity import Similarity, fit_similarity
 from dreamdrive.splat.scene_view import render_scene
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -8,11 +8,11 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from dreamdrive.evaluate.similarity import Similarity
 from dreamdrive.evaluate.truth import Truth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.similarity import Similarity
 from dreamdrive.splat import one_torch_thread, render
 
 LEAST_SHARE = 1e-3
@@ -84,7 +84,7 @@ def offset_m(
     if inside.sum() < _FOUND * mask.sum():
         return None
     own = (everywhere > 0) & (near > _FOUND * everywhere)
-    centres = truth_from_scene.points(shown.means.numpy()[own].astype(np.float64))
+    centres = truth_from_scene(shown.means.numpy()[own].astype(np.float64))
     surface = truth.points_m(frame, mask)
     return _middle(centres, everywhere[own]) - _middle(surface, np.ones(len(surface)))
 

@@ -11,12 +11,12 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.evaluate.actor_places import ActorError, actor_error
 from dreamdrive.evaluate.retrieval import Retrieval, retrieval
-from dreamdrive.evaluate.similarity import fit_similarity
 from dreamdrive.evaluate.true_labels import places, true_labels
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.deformation import alive_at
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.splat.scene_view import render_scene
 
 EDGE_SHARE = 1 / 64
@@ -89,7 +89,7 @@ def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
     moving, judged = true_labels(scene, views, truth, similarity.scale)
     labels = np.repeat([0.0, 1.0], [len(scene.static), len(scene.dynamic)])
     found, asked = (np.stack([c.world_from_camera[:3, 3] for c in cs]) for cs in (views, truth.cameras))
-    left_m = np.linalg.norm(similarity.points(found) - asked, axis=1)
+    left_m = np.linalg.norm(similarity(found) - asked, axis=1)
     return Decomposition(
         frames=len(views),
         width_px=truth.size[0],

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, UInt8
 from dreamdrive.drive.panels import Image, depth_colours, labelled
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.geometry_truth import GeometryTruth
-from dreamdrive.evaluate.similarity import fit_similarity
+from dreamdrive.scene.similarity import fit_similarity
 
 _FRAMES = 3
 _PATH_PX = 260
@@ -85,7 +85,7 @@ def _paths(estimate: Estimate, truth: GeometryTruth, width: int) -> Image:
     similarity = fit_similarity(estimate.cameras, truth.cameras)
     found, true = (np.stack([c.world_from_camera[:3, 3] for c in x.cameras]) for x in (estimate, truth))
     first = truth.cameras[0].camera_from_world
-    both = [x @ first[:3, :3].T + first[:3, 3] for x in (true, similarity.points(found))]
+    both = [x @ first[:3, :3].T + first[:3, 3] for x in (true, similarity(found))]
     places = np.concatenate(both)[:, [2, 0]]
     low, high = places.min(axis=0), places.max(axis=0)
     room = np.array([width, _PATH_PX]) - 2 * _MARGIN_PX

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.registration import register
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
+from dreamdrive.scene.similarity import fit_similarity
 
 _MOST_APART = 0.05  # of the path's length, root mean square
 _STANDING_M = 0.5
@@ -45,21 +45,23 @@ def refined(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
 
 def _with_length_of(geometry: Geometry, known: Float[np.ndarray, "f 4 4"]) -> Geometry:
     """The geometry in metres of the known path, if it is the same path."""
+    wanted = [camera.at(pose) for camera, pose in zip(geometry.cameras, known, strict=True)]
+    onto = fit_similarity(geometry.cameras, wanted)
     poses = np.stack([camera.world_from_camera for camera in geometry.cameras])
-    moved = register(poses[:, :3, 3], known[:, :3, 3], np.ones(len(poses)))
-    apart_m = np.linalg.norm(moved(poses[:, :3, 3]) - known[:, :3, 3], axis=1)
+    apart_m = np.linalg.norm(onto(poses[:, :3, 3]) - known[:, :3, 3], axis=1)
     share = float(np.sqrt(np.square(apart_m).mean())) / _length(known)
     if share > _MOST_APART:
         raise InputError(
             f"the given poses and the path that the frames show are {share:.0%} of its length apart, too far "
             "for refining: are they of these frames, in metres, world-from-camera?"
         )
-    scaled = _scaled(geometry, _extent(known) / _extent(poses))
-    turned_deg = np.degrees(_angles(poses, known))
+    rest = np.swapaxes(known[:, :3, :3], 1, 2) @ onto.rotation @ poses[:, :3, :3]
+    turned_deg = np.degrees(np.arccos(np.clip((np.trace(rest, axis1=1, axis2=2) - 1) / 2, -1, 1)))
     note = (
         f"the given poses are refined by the frames: moved by {apart_m.max():.2f} m and turned by "
         f"{turned_deg.max():.2f} degrees at most"
     )
+    scaled = _scaled(geometry, onto.scale)
     return replace(scaled, detected=(*scaled.detected, note))
 
 
@@ -83,18 +85,3 @@ def _scaled(geometry: Geometry, factor: float) -> Geometry:
 
 def _length(poses: Float[np.ndarray, "f 4 4"]) -> float:
     return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
-
-
-def _extent(poses: Float[np.ndarray, "f 4 4"]) -> float:
-    """Root mean square distance from the middle of a path: small turns of its frames do not count."""
-    away = poses[:, :3, 3] - poses[:, :3, 3].mean(axis=0)
-    return float(np.sqrt(np.square(away).sum(axis=1).mean()))
-
-
-def _angles(poses: Float[np.ndarray, "f 4 4"], known: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, " f"]:
-    """Angle (F,) in radians between both, after the turn of the world that brings them together best."""
-    between = known[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
-    left, _, right = np.linalg.svd(between.sum(axis=0))
-    world = (left * np.array([1, 1, np.linalg.det(left @ right)])) @ right
-    rest = np.swapaxes(between, 1, 2) @ world
-    return np.arccos(np.clip((np.trace(rest, axis1=1, axis2=2) - 1) / 2, -1, 1))

@@ -1,32 +1,11 @@
 """The similarity that best brings points onto points."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
+from dreamdrive.scene.similarity import Similarity
+
 _TINY = 1e-12
-
-
-@dataclass(frozen=True)
-class Similarity:
-    """From points x to scale * rotation @ x + translation.
-
-    Attributes:
-        scale: Positive.
-        rotation: Right-handed (3, 3).
-        translation: In the unit of the target (3,).
-    """
-
-    scale: float
-    rotation: Float[np.ndarray, "3 3"]
-    translation: Float[np.ndarray, "3"]
-
-    def __call__(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """The points (..., 3) brought over, in their own precision, float32 at least."""
-        kind = np.result_type(points.dtype, np.float32)
-        turned = points.astype(kind, copy=False) @ (self.scale * self.rotation.T).astype(kind)
-        return turned + self.translation.astype(kind)
 
 
 def register(

@@ -11,6 +11,8 @@ from dreamdrive.data.world import make_street
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
+from dreamdrive.geometry.dust3r.reconstruct import planned_pairs
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
@@ -99,3 +101,10 @@ def test_one_frame_is_too_few(clip: Clip, weights: Path):
     )
     with pytest.raises(InputError, match="two frames or more"):
         reconstruct(alone, method="dust3r", weights=weights)
+
+
+def test_pairs_get_fewer_before_a_clip_is_refused():
+    assert len(planned_pairs(24, (512, 288))) == len(make_pairs(24, video_graph(24)))
+    assert len(planned_pairs(128, (512, 288))) < len(make_pairs(128, video_graph(128)))
+    with pytest.raises(InputError, match=r"Aligning 1000 images .* allowed"):
+        planned_pairs(1000, (512, 288))

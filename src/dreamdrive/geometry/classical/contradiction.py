@@ -1,6 +1,7 @@
 """Whether given poses can be those of the frames."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -114,6 +115,7 @@ def _own(
     matrix = camera.matrix.copy()
     matrix[:2, 2] -= 0.5  # tracks count pixels from 0
     cv2.setRNGSeed(0)
+    essential: Any  # None where nothing fits
     essential, inliers = cv2.findEssentialMat(here, there, matrix, cv2.RANSAC, 0.999, 1.0)
     found = np.eye(4)
     if essential is not None and essential.shape == (3, 3):

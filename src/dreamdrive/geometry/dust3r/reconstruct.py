@@ -4,13 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical.evidence import Evidence, free_pixels, look
 from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
 from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
 from dreamdrive.geometry.dust3r.network.images import fitting
 from dreamdrive.geometry.dust3r.network.inference import infer
@@ -24,7 +25,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-_MOST_RESIDUAL = 0.2  # median relative miss of the pairs
+_NARROWER = ("swin-3-noncyclic", "swin-2-noncyclic")
 
 
 def reconstruct(
@@ -51,9 +52,34 @@ def reconstruct(
     evidence = look(clip)
     how = fitting(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]
-    maps = infer(network, pictures, make_pairs(len(clip), video_graph(len(clip))))
+    maps = infer(network, pictures, planned_pairs(len(clip), how.size))
     aligned = align(masked(maps, _usable(clip, evidence, how)), _options(clip, seed), _known(clip, how))
     return finish(clip, measured(clip, aligned, how), evidence, camera_height_m=camera_height_m, seed=seed)
+
+
+def planned_pairs(frames: int, size: tuple[int, int]) -> Int[np.ndarray, "e 2"]:
+    """Pairs (E, 2) of frames: those of ``video_graph``, or of narrower windows where they would not fit.
+
+    Args:
+        frames: Number of frames.
+        size: Width and height of the pictures.
+
+    Raises:
+        InputError: Not even the alignment of pairs of close neighbours fits into the memory allowed.
+    """
+    options = AlignOptions()
+    refused: InputError | None = None
+    for graph in (video_graph(frames), *_NARROWER):
+        edges = make_pairs(frames, graph)
+        predicted = predicted_bytes([(size[1], size[0])] * frames, edges, options.samples_per_image)
+        try:
+            check_budget(predicted, int(options.memory_gb * 1e9), frames, len(edges))
+        except InputError as error:
+            refused = error
+        else:
+            return edges
+    assert refused is not None
+    raise refused
 
 
 def masked(maps: PairMaps, usable: Bool[np.ndarray, "n h w"]) -> PairMaps:

@@ -10,9 +10,9 @@ from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.feedforward.network import Seen
-from dreamdrive.geometry.registration import Similarity
 from dreamdrive.geometry.weighted import weighted_median
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.similarity import Similarity
 
 _PIXELS = 4_000  # of a frame that take part in joining; more do not make it better
 

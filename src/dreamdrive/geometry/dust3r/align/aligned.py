@@ -12,7 +12,7 @@ from dreamdrive.geometry.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.dust3r.align.samples import Dense
 from dreamdrive.geometry.dust3r.align.state import State
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.registration import Similarity
+from dreamdrive.scene.similarity import Similarity
 
 _SURE_FOCAL = 0.03  # standard error of the shared focal length up to which it counts as observed
 _SURE_STEP = 0.5  # of the way between paired images, by which a pair's own camera may be off

@@ -53,7 +53,7 @@ class AlignOptions:
     outlier: float = 0.05
     sharper: float = 3.0
     steps: int = 60
-    memory_gb: float = 4.0
+    memory_gb: float = 8.0
     seed: int = 0
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
-from dreamdrive.geometry.registration import Similarity, register
+from dreamdrive.geometry.registration import register
+from dreamdrive.scene.similarity import Similarity
 
 _STANDING = 1e-9
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.registration import Similarity
+from dreamdrive.scene.similarity import Similarity
 
 Normalisation = Literal["pooled", "modular"]
 _FOCAL_BREAK = 20.0

@@ -11,7 +11,8 @@ from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_px, focal_v
 from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.pnp import pose_by_pnp
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.registration import Similarity, register
+from dreamdrive.geometry.registration import register
+from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
 PNP_CONFIDENCE = 3.0

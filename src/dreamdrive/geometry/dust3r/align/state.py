@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.geometry.registration import Similarity
+from dreamdrive.scene.similarity import Similarity
 
 PER_IMAGE = 7
 """Steps of an image: turn about its centre (3), shift (3), log focal length; all in the world's frame."""

@@ -1,4 +1,4 @@
-"""The similarity that brings one recording's cameras onto those of another."""
+"""Rotation, shift and scale between two worlds, such as those of two recordings of the same cameras."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,26 +8,28 @@ from jaxtyping import Float
 
 from dreamdrive.scene.camera import Camera
 
-_STANDING_M = 1e-6
+_STANDING = 1e-6
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """From points x of one world to scale * rotation @ x + translation_m in another.
+    """From points x of one world to scale * rotation @ x + translation in another.
 
     Attributes:
-        scale: Metres there for a unit of length here.
+        scale: Lengths there for a unit of length here; positive.
         rotation: Right-handed (3, 3).
-        translation_m: In the other world (3,).
+        translation: In the other world (3,).
     """
 
     scale: float
     rotation: Float[np.ndarray, "3 3"]
-    translation_m: Float[np.ndarray, "3"]
+    translation: Float[np.ndarray, "3"]
 
-    def points(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """The points (..., 3) in the other world."""
-        return self.scale * points @ self.rotation.T + self.translation_m
+    def __call__(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """The points (..., 3) brought over, in their own precision, float32 at least."""
+        kind = np.result_type(points.dtype, np.float32)
+        turned = points.astype(kind, copy=False) @ (self.scale * self.rotation.T).astype(kind)
+        return turned + self.translation.astype(kind)
 
 
 def fit_similarity(found: Sequence[Camera], true: Sequence[Camera]) -> Similarity:
@@ -50,7 +52,7 @@ def fit_similarity(found: Sequence[Camera], true: Sequence[Camera]) -> Similarit
     middle, target = here[:, :3, 3].mean(axis=0), there[:, :3, 3].mean(axis=0)
     x, y = here[:, :3, 3] - middle, there[:, :3, 3] - target
     spread = float(np.sqrt(np.square(x).sum())), float(np.sqrt(np.square(y).sum()))
-    moves = min(spread) > _STANDING_M
+    moves = min(spread) > _STANDING
     together = np.einsum("fij,fkj->ik", there[:, :3, :3], here[:, :3, :3]) / (3 * len(here))
     if moves:
         together += y.T @ x / (spread[0] * spread[1])

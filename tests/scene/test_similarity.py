@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.evaluate.similarity import fit_similarity
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.similarity import fit_similarity
 
 PINHOLE = Camera(50.0, 50.0, 20.0, 15.0, 40, 30)
 
@@ -38,7 +38,7 @@ def test_a_similarity_is_found_again(way: str) -> None:
     assert found.scale == pytest.approx(1.7)
     np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
     points = np.random.default_rng(1).normal(size=(5, 3))
-    np.testing.assert_allclose(found.points(points), 1.7 * points @ turn.T + [3, -2, 5], atol=1e-8)
+    np.testing.assert_allclose(found(points), 1.7 * points @ turn.T + [3, -2, 5], atol=1e-8)
 
 
 def test_a_standing_camera_keeps_the_scale() -> None:
@@ -47,7 +47,7 @@ def test_a_standing_camera_keeps_the_scale() -> None:
     found = fit_similarity(here, moved(here, 3.0, turn, np.array([1.0, 2, 3])))
     assert found.scale == 1.0
     np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
-    np.testing.assert_allclose(found.translation_m, [1, 2, 3], atol=1e-9)
+    np.testing.assert_allclose(found.translation, [1, 2, 3], atol=1e-9)
 
 
 def test_frames_have_to_match() -> None:
