@@ -25,20 +25,15 @@ def weights(tmp_path: Path) -> Path:
     return save_pth(tmp_path / "tiny.pth", tiny(), img_size=(160, 160))
 
 
-def test_a_clip_becomes_a_scene(run: Run, tmp_path: Path, weights: Path) -> None:
-    out = tmp_path / "out"
+def test_a_clip_becomes_a_scene_and_other_weights_another(run: Run, tmp_path: Path, weights: Path) -> None:
+    out, hub = tmp_path / "out", tmp_path / "hub"
+    hub.mkdir()
     done = run("generate", *SHORT, "--geometry", "dust3r", "--weights", weights, "-o", out)
     assert done.code == 0, done.err
     report = json.loads((out / "report.json").read_text())
     assert report["geometry"]["pairs_residual"] > 0
     assert any("not to be believed" in note for note in report["detected"])
     assert len(load_scene(out / "scene").cameras) == 6
-
-
-def test_other_weights_make_another_scene(run: Run, tmp_path: Path, weights: Path) -> None:
-    out, hub = tmp_path / "out", tmp_path / "hub"
-    hub.mkdir()
-    assert run("generate", *SHORT, "--geometry", "dust3r", "--weights", weights, "-o", out).code == 0
     same = run("generate", *SHORT, "--geometry", "dust3r", "--weights", weights, "-o", out)
     other = run("generate", *SHORT, "--geometry", "dust3r", "--weights", save_hub(hub, tiny()), "-o", out)
     assert same.code == 0
