@@ -39,6 +39,10 @@ def write_points(path: Path, u: list[float], v: list[float], depth: list[float])
     np.savez(path, u=np.array(u), v=np.array(v), depth=np.array(depth))
 
 
+def edit(path: Path, old: str, new: str) -> None:
+    path.write_text(path.read_text().replace(old, new))
+
+
 def recording(folder: Path) -> Path:
     """A KITTI-like folder of 3 frames of 64x32, points in frame 1."""
     folder.mkdir(exist_ok=True)
@@ -190,23 +194,17 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
         "metre, 64x32 pixels",
     ),
     "another camera": (
-        lambda folder: (pandaset(folder) / "cameras.json").write_text(
-            (folder / "cameras.json").read_text().replace("side_camera", "other")
-        ),
+        lambda folder: edit(pandaset(folder) / "cameras.json", "side_camera", "other"),
         "--truth PLACE/cameras.json has the cameras other; none is called like the input, 'side_camera': "
         "name the input folder like its camera",
     ),
     "no matrix": (
-        lambda folder: (pandaset(folder) / "cameras.json").write_text(
-            (folder / "cameras.json").read_text().replace('"K"', '"k"')
-        ),
+        lambda folder: edit(pandaset(folder) / "cameras.json", '"K"', '"k"'),
         "--truth PLACE/cameras.json: side_camera has no usable width, height and K (KeyError('K')); expected "
         "pixels and a 3x3 matrix",
     ),
     "boxes without a place": (
-        lambda folder: (pandaset(folder) / "cuboids.json").write_text(
-            (folder / "cuboids.json").read_text().replace("position", "place")
-        ),
+        lambda folder: edit(pandaset(folder) / "cuboids.json", "position", "place"),
         "--truth PLACE/cuboids.json is damaged (KeyError('position')); expected frames, each a list of boxes "
         "with motion, position, size_wlh and yaw: take it away to do without what moves",
     ),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.classical import assemble, contradiction
+from dreamdrive.geometry.classical import assemble
 from dreamdrive.geometry.classical import scale as scales
 from dreamdrive.geometry.classical.dense import StaticDepth, densify
 from dreamdrive.geometry.classical.evidence import Evidence
@@ -15,10 +15,9 @@ from dreamdrive.geometry.classical.poses import as_posed
 from dreamdrive.geometry.classical.scale import Metric, Street
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.geometry import Geometry, Ground, Scale
+from dreamdrive.scene.geometry import Geometry
 
 _MEDIAN_DEPTH_M = 12.0  # of a street seen from a car; makes "near" a word before the metre is known
-_AGREES = 0.15  # relative
 
 
 def finish(
@@ -34,12 +33,7 @@ def finish(
         evidence: The first look at them.
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
-
-    Raises:
-        InputError: Known poses contradict the frames.
     """
-    if clip.known.world_from_camera is not None:
-        contradiction.check(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)
     poses = measured.world_from_camera.astype(np.float64)
     poses[:, :3, 3] *= factor
@@ -76,12 +70,4 @@ def _metric(
     street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
     if measured.unit is None:
         return scales.from_ground(street, height_m, measured.focal_observed, seed)
-    plane, _ = scales.find_ground(street, seed, scales.KNOWN_HEIGHTS_M)
-    ground = None if plane is None else Ground(plane.normal, plane.offset)
-    notes: tuple[str, ...] = ()
-    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > _AGREES:
-        notes = (
-            f"by {measured.unit} the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m",
-        )
-    others = scales.by_height(plane, 1.0, height_m)
-    return Metric(1.0, ground, Scale(measured.unit, measured.unit_spread, others), notes)
+    return scales.as_given(street, measured.unit, measured.unit_spread, measured.unit, height_m, seed)

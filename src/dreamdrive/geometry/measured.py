@@ -4,9 +4,31 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from dreamdrive.scene.camera import Camera
+
+
+def trusted(
+    depth: Float[np.ndarray, "f h w"], trust: Float[np.ndarray, "f h w"], there: Bool[np.ndarray, "f h w"]
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    """Depth (F, H, W) where it is there, and as its confidence the share of that depth that is trusted less.
+
+    Args:
+        depth: As a network gives it.
+        trust: Grows with its trust, on any scale.
+        there: Pixels whose depth counts; elsewhere both are 0.
+    """
+    confidence = np.zeros(depth.shape, np.float32)
+    confidence[there] = ranks(trust[there])
+    return np.where(there, depth, 0).astype(np.float32), confidence
+
+
+def ranks(values: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Share of all values that are at most this one, equal ones at their mean."""
+    from scipy.stats import rankdata  # here: it takes half a second, and most runs have no network
+
+    return rankdata(values).reshape(values.shape) / max(values.size, 1)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical.paths import path_length
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 from dreamdrive.scene.similarity import fit_similarity
@@ -35,7 +36,7 @@ def refined(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
     if len(clip.rig) > 1:
         raise InputError(f"poses of one camera can be refined; the clip has {len(clip.rig)}")
     own = replace(clip, known=replace(clip.known, world_from_camera=None, points=None))
-    found = reconstruct(own) if _length(known) > _STANDING_M else None
+    found = reconstruct(own) if path_length(known) > _STANDING_M else None
     if found is None or found.fallback is not None:
         why = "the camera stands still" if found is None else found.fallback
         given = reconstruct(clip)
@@ -49,7 +50,7 @@ def _with_length_of(geometry: Geometry, known: Float[np.ndarray, "f 4 4"]) -> Ge
     onto = fit_similarity(geometry.cameras, wanted)
     poses = np.stack([camera.world_from_camera for camera in geometry.cameras])
     apart_m = np.linalg.norm(onto(poses[:, :3, 3]) - known[:, :3, 3], axis=1)
-    share = float(np.sqrt(np.square(apart_m).mean())) / _length(known)
+    share = float(np.sqrt(np.square(apart_m).mean())) / path_length(known)
     if share > _MOST_APART:
         raise InputError(
             f"the given poses and the path that the frames show are {share:.0%} of its length apart, too far "
@@ -81,7 +82,3 @@ def _scaled(geometry: Geometry, factor: float) -> Geometry:
         ground=None if ground is None else Ground(ground.normal_world, ground.offset_m * factor),
         scale=Scale("length of the given path", 0.0, others),
     )
-
-
-def _length(poses: Float[np.ndarray, "f 4 4"]) -> float:
-    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())

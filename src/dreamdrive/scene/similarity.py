@@ -56,11 +56,12 @@ def fit_similarity(found: Sequence[Camera], true: Sequence[Camera]) -> Similarit
     together = np.einsum("fij,fkj->ik", there[:, :3, :3], here[:, :3, :3]) / (3 * len(here))
     if moves:
         together += y.T @ x / (spread[0] * spread[1])
-    rotation = _nearest_rotation(together)
+    rotation = nearest_rotation(together)
     scale = float((y * (x @ rotation.T)).sum() / spread[0] ** 2) if moves else 1.0
     return Similarity(scale, rotation, target - scale * rotation @ middle)
 
 
-def _nearest_rotation(matrix: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+def nearest_rotation(matrix: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """The right-handed rotation nearest to a matrix (3, 3)."""
     left, _, right = np.linalg.svd(matrix)
     return (left * [1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from tests.geometry.dust3r.network.golden import tiny
 from tests.geometry.dust3r.network.test_checkpoint import save_pth
+from tests.streets import street_clip
 
-from dreamdrive.data.select import held_out_mask
 from dreamdrive.data.world import make_street
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
@@ -15,7 +15,7 @@ from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.dust3r.reconstruct import planned_pairs
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.clip import Clip
 
 FRAMES, SIZE = 6, (160, 96)
 
@@ -27,16 +27,7 @@ def drive():
 
 @pytest.fixture(scope="module")
 def clip(drive) -> Clip:
-    return Clip(
-        frames=drive.frames,
-        times_s=drive.times_s,
-        camera=np.zeros(FRAMES, np.int64),
-        rig=(drive.cameras[0].at(np.eye(4)),),
-        valid=np.ones(drive.depth_m.shape, bool),
-        held_out=held_out_mask(FRAMES, 4),
-        source_index=np.arange(FRAMES),
-        known=Known(intrinsics=True),
-    )
+    return replace(street_clip(drive, 4), features={})
 
 
 @pytest.fixture(scope="module")

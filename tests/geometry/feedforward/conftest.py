@@ -1,14 +1,14 @@
 """A street, its clip, and packages that know the truth of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 from tests.geometry.feedforward.fakes import KINDS, Truth, install, save_weights
+from tests.streets import street_clip
 from torch import Tensor
 
-from dreamdrive.data.select import held_out_mask
 from dreamdrive.data.world import Drive, make_street
 from dreamdrive.geometry.fitting import Fitting
 from dreamdrive.scene.clip import Clip, Known
@@ -23,16 +23,7 @@ def drive() -> Drive:
 
 @pytest.fixture(scope="session")
 def clip(drive: Drive) -> Clip:
-    return Clip(
-        frames=drive.frames,
-        times_s=drive.times_s,
-        camera=np.zeros(FRAMES, np.int64),
-        rig=(drive.cameras[0].at(np.eye(4)),),
-        valid=np.ones(drive.depth_m.shape, bool),
-        held_out=held_out_mask(FRAMES, 4),
-        source_index=np.arange(FRAMES),
-        known=Known(),
-    )
+    return replace(street_clip(drive, 4), known=Known(), features={})
 
 
 @pytest.fixture(params=KINDS)

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, UInt8
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical.evidence import Evidence
 from dreamdrive.geometry.classical.motion import track
+from dreamdrive.geometry.classical.paths import path_length
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 
@@ -47,16 +48,17 @@ class Explained:
 
 
 def check(clip: Clip, evidence: Evidence) -> None:
-    """Refuse known poses that contradict the frames.
+    """Refuse known poses that contradict the frames, where there are any.
 
     Args:
-        clip: Frames of which the poses are known.
+        clip: The frames.
         evidence: The first look at them.
 
     Raises:
         InputError: The frames of the first camera clearly show another motion.
     """
-    assert clip.known.world_from_camera is not None
+    if clip.known.world_from_camera is None:
+        return
     of = clip.camera == clip.camera[0]
     camera = clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px)
     found = explain(evidence.grey[of], evidence.street[of], camera, clip.known.world_from_camera[of])
@@ -88,7 +90,7 @@ def explain(
         camera: Pinhole of that size.
         world_from_camera: Poses to be checked, in any unit.
     """
-    path = float(np.linalg.norm(np.diff(world_from_camera[:, :3, 3], axis=0), axis=1).sum())
+    path = path_length(world_from_camera)
     apart = min(_APART, len(grey) - 1)
     given, own = [], []
     for first in np.unique(np.linspace(0, len(grey) - 1 - apart, _PAIRS).round().astype(int)).tolist():

@@ -55,6 +55,12 @@ def depth_ratios(
     return joined if len(joined) >= MIN_RATIOS else np.zeros(0)
 
 
+def factor_of(ratios: Float[np.ndarray, " n"]) -> tuple[float, float]:
+    """The factor that ratios (N,) agree on, and their spread around it as a fraction."""
+    factor = float(np.median(ratios))
+    return factor, float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
+
+
 def in_metres(clip: Clip, metres_per_unit: float | None) -> Clip:
     """The clip with its known depth in metres; without depth where nothing makes metres of its unit."""
     if metres_per_unit == 1 or clip.known.depth_m is None:

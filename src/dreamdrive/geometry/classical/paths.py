@@ -5,6 +5,11 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
 
+def path_length(poses: Float[np.ndarray, "f 4 4"]) -> float:
+    """Length of the way from pose to pose, in their unit."""
+    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
+
+
 def rebase(
     world_from_camera: Float[np.ndarray, "f 4 4"], points: Float[np.ndarray, "p 3"]
 ) -> tuple[Float[np.ndarray, "f 4 4"], Float[np.ndarray, "p 3"]]:

@@ -11,7 +11,7 @@ from dreamdrive.geometry.classical import contradiction, odometry, scale
 from dreamdrive.geometry.classical import evidence as looking
 from dreamdrive.geometry.classical.evidence import Evidence
 from dreamdrive.geometry.classical.known import depth_points, depth_ratios
-from dreamdrive.geometry.classical.paths import fill, rebase
+from dreamdrive.geometry.classical.paths import fill, path_length, rebase
 from dreamdrive.geometry.classical.reconstruct import Outcome, reconstruct
 from dreamdrive.geometry.classical.scale import Metric, Street
 from dreamdrive.scene.camera import Camera
@@ -71,8 +71,8 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
     """
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
+    contradiction.check(clip, evidence)
     if clip.known.world_from_camera is not None:
-        contradiction.check(clip, evidence)
         if not clip.known.metric:
             return _from_unscaled(clip, evidence, camera_height_m, seed)
         return _from_known(clip, evidence, camera_height_m, seed)
@@ -130,15 +130,8 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
 def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
     """The user's poses, moved so that the first frame's camera is the world; the road is only looked for."""
     street = _known_street(clip, evidence)
-    plane, _ = scale.find_ground(street, seed, scale.KNOWN_HEIGHTS_M)
-    ground = None if plane is None else Ground(plane.normal, plane.offset)
-    metric = Metric(1.0, ground, Scale("poses", 0.0, scale.by_height(plane, 1.0, height_m)), ())
-    notes = ["the given poses are used"]
-    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > 0.15:
-        notes.append(
-            f"by the given poses the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m"
-        )
-    return _with_known(clip, evidence, metric, notes)
+    metric = scale.as_given(street, "poses", 0.0, "the given poses", height_m, seed)
+    return _with_known(clip, evidence, metric, ["the given poses are used", *metric.notes])
 
 
 def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
@@ -183,7 +176,7 @@ def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]
     poses[:, :3, 3] *= metric.factor
     details = {} if clip.known.metric else {"metres_per_unit": metric.factor}
     posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, details)
-    return replace(posed, standing=evidence.motion.standing and _path_m(poses) < 0.5)
+    return replace(posed, standing=evidence.motion.standing and path_length(poses) < 0.5)
 
 
 def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:
@@ -261,7 +254,7 @@ def as_posed(
         "flow_px_at_320": float(np.median(evidence.motion.flow_px)) if len(clip) > 1 else 0.0,
         "moving_steps": int(evidence.motion.moving.sum()),
         "brightness": evidence.motion.brightness,
-        "path_m": _path_m(poses),
+        "path_m": path_length(poses),
     }
     return Posed(
         cameras=cameras,
@@ -275,7 +268,3 @@ def as_posed(
         detected=evidence.detected + tuple(notes),
         details=figures | details,
     )
-
-
-def _path_m(poses: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())

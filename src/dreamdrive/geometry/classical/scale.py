@@ -7,11 +7,13 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.geometry.classical.ground_points import Plane, fit_points
 from dreamdrive.geometry.classical.ground_sweep import Road, sweep
+from dreamdrive.geometry.classical.known import factor_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground, Scale
 
 USUAL_HEIGHT_M = 1.5
 KNOWN_HEIGHTS_M = (0.6, 5.0)
+AGREES = 0.15  # relative; a height that differs more is worth a note
 MIN_INLIERS, MIN_SHARE = 100, 0.25
 SPEEDS_M_S = (0.5, 45.0)
 ASSUMED_SPEED_M_S = 8.0
@@ -103,8 +105,7 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
 
 def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:
     """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
-    factor = float(np.median(ratios))
-    spread = float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
+    factor, spread = factor_of(ratios)
     plane, _ = find_ground(street, seed)
     ground = None if plane is None else Ground(plane.normal, plane.offset * factor)
     return Metric(factor, ground, Scale("depth", spread, by_height(plane, factor, height_m)), ())
@@ -128,6 +129,27 @@ def height_words(height_m: float | None) -> str:
     """The camera's height above the road and where it comes from."""
     wanted, word = (USUAL_HEIGHT_M, "assumed") if height_m is None else (height_m, "given")
     return f"camera height {wanted:.2f} m ({word})"
+
+
+def as_given(
+    street: Street, source: str, spread: float, words: str, height_m: float | None, seed: int
+) -> Metric:
+    """The unit of the poses is the metre already; the road is only looked for.
+
+    Args:
+        street: Posed clip in metres.
+        source: What says so.
+        spread: How far it may be off, as a fraction.
+        words: The same for a note, where the road disagrees with it.
+        height_m: Camera height that the user gave; None assumes 1.5 m.
+        seed: Seed of RANSAC.
+    """
+    plane, _ = find_ground(street, seed, KNOWN_HEIGHTS_M)
+    ground = None if plane is None else Ground(plane.normal, plane.offset)
+    notes: tuple[str, ...] = ()
+    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > AGREES:
+        notes = (f"by {words} the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m",)
+    return Metric(1.0, ground, Scale(source, spread, by_height(plane, 1.0, height_m)), notes)
 
 
 def _from_speed(street: Street, problem: str) -> Metric:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Int
-from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical import contradiction
 from dreamdrive.geometry.classical.evidence import Evidence, free_pixels, look
 from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
@@ -20,7 +20,7 @@ from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.frames import check_frames
-from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -42,14 +42,15 @@ def reconstruct(
         weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
 
     Raises:
-        InputError: No weights, frames as ``frames.check_frames`` refuses them, or weights or pointmaps that
-            cannot be used.
+        InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that contradict
+            them, or weights or pointmaps that cannot be used.
     """
     if weights is None:
         raise InputError("geometry dust3r needs the weights of its network")
     check_frames(clip, "dust3r")
     network = load_dust3r(weights)
     evidence = look(clip)
+    contradiction.check(clip, evidence)
     how = fitting(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]
     maps = infer(network, pictures, planned_pairs(len(clip), how.size))
@@ -68,18 +69,13 @@ def planned_pairs(frames: int, size: tuple[int, int]) -> Int[np.ndarray, "e 2"]:
         InputError: Not even the alignment of pairs of close neighbours fits into the memory allowed.
     """
     options = AlignOptions()
-    refused: InputError | None = None
-    for graph in (video_graph(frames), *_NARROWER):
-        edges = make_pairs(frames, graph)
-        predicted = predicted_bytes([(size[1], size[0])] * frames, edges, options.samples_per_image)
-        try:
-            check_budget(predicted, int(options.memory_gb * 1e9), frames, len(edges))
-        except InputError as error:
-            refused = error
-        else:
-            return edges
-    assert refused is not None
-    raise refused
+    budget = int(options.memory_gb * 1e9)
+    sizes = [(size[1], size[0])] * frames
+    choices = [make_pairs(frames, graph) for graph in (video_graph(frames), *_NARROWER)]
+    needs = [predicted_bytes(sizes, edges, options.samples_per_image) for edges in choices]
+    chosen = next((k for k, need in enumerate(needs) if need <= budget), len(choices) - 1)
+    check_budget(needs[chosen], budget, frames, len(choices[chosen]))
+    return choices[chosen]
 
 
 def masked(maps: PairMaps, usable: Bool[np.ndarray, "n h w"]) -> PairMaps:
@@ -100,9 +96,7 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
     camera = clip.rig[0] if clip.known.intrinsics else how.frame_camera(picture)
     depth, trust = (in_frames(part, how) for part in (aligned.depth, aligned.confidence))
     there = (trust > 1) & ~clip.held_out[:, None, None]
-    confidence = np.zeros(trust.shape, np.float32)
-    if there.any():
-        confidence[there] = rankdata(trust[there]) / np.count_nonzero(there)
+    depth, confidence = trusted(depth, trust, there)
     notes = [] if aligned.path_observed else ["the pairs do not agree on a path: it is not to be believed"]
     if not aligned.focal_observed:
         notes.append("the pairs do not agree on a focal length")
@@ -110,7 +104,7 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
         world_from_camera=aligned.world_from_camera,
         camera=replace(camera, world_from_camera=np.eye(4)),
         focal_observed=aligned.focal_observed,
-        depth=np.where(there, depth, 0).astype(np.float32),
+        depth=depth,
         confidence=confidence,
         unit="poses" if clip.known.metric and clip.known.world_from_camera is not None else None,
         notes=tuple(notes),

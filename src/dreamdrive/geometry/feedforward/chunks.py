@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.feedforward.network import Seen
+from dreamdrive.geometry.measured import ranks
 from dreamdrive.geometry.weighted import weighted_median
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.similarity import Similarity
+from dreamdrive.scene.similarity import Similarity, nearest_rotation
 
 _PIXELS = 4_000  # of a frame that take part in joining; more do not make it better
 
@@ -114,8 +114,7 @@ def _onto(
     ratio = np.log(target_depth[counts] / source_depth[counts])
     scale = float(np.exp(weighted_median(ratio, weights[counts])))
     turns = target[:, :3, :3] @ np.swapaxes(source[:, :3, :3], 1, 2)
-    left, _, right = np.linalg.svd(turns.sum(axis=0))
-    rotation = (left * np.array([1, 1, np.linalg.det(left @ right)])) @ right
+    rotation = nearest_rotation(turns.sum(axis=0))
     translation = np.median(target[:, :3, 3] - scale * source[:, :3, 3] @ rotation.T, axis=0)
     found = Similarity(scale, rotation, translation)
     rays = camera.rays()[:: _stride(camera), :: _stride(camera)]
@@ -133,8 +132,7 @@ def _part(
         values[own, :: _stride(camera), :: _stride(camera)].astype(np.float64)
         for values in (seen.depth, seen.confidence)
     )
-    rank = rankdata(trust).reshape(trust.shape) / trust.size
-    return seen.world_from_camera[own], depth, np.where(depth > 0, rank, 0)
+    return seen.world_from_camera[own], depth, np.where(depth > 0, ranks(trust), 0)
 
 
 def _points(

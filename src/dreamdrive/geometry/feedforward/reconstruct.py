@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
-from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.classical import contradiction
 from dreamdrive.geometry.classical.evidence import free_pixels, look
 from dreamdrive.geometry.feedforward.camera import SharedCamera, share
 from dreamdrive.geometry.feedforward.chunks import Joined, chunks, join
@@ -18,7 +18,7 @@ from dreamdrive.geometry.feedforward.pictures import fit_patches, show
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
-from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -68,6 +68,7 @@ class FeedForward:
             raise InputError(f"geometry {self.name} needs the weights of its network")
         check_frames(clip, self.name)
         evidence = look(clip)
+        contradiction.check(clip, evidence)
         found = self.measure(clip, free_pixels(clip, evidence), weights, seed)
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
 
@@ -124,14 +125,12 @@ def _measured(
         unit = "poses" if clip.known.metric else None
     depth, trust = (in_frames(tuple(part), how) for part in (joined.depth, joined.confidence))
     there = np.isfinite(depth) & (depth > 0) & free & ~clip.held_out[:, None, None]
-    confidence = np.zeros(depth.shape, np.float32)
-    if there.any():
-        confidence[there] = rankdata(trust[there]) / np.count_nonzero(there)
+    depth, confidence = trusted(depth * np.float32(factor), trust, there)
     return Measured(
         world_from_camera=poses,
         camera=replace(_camera(clip, shared), world_from_camera=np.eye(4)),
         focal_observed=clip.known.intrinsics or shared.spread <= _FOCAL_SPREAD,
-        depth=np.where(there, depth * np.float32(factor), 0).astype(np.float32),
+        depth=depth,
         confidence=confidence,
         unit=unit,
         notes=tuple(_notes(clip, joined, shared)),

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from dreamdrive.data.camera_models import LensCamera
 from dreamdrive.data.poses import to_first
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical.known import depth_ratios
+from dreamdrive.geometry.classical.known import depth_ratios, factor_of
 from dreamdrive.geometry.files.declared import NAME
 from dreamdrive.geometry.files.depth import read_depth
 from dreamdrive.geometry.files.formats import recognise
@@ -142,8 +142,7 @@ def _scaled_by_depth(clip: Clip, given: Given, where: str) -> tuple[Known, str]:
             f'tell the one from the other; write {{"metric": true}} into {NAME} if the poses are in metres, '
             'or {"depth_unit": "poses"} if the depth has their unit'
         )
-    factor = float(np.median(ratios))
-    spread = float(np.median(np.abs(ratios / factor - 1)) * 1.4826)
+    factor, spread = factor_of(ratios)
     scaled = poses.copy()
     scaled[:, :3, 3] *= factor
     known = replace(clip.known, world_from_camera=scaled, points=points * factor, metric=True)
