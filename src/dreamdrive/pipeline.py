@@ -1,6 +1,7 @@
 """The paper's pipeline: prior, geometry, Gaussians, decomposition, joint fit; each stage kept on disk."""
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,7 @@ def generate(
     geometry_method: str = "classical",
     geometry_files: Path | None = None,
     weights: str | Path | None = None,
+    geometry_weights: str | Path | None = None,
     refine_poses: bool = False,
     quality: QualityName = "standard",
     representation: Representation = "hybrid",
@@ -69,7 +71,9 @@ def generate(
         prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
         geometry_method: How cameras and depth are found.
         geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.files``.
-        weights: The network of that geometry method: a file or folder, or a name, see ``hub.find_weights``.
+        weights: The network, of the prior if it has one, else of the geometry method: a file or folder, or a
+            name, see ``hub.find_weights``.
+        geometry_weights: The network of the geometry method, where the prior has one too.
         refine_poses: Whether given poses tell only how long the path is, see ``geometry.refine``.
         quality: Name in ``options.QUALITIES``.
         representation: ``"hybrid"``, or one of its baselines.
@@ -86,8 +90,8 @@ def generate(
         InputError: The input, an option or ``out`` cannot be used.
     """
     prior = prior or prior_of(control.path)
-    choose_prior(prior)
-    network = None if weights is None else find_weights(weights)
+    control, network = _with_networks(control, prior, weights, geometry_weights)
+    choose_prior(prior).check(control)
     backend_of(geometry_method, network)
     if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
@@ -142,7 +146,7 @@ def _make(
     of_geometry = [request["digests"].get(name) for name in _OF_GEOMETRY]
     files = {name: value for name, value in request["digests"].items() if name not in _OF_GEOMETRY}
     reading = [chosen["prior"], _reading(control), files, control.seed]
-    clip = stages.run("prior", (), reading, lambda _: choose_prior(chosen["prior"])(control))
+    clip = stages.run("prior", (), reading, partial(choose_prior(chosen["prior"]), control))
 
     method = chosen["geometry"]
     geometry = stages.run(
@@ -188,6 +192,21 @@ def _reconstructed(attached: Clip, clip: Clip, **how: Any) -> Geometry:
     geometry = reconstruct(attached, **how)
     noticed = attached.provenance.get("notes", [])[len(clip.provenance.get("notes", [])) :]
     return replace(geometry, detected=(*noticed, *geometry.detected))
+
+
+def _with_networks(
+    control: Control, prior: str, weights: str | Path | None, geometry_weights: str | Path | None
+) -> tuple[Control, Path | None]:
+    """The control with the prior's network, and the network of the geometry."""
+    if choose_prior(prior).weights is None:
+        if weights is not None and geometry_weights is not None:
+            raise InputError(
+                "--weights and --geometry-weights are given, but the prior "
+                f"{prior} has no network; leave one out"
+            )
+        weights, geometry_weights = None, geometry_weights or weights
+    made = control if weights is None else replace(control, weights=find_weights(weights))
+    return made, None if geometry_weights is None else find_weights(geometry_weights)
 
 
 def _with_lens(control: Control, geometry_files: Path | None) -> Control:
@@ -300,7 +319,8 @@ def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made
 
 def _reading(control: Control) -> dict[str, Any]:
     """The options of reading that are no files."""
-    return {k: v for k, v in asdict(control).items() if k not in ("path", "intrinsics", "poses", "seed")}
+    files = ("path", "intrinsics", "poses", "trajectory", "weights")
+    return {k: v for k, v in asdict(control).items() if k not in (*files, "seed")}
 
 
 def _digests(control: Control, geometry_files: Path | None, weights: Path | None) -> dict[str, str]:
@@ -309,6 +329,8 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
+        "trajectory": (control.trajectory, "a file with poses"),
+        "prior-weights": (control.weights, "a file of weights or its folder"),
         "geometry-files": (geometry_files, EXPECTED),
         "weights": (weights, "a file of weights or its folder"),
     }
@@ -319,7 +341,7 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         if not path.exists():
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
-        digests[name] = file_digest(path, deep=name == "geometry-files")
+        digests[name] = file_digest(path, deep=name in ("geometry-files", "prior-weights"))
         beside = companions(path) if name == "geometry-files" else []
         if beside:
             digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])

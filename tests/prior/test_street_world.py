@@ -8,16 +8,14 @@ import pytest
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.world import draw_street
 from dreamdrive.errors import InputError
-from dreamdrive.prior.protocol import Prior
-from dreamdrive.prior.street_world import street_world
+from dreamdrive.prior.street_world import STREET_WORLD, street_world
 from dreamdrive.scene.control import Control
 
 SMALL = (64, 48)
 
 
 def test_only_the_intrinsics_are_given_unless_asked() -> None:
-    prior: Prior = street_world
-    clip = prior(Control(frames="0:3", size=SMALL, seed=2))
+    clip = street_world(Control(frames="0:3", size=SMALL, seed=2))
     assert len(clip) == 3
     assert clip.known.intrinsics
     assert clip.known.world_from_camera is None
@@ -48,8 +46,8 @@ def test_a_layout_is_drawn_and_said_to_be_simulated(tmp_path: Path) -> None:
 
 
 def test_what_it_cannot_use_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="takes no poses"):
-        street_world(Control(poses=Path("poses.json")))
+    with pytest.raises(InputError, match="street-world takes no poses; it takes fps, frames"):
+        STREET_WORLD(Control(poses=Path("poses.json")))
     with pytest.raises(InputError, match="expected a layout as JSON"):
         street_world(Control(path=tmp_path / "video.mp4"))
     with pytest.raises(InputError, match="even numbers"):

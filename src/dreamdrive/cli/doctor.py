@@ -36,7 +36,7 @@ def doctor() -> None:
     table.add_row("GPU", _gpu())
     console = Console()
     console.print(table)
-    _geometry(console)
+    _backends(console)
     missing += trouble
     for line in missing:
         console.print(f"missing: {line}", soft_wrap=True)
@@ -55,15 +55,19 @@ def _native() -> tuple[str, list[str]]:
     return ", ".join(f"{name} {value}" for name, value in native_info().items()), []
 
 
-def _geometry(console: Console) -> None:
-    """What ``generate --geometry`` offers: nothing of it is needed but classical."""
+def _backends(console: Console) -> None:
+    """What ``generate --prior`` and ``--geometry`` offer; nothing is needed but what is ready."""
     try:
         from dreamdrive.geometry import BACKENDS
+        from dreamdrive.prior import PRIORS
     except ImportError:
         return
-    for backend in BACKENDS.values():
+    offers = [("prior", each) for each in PRIORS.values()] + [
+        ("geometry", each) for each in BACKENDS.values()
+    ]
+    for stage, backend in offers:
         takes = "ready" if backend.weights is None else f"give --weights, {backend.weights}"
-        console.print(f"\n geometry {backend.name}: {backend.about}", highlight=False, soft_wrap=True)
+        console.print(f"\n {stage} {backend.name}: {backend.about}", highlight=False, soft_wrap=True)
         for name, value in (
             ("to use it", backend.missing_package() or takes),
             ("memory", backend.memory),

@@ -22,6 +22,7 @@ def generate(
         Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"], arg(metavar="NAME")
     ] = "classical",
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
+    geometry_weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
@@ -50,8 +51,9 @@ def generate(
             it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
-        weights: Weights of the geometry's network: a file, a folder, or the name of a model that the hub's
-            cache holds. Nothing is ever downloaded.
+        weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
+            model that the hub's cache holds. Nothing is ever downloaded.
+        geometry_weights: Weights of the geometry's network, where the prior has one too.
         quality: How many steps the fits take.
         frames: Frames of the input to use, counted from 0.
         fps: Rate of the input, before the step of --frames.
@@ -97,6 +99,7 @@ def generate(
             geometry_files=geometry_files,
             refine_poses=refine_poses,
             weights=weights,
+            geometry_weights=geometry_weights,
             quality=quality,
             representation=representation,
             camera_height_m=camera_height,

@@ -7,15 +7,17 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical import CLASSICAL
 from dreamdrive.geometry.dust3r import DUST3R
 from dreamdrive.geometry.feedforward import FEED_FORWARD
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.refine import refined
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-BACKENDS: dict[str, Backend] = {backend.name: backend for backend in (CLASSICAL, DUST3R, *FEED_FORWARD)}
+BACKENDS: dict[str, GeometryBackend] = {
+    backend.name: backend for backend in (CLASSICAL, DUST3R, *FEED_FORWARD)
+}
 
 
-def backend_of(method: str, weights: Path | None = None) -> Backend:
+def backend_of(method: str, weights: Path | None = None) -> GeometryBackend:
     """A way of getting geometry by its name, if it could start with these weights.
 
     Raises:
@@ -24,7 +26,7 @@ def backend_of(method: str, weights: Path | None = None) -> Backend:
     if method not in BACKENDS:
         raise InputError(f"Unknown geometry method {method!r}; choose from: {', '.join(BACKENDS)}.")
     backend = BACKENDS[method]
-    backend.check(weights)
+    backend.check_start("geometry", weights)
     return backend
 
 

@@ -6,15 +6,10 @@ from types import MappingProxyType
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
-from dreamdrive.prior.replay import replay
-from dreamdrive.prior.street_world import street_world
+from dreamdrive.prior.replay import REPLAY, replay
+from dreamdrive.prior.street_world import STREET_WORLD, street_world
 
-PRIORS: Mapping[str, Prior] = MappingProxyType(
-    {
-        "replay": replay,
-        "street-world": street_world,
-    }
-)
+PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in (REPLAY, STREET_WORLD)})
 """Every prior by the name that ``--prior`` takes."""
 
 

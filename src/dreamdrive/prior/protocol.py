@@ -1,19 +1,68 @@
 """What every prior offers."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
 
+from dreamdrive.backend import Backend
+from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
+Progress = Callable[[int, int], None]
+"""Called with steps done and steps in all."""
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
 
 @runtime_checkable
-class Prior(Protocol):
+class Make(Protocol):
     """F_VDM (eq. 3): from what the user asks for to frames with features Z_ref."""
 
-    def __call__(self, control: Control) -> Clip:
+    def __call__(self, control: Control, progress: Progress) -> Clip:
         """Make the clip.
 
         Raises:
             InputError: The prior cannot work with this control.
         """
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prior(Backend):
+    """A prior, by its name for ``--prior``.
+
+    Attributes:
+        make: The way itself.
+        takes: Names of the fields of ``Control`` that it honours; ``seed`` and ``weights`` go without saying.
+        gives: What its clips hold beside the frames, in words.
+    """
+
+    make: Make
+    takes: frozenset[str]
+    gives: str
+
+    def check(self, control: Control) -> None:
+        """Whether it could start and honour all that is asked.
+
+        Raises:
+            InputError: A field is given that it does not take, or weights or a package are missing.
+        """
+        given = [field.name for field in fields(control) if getattr(control, field.name) is not None]
+        if refused := [name for name in given if name not in self.takes | {"seed", "weights"}]:
+            raise InputError(
+                f"the prior {self.name} takes no {' and no '.join(refused)}; "
+                f"it takes {', '.join(sorted(self.takes))}"
+            )
+        self.check_start("prior", control.weights)
+
+    def __call__(self, control: Control, progress: Progress = silent) -> Clip:
+        """Make the clip.
+
+        Raises:
+            InputError: See ``check``; or the input, an option or the weights cannot be used.
+        """
+        self.check(control)
+        return self.make(control, progress)

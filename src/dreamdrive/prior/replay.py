@@ -3,11 +3,12 @@
 from dreamdrive.data import read_clip
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.protocol import Prior, Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
 
-def replay(control: Control) -> Clip:
+def replay(control: Control, progress: Progress = silent) -> Clip:
     """Read a video or a folder of images; Z_ref is ``features["appearance"]``.
 
     Raises:
@@ -26,3 +27,14 @@ def replay(control: Control) -> Clip:
         hold_out=control.hold_out,
     )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+REPLAY = Prior(
+    name="replay",
+    make=replay,
+    takes=frozenset({"path", "frames", "fps", "size", "intrinsics", "poses", "hfov_deg", "hold_out"}),
+    gives="the frames as they are; poses, where they are given",
+    about="a recording, or a video that another program made",
+    licence="none but that of the recording",
+    memory="that of the frames",
+)

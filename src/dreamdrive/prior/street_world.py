@@ -10,6 +10,7 @@ from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.protocol import Prior, Progress, silent
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 
@@ -21,26 +22,21 @@ SIZE = (320, 192)
 """Width and height unless told."""
 
 
-def street_world(control: Control, *, truth: bool = False) -> Clip:
+def street_world(control: Control, progress: Progress = silent, *, truth: bool = False) -> Clip:
     """A clip of simulated frames; Z_ref is ``features["appearance"]``.
 
     The street is that of the layout ``control.path``, or one that ``control.seed`` decides.
 
     Args:
-        control: Layout or seed, frames, rate, size, withheld frames; no other files.
+        control: Layout or seed, frames, rate, size, withheld frames.
+        progress: Told of every frame.
         truth: Whether the exact poses, depth and sky are handed over. Without them the clip is what a
             calibrated dashcam would give, and the reconstruction has to find them.
 
     Raises:
-        InputError: A file is given that it cannot use, the layout is wrong, the size is odd, or the frames
+        InputError: The layout is wrong, the size is odd, or the frames
             cannot be selected.
     """
-    for name in ("intrinsics", "poses", "hfov_deg"):
-        if getattr(control, name) is not None:
-            raise InputError(
-                f"the prior street-world draws its own frames and takes no {name}; leave it out, "
-                "or use --prior replay for a recording"
-            )
     size = control.size or SIZE
     if size[0] % 2 or size[1] % 2:
         raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
@@ -55,7 +51,7 @@ def street_world(control: Control, *, truth: bool = False) -> Clip:
     else:
         layout = read_layout(control.path)
         source = f"the layout {control.path.name}"
-    clip = _clip(drive(layout, count, fps, size), np.array(wanted), truth)
+    clip = _clip(drive(layout, count, fps, size, progress=progress), np.array(wanted), truth)
     provenance = {
         "prior": "street-world",
         "seed": control.seed,
@@ -89,3 +85,14 @@ def _clip(made: Drive, index: np.ndarray, truth: bool) -> Clip:
         source_index=index,
         known=known,
     )
+
+
+STREET_WORLD = Prior(
+    name="street-world",
+    make=street_world,
+    takes=frozenset({"path", "frames", "fps", "size", "hold_out"}),
+    gives="exact intrinsics",
+    about="a drive through a layout, or through a street drawn at random; its frames are simulated",
+    licence="Apache-2.0, as all of dreamdrive",
+    memory="0.5 GB for 24 frames at 480x270",
+)

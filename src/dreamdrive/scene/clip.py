@@ -44,6 +44,7 @@ class Clip:
         held_out: Frames that no fit may see (F,).
         source_index: Index of each frame in the source, in file or decode order (F,).
         features: Named per-pixel features (F, h, w, C), the paper's Z_ref; h and w a whole fraction of H, W.
+        latents: What the frames were decoded from, for priors with a latent space (F, h, w, C).
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
@@ -58,6 +59,7 @@ class Clip:
     held_out: Bool[np.ndarray, " f"]
     source_index: Int[np.ndarray, " f"]
     features: dict[str, Float[np.ndarray, "f _ _ _"]] = field(default_factory=dict)
+    latents: Float[np.ndarray, "f _ _ _"] | None = None
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -3,19 +3,26 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from dreamdrive.scene.action import Action
+
 
 @dataclass(frozen=True)
 class Control:
     """The input of a prior and how to read it; ``None`` leaves a choice to the prior.
 
     Attributes:
-        path: A video, a folder of images, a layout; ``None`` where the prior needs no input.
-        frames: ``START:STOP:STEP`` over the indices of the source.
+        path: A video, a folder of images, a photo, a layout; ``None`` where the prior needs no input.
+        frames: ``START:STOP:STEP`` over the indices of the source, or of the frames that a prior makes.
         fps: Rate of the input in frames a second, before the step of ``frames``.
         size: Width and height of the clip in pixels.
         intrinsics: Calibration file of the input.
         poses: Pose file of the input.
         hfov_deg: Horizontal field of view in degrees, where there is no calibration.
+        trajectory: File with the wanted path of the camera, for priors that make one.
+        action: What the car shall do, for priors that take no path.
+        prompt: What shall be seen, in words.
+        steps: Steps of a diffusion sampler.
+        weights: The prior's network, a file or folder.
         hold_out: Withhold the selected frames i with i mod N = N // 2.
         seed: Seed of everything the prior draws.
     """
@@ -27,5 +34,10 @@ class Control:
     intrinsics: Path | None = None
     poses: Path | None = None
     hfov_deg: float | None = None
+    trajectory: Path | None = None
+    action: Action | None = None
+    prompt: str | None = None
+    steps: int | None = None
+    weights: Path | None = None
     hold_out: int | None = None
     seed: int = 0

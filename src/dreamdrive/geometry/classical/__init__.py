@@ -7,7 +7,7 @@ from dreamdrive.geometry.classical.dense import Dense, densify
 from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
 from dreamdrive.geometry.classical.traffic import compared_with_traffic
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -47,7 +47,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
     return replace(geometry, scale=compared_with_traffic(geometry))
 
 
-CLASSICAL = Backend(
+CLASSICAL = GeometryBackend(
     name="classical",
     reconstruct=reconstruct,
     about="structure from motion (pycolmap), plane sweep, optical flow: no weights, no GPU",

@@ -5,9 +5,9 @@ are for research only (CC BY-NC-SA 4.0, and the terms of the data they were trai
 """
 
 from dreamdrive.geometry.dust3r.reconstruct import reconstruct
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 
-DUST3R = Backend(
+DUST3R = GeometryBackend(
     name="dust3r",
     reconstruct=reconstruct,
     about="pointmaps of pairs of frames (DUSt3R), aligned",

@@ -17,7 +17,7 @@ from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import standardise
 from dreamdrive.geometry.feedforward.poses import world_from_camera
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 
 EXPECTED = (
     "the hub's folder of a Depth Anything 3 model (config.json, model.safetensors), such as "
@@ -84,7 +84,7 @@ def _look(network: nn.Module) -> Callable[[Views], Seen]:
     return look
 
 
-DA3 = Backend(
+DA3 = GeometryBackend(
     name="da3",
     reconstruct=FeedForward("da3", load_da3, long_side_px=504),
     about="cameras and depth of 24 frames at a time (Depth Anything 3); metric with the nested model",

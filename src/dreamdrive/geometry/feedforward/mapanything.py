@@ -19,7 +19,7 @@ from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import standardise
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 
 EXPECTED = (
     "the hub's folder of a MapAnything model (config.json, model.safetensors), such as "
@@ -106,7 +106,7 @@ def _shown(views: Views) -> list[dict[str, Any]]:
     return shown
 
 
-MAPANYTHING = Backend(
+MAPANYTHING = GeometryBackend(
     name="mapanything",
     reconstruct=FeedForward("mapanything", load_mapanything, long_side_px=518),
     about="metric cameras and depth of 24 frames at a time (MapAnything); takes known cameras",

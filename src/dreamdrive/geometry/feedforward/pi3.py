@@ -17,7 +17,7 @@ from dreamdrive.geometry.feedforward.load import build, device, read_stored, ups
 from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
 INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; pip install huggingface_hub"
@@ -79,7 +79,7 @@ def _pinhole(points: Float[np.ndarray, "h w 3"], odds: Float[np.ndarray, "h w"])
     return np.array([[focal_px, 0, width / 2], [0, focal_px, height / 2], [0, 0, 1]])
 
 
-PI3 = Backend(
+PI3 = GeometryBackend(
     name="pi3",
     reconstruct=FeedForward("pi3", load_pi3, long_side_px=504),
     about="cameras and depth of 24 frames at a time (Pi3, or Pi3X, which takes known cameras and is metric)",

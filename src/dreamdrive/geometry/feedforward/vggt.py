@@ -16,7 +16,7 @@ from dreamdrive.geometry.feedforward.load import build, device, read_stored, ups
 from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.poses import world_from_camera
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
-from dreamdrive.geometry.protocol import Backend
+from dreamdrive.geometry.protocol import GeometryBackend
 
 EXPECTED = "VGGT's model.safetensors or model.pt or their folder, such as facebook/VGGT-1B"
 INSTALL = "pip install --no-deps git+https://github.com/facebookresearch/vggt, then pip install einops"
@@ -56,7 +56,7 @@ def _look(network: nn.Module, encoding: Any) -> Callable[[Views], Seen]:
     return look
 
 
-VGGT = Backend(
+VGGT = GeometryBackend(
     name="vggt",
     reconstruct=FeedForward("vggt", load_vggt, long_side_px=518),
     about="cameras and depth of 24 frames at a time (VGGT)",
