@@ -42,7 +42,7 @@ def true_geometry(street: Drive, evidence: bool = True) -> Geometry:
         confidence=(street.depth_m > 0).astype(np.float32),
         sky=street.sky.copy(),
         moving=moving if evidence else np.zeros_like(moving),
-        fixed_regions=np.zeros(street.depth_m.shape[1:], dtype=np.int64),
+        fixed_regions=np.zeros((1, *street.depth_m.shape[1:]), dtype=np.int64),
         region_names=(),
         ground=street.ground,
         scale=Scale("poses", 0.0),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.held_out import BASELINES, interpolate_flow, likeness, score_baselines
+from tests.rigs import rig_clip
 from tests.streets import small_street, street_clip, true_geometry
 
 
@@ -70,3 +71,9 @@ def test_flow_interpolation_meets_a_moving_picture_half_way() -> None:
     clip = replace(street_clip(street, hold_out=2), frames=frames)
     error = np.abs(interpolate_flow(clip, 1) - frames[1] / 255)[16:-16, 16:-16]
     assert error.mean() < 0.01
+
+
+def test_frames_are_predicted_from_their_own_camera() -> None:
+    clip = rig_clip()
+    before = BASELINES["repeat_previous"](clip, 5)
+    np.testing.assert_allclose(before, clip.frames[3] / 255, atol=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dreamdrive.data import Lens
 from dreamdrive.data.distortion import Distortion
-from dreamdrive.pictures import as_recorded, frame_rate, lens_of, smooth, up_of, write_held_out
+from dreamdrive.pictures import _surround, as_recorded, frame_rate, lens_of, smooth, up_of, write_held_out
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from tests.scene.scenes import make_scene
@@ -57,3 +57,31 @@ def test_drives_are_made_smooth_without_moving_recorded_frames() -> None:
     assert len(fine) == 17
     np.testing.assert_allclose(fine.world_from_camera[::4], poses, atol=1e-9)
     assert frame_rate(Trajectory(poses[:1], np.zeros(1))) == 10
+
+
+def test_of_a_rig_the_other_cameras_carry_their_number(tmp_path: Path) -> None:
+    scene = replace(make_scene(), camera=np.array([0, 1, 0]), exposure=None)
+    write_held_out(tmp_path, scene, [4, 4, 5])
+    assert [path.name for path in tmp_path.iterdir()] == ["0004_camera1.png"]
+
+
+def test_all_cameras_of_a_rig_are_shown_in_one_picture() -> None:
+    """What looks ahead is above, from left to right; what looks back below."""
+    scene, turned = make_scene(), [0.0, 1.0, -1.0, np.pi]
+    cameras = []
+    for yaw in turned:
+        pose = np.eye(4)
+        pose[:3, :3] = cv2.Rodrigues(np.array([0.0, yaw, 0.0]))[0]
+        cameras.append(scene.cameras[0].at(pose))
+    rig = np.arange(4)
+    scene = replace(
+        scene, cameras=tuple(cameras), times_s=np.zeros(4), held_out=rig < 0, camera=rig, exposure=None
+    )
+    picture = next(_surround(scene, rig))
+    height, width = scene.cameras[0].height_px, scene.cameras[0].width_px
+    assert picture.shape == (2 * height, 3 * width, 3)
+    order = [2, 0, 1]
+    for column, camera in enumerate(order):
+        shown = picture[:height, column * width : (column + 1) * width]
+        np.testing.assert_array_equal(shown, as_recorded(scene, scene.cameras[camera], 0.0, None, camera))
+    assert (picture[height:, width:] == 0).all()

@@ -36,7 +36,8 @@ def score_scene(clip: Clip, geometry: Geometry, scene: Scene) -> dict[int, Liken
     """Likeness of the scene's view of each withheld frame, by index in the clip."""
 
     def rendered(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
-        return render_scene(scene, geometry.cameras[frame], float(clip.times_s[frame])).colour.numpy()
+        camera, of_rig = geometry.cameras[frame], int(clip.camera[frame])
+        return render_scene(scene, camera, float(clip.times_s[frame]), of_rig=of_rig).colour.numpy()
 
     return _score(clip, geometry, rendered)
 
@@ -47,9 +48,9 @@ def score_baselines(clip: Clip, geometry: Geometry) -> dict[str, dict[int, Liken
 
 
 def _score(clip: Clip, geometry: Geometry, predict: Predictor) -> dict[int, Likeness]:
-    street = geometry.fixed_regions == 0
+    street = geometry.fixed_regions[clip.camera] == 0
     withheld = np.flatnonzero(clip.held_out).tolist()
-    return {i: likeness(predict(clip, i), clip.frames[i], clip.valid[i] & street) for i in withheld}
+    return {i: likeness(predict(clip, i), clip.frames[i], clip.valid[i] & street[i]) for i in withheld}
 
 
 def likeness(
@@ -105,7 +106,7 @@ BASELINES: dict[str, Predictor] = {
 
 
 def _neighbours(clip: Clip, frame: int) -> tuple[int, int]:
-    seen = np.flatnonzero(~clip.held_out)
+    seen = np.array(clip.seen_of(int(clip.camera[frame])))
     return int(seen[seen < frame].max()), int(seen[seen > frame].min())
 
 

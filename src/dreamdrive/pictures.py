@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.data import Lens
@@ -53,10 +53,12 @@ def write_videos(
 ) -> None:
     """Write ``drive.mp4``, ``shift.mp4``, ``recorded_beside_rendered.mp4`` and ``panels.mp4``.
 
+    All show the rig's first camera; of several, ``surround.mp4`` shows what each of them sees.
+
     Args:
         folder: Where to.
         scene: What to show.
-        recorded: The frames as recorded (F, H, W, 3), in the source's distortion.
+        recorded: The frames of that camera as recorded (F, H, W, 3), in the source's distortion.
         scored: Dynamic scores; without them their panel is black.
         progress: Called with frames done and frames in all.
     """
@@ -71,7 +73,10 @@ def write_videos(
         ("recorded_beside_rendered", _beside(scene, recorded, lens), rate),
         ("panels", _panels(scene, scored), rate),
     ]
-    total = len(drive) + len(shifted) + 2 * len(scene.cameras)
+    total = len(drive) + len(shifted) + 2 * len(scene.front)
+    if scene.camera is not None:
+        drives.append(("surround", _surround(scene, scene.camera), rate))
+        total += len(scene.front)
     done = 0
 
     def counted(frames: Iterator[UInt8[np.ndarray, "h w 3"]]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
@@ -91,12 +96,14 @@ def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
     Args:
         folder: Where to.
         scene: What to render.
-        source_index: Index of each frame of the scene in the source: the number in the name.
+        source_index: Index of each frame of the scene in the source: the number in the name. Of several
+            cameras, those after the first add ``_cameraK``.
     """
     lens = lens_of(scene)
     for i in np.flatnonzero(scene.held_out).tolist():
-        image = as_recorded(scene, scene.cameras[i], float(scene.times_s[i]), lens)
-        write_png(folder / f"{source_index[i]:04d}.png", image)
+        camera = 0 if scene.camera is None else int(scene.camera[i])
+        image = as_recorded(scene, scene.cameras[i], float(scene.times_s[i]), lens, camera)
+        write_png(folder / f"{source_index[i]:04d}{f'_camera{camera}' if camera else ''}.png", image)
 
 
 def write_png(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
@@ -118,12 +125,14 @@ def drive_frames(
         yield as_recorded(scene, scene.cameras[0].at(pose), t_s, lens)
 
 
-def as_recorded(scene: Scene, camera: Camera, t_s: float, lens: Lens | None) -> UInt8[np.ndarray, "h w 3"]:
-    """A view as the recording's camera would have shown it, with the distortion of its lens if it has one."""
+def as_recorded(
+    scene: Scene, camera: Camera, t_s: float, lens: Lens | None, of_rig: int = 0
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A view as a camera of the rig would have shown it, with the distortion of its lens if it has one."""
     if lens is None:
-        return panels.to_bytes(render_scene(scene, camera, t_s).colour.numpy())
+        return panels.to_bytes(render_scene(scene, camera, t_s, of_rig=of_rig).colour.numpy())
     wide = lens.covering().at(camera.world_from_camera)
-    return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s).colour.numpy(), wide))
+    return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s, of_rig=of_rig).colour.numpy(), wide))
 
 
 def frame_rate(path: Trajectory) -> float:
@@ -156,11 +165,32 @@ def _beside(
         yield panels.beside(frame, rendered)
 
 
+def _surround(scene: Scene, camera: Int[np.ndarray, " f"]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    """All cameras of the rig at each time: above what looks ahead, below what looks back, mirrored."""
+    front = scene.cameras[0].camera_from_world
+    rig = np.unique(camera).tolist()
+    views = {index: np.flatnonzero(camera == index).tolist() for index in rig}
+    ahead = {index: front[:3, :3] @ scene.cameras[views[index][0]].world_from_camera[:3, 2] for index in rig}
+    above = sorted((i for i in rig if ahead[i][2] > 0), key=lambda i: ahead[i][0])
+    below = sorted((i for i in rig if ahead[i][2] <= 0), key=lambda i: ahead[i][0])
+    for step in range(min(len(each) for each in views.values())):
+        rows: list[UInt8[np.ndarray, "h w 3"]] = []
+        for row in (above, below):
+            frames = [(i, views[i][step]) for i in row]
+            seen = [as_recorded(scene, scene.cameras[f], float(scene.times_s[f]), None, i) for i, f in frames]
+            rows += [np.concatenate(seen, axis=1)] if seen else []
+        width = max(row.shape[1] for row in rows)
+        yield np.concatenate([np.pad(r, ((0, 0), (0, width - r.shape[1]), (0, 0))) for r in rows])
+
+
 def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-    for frame, (camera, t_s) in enumerate(zip(scene.cameras, scene.times_s.tolist(), strict=True)):
+    front = scene.front.tolist()
+    near = {frame: front[max(k - 1, 0) : k + 2] for k, frame in enumerate(front)}
+    for frame in front:
+        camera, t_s = scene.cameras[frame], float(scene.times_s[frame])
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
-        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, frame)
+        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near[frame])
         yield panels.parts(
             panels.to_bytes(still.numpy()),
             panels.to_bytes(moving.numpy()),
@@ -170,12 +200,12 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
 
 
 @torch.no_grad()
-def _score_image(scored: Scored, camera: Camera, frame: int) -> Float[Tensor, "h w"]:
+def _score_image(scored: Scored, camera: Camera, frames: list[int]) -> Float[Tensor, "h w"]:
     """Scores composited like colour (eq. 8).
 
-    The seeds hold a moving thing once a frame; of those only the ones of neighbouring frames are shown.
+    The seeds hold a moving thing once a frame; of those only the ones from ``frames`` are shown.
     """
-    near = (scored.gaussians.source_frame - frame).abs() <= 1
+    near = torch.isin(scored.gaussians.source_frame, torch.tensor(frames))
     rows = torch.nonzero(near | (scored.scores <= scored.threshold)).squeeze(1)
     shown = scored.gaussians.select(rows)
     return render(shown, camera, channels=scored.scores[rows][:, None], sh_degree=0).channels[..., 0]

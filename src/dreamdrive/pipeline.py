@@ -218,7 +218,7 @@ def _with_lens(control: Control, geometry_files: Path | None) -> Control:
 
 def _seen(clip: Clip, geometry: Geometry) -> Geometry:
     """The geometry itself, if there is anything in it to make Gaussians from."""
-    solid = clip.valid & (geometry.depth_m > 0) & ~geometry.sky & (geometry.fixed_regions == 0)
+    solid = clip.valid & (geometry.depth_m > 0) & ~geometry.sky & (geometry.fixed_regions[clip.camera] == 0)
     if not solid[~clip.held_out].any():
         raise InputError(
             "no frame shows anything solid: all of it is sky, fixed to the camera or without a picture; "
@@ -351,5 +351,5 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
 def _recorded(control: Control, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:
     """The frames in the source's distortion, at the clip's size."""
     if lens_of(scene) is None or control.path is None:
-        return clip.frames
+        return clip.frames[scene.front]
     return read_clip(control.path, frames=control.frames, fps=control.fps, size=clip.size).frames

@@ -90,7 +90,12 @@ def package_versions() -> dict[str, str | None]:
 
 
 def _by_source_index(clip: Clip, scores: dict[int, Likeness]) -> dict[str, dict[str, float]]:
-    return {str(int(clip.source_index[i])): asdict(one) for i, one in scores.items()}
+    """Likeness by index in the source; of the cameras after the first with their number in the rig."""
+    named: dict[str, dict[str, float]] = {}
+    for i, one in scores.items():
+        camera = int(clip.camera[i])
+        named[f"{int(clip.source_index[i])}{f'_camera{camera}' if camera else ''}"] = asdict(one)
+    return named
 
 
 def _mean(scores: dict[int, Likeness]) -> dict[str, float] | None:

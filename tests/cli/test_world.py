@@ -4,8 +4,11 @@ import json
 from pathlib import Path
 
 import cv2
+import pytest
 from tests.cli.conftest import Run
+from tests.test_pipeline import shorten
 
+from dreamdrive import load_scene
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.world import MOUNTS, draw_street
 
@@ -51,3 +54,22 @@ def test_mistakes_are_told(run: Run, tmp_path: Path) -> None:
     result = run("world", "make", "--layout", tmp_path / "bad.json", "-o", tmp_path / "w")
     assert result.code == 2
     assert "$.ego.track" in result.err
+
+
+@pytest.mark.slow
+def test_a_surround_world_becomes_one_scene(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten(monkeypatch)
+    world, out = tmp_path / "world", tmp_path / "out"
+    made = ["world", "make", "--seed", 4, "--frames", 6, "--size", "96x64", "--cameras", "surround"]
+    assert run(*made, "--one-ray", "-o", world).code == 0
+    given = ["--quality", "draft", "--fps", 10, "--size", "96x64", "--hold-out", 4]
+    done = run("generate", world, *given, "-o", out)
+    assert done.code == 0, done.err
+    report = json.loads((out / "report.json").read_text())
+    assert set(report["held_out"]) == {"2", *(f"2_camera{k}" for k in range(1, 6))}
+    assert len(list((out / "held_out").iterdir())) == 6
+    assert (out / "video" / "surround.mp4").is_file()
+    scene = load_scene(out / "scene")
+    assert (len(scene.cameras), len(scene.trajectory)) == (36, 6)

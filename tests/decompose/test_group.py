@@ -2,9 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from tests.rigs import rig_clip
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
+from dreamdrive.decompose.group import _successive
 from dreamdrive.fit import SeedOptions, initialise
 
 
@@ -92,3 +94,8 @@ def test_a_cluster_without_a_core_is_street():
     lukewarm = torch.full((len(seeds),), 0.45)
     assert not group(clip, geometry, seeds, lukewarm, GroupOptions()).dynamic.any()
     assert group(clip, geometry, seeds, lukewarm, GroupOptions(core=0.0)).dynamic.any()
+
+
+def test_labels_are_handed_on_within_each_camera() -> None:
+    clip = rig_clip()
+    assert _successive(clip)[:6] == [(None, 0), (0, 2), (2, 6), (6, 8), (8, 10), (None, 1)]

@@ -57,7 +57,7 @@ def test_held_out_frames_seed_nothing_and_are_not_read(street):
 
 def test_sky_and_camera_fixed_pixels_seed_nothing(street):
     geometry = true_geometry(street)
-    geometry.fixed_regions[-10:] = 1
+    geometry.fixed_regions[:, -10:] = 1
     seeds = initialise(street_clip(street), geometry, SeedOptions())
     last = (seeds.source_frame == len(street.times_s) - 1).numpy()
     camera = geometry.cameras[-1]

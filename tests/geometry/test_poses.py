@@ -124,11 +124,6 @@ def test_a_bonnet_is_handed_on_with_its_name() -> None:
     assert any(sentence.startswith("bonnet") for sentence in posed.detected)
 
 
-def test_several_cameras_without_poses_are_refused(clip: Clip) -> None:
-    with pytest.raises(InputError, match="2 cameras"):
-        pose_clip(replace(clip, rig=(*clip.rig, clip.rig[0])))
-
-
 @pytest.mark.parametrize("height", [0.0, -1.5, float("nan")])
 def test_a_camera_height_must_be_positive(clip: Clip, height: float) -> None:
     with pytest.raises(InputError, match="camera height"):

@@ -39,7 +39,7 @@ def seen(clip: Clip) -> Geometry:
         confidence=np.ones(shape, np.float32),
         sky=np.zeros(shape, bool),
         moving=np.zeros(shape, np.float32),
-        fixed_regions=np.zeros(shape[1:], np.int64),
+        fixed_regions=np.zeros((1, *shape[1:]), np.int64),
         region_names=(),
         ground=Ground(np.array([0.0, -1.0, 0.0]), HEIGHT_M * UNIT),
         scale=Scale("camera height", 0.2, {"traffic": 1.1}),

@@ -20,7 +20,7 @@ def street(tall_m: float, frames: int = MIN_SEEN, unit: float = 1.0, left: int =
         confidence=np.ones_like(moving),
         sky=np.zeros(moving.shape, bool),
         moving=moving,
-        fixed_regions=np.zeros((HEIGHT, WIDTH), np.int64),
+        fixed_regions=np.zeros((1, HEIGHT, WIDTH), np.int64),
         region_names=(),
         ground=Ground(np.array([0.0, -1.0, 0.0]), CAMERA_M * unit),
         scale=Scale("poses", 0.0, {"camera height": 1.1}),

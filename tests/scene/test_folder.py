@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -178,3 +179,19 @@ def test_a_kill_between_the_renames_is_repaired(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exists already"):
         save_scene(make_scene(full=False), tmp_path / "s")
     assert contents(tmp_path / "s") == before
+
+
+def test_round_trip_of_a_rig(tmp_path: Path) -> None:
+    scene = make_scene()
+    assert scene.exposure is not None
+    exposure = replace(scene.exposure, times_s=np.zeros(2), camera=np.array([0, 1]))
+    rig = replace(scene, camera=np.array([0, 1, 0]), exposure=exposure)
+    save_scene(rig, tmp_path / "scene")
+    loaded = load_scene(tmp_path / "scene")
+    assert loaded.camera is not None
+    assert loaded.camera.tolist() == [0, 1, 0]
+    assert loaded.front.tolist() == [0, 2]
+    assert loaded.exposure is not None
+    assert loaded.exposure.camera is not None
+    assert loaded.exposure.camera.tolist() == [0, 1]
+    assert len(loaded.trajectory) == 2

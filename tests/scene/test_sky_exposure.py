@@ -152,3 +152,13 @@ def test_wrong_values_are_refused() -> None:
         Exposure(torch.zeros(2, 3, 4), np.array([1.0, 0.0]))
     with pytest.raises(ValueError, match="2 times for 3 frames"):
         ExposureNetwork(3).freeze(np.array([0.0, 1.0]), np.array([True, True]))
+
+
+def test_each_camera_of_a_rig_has_its_own_exposure() -> None:
+    transforms = torch.zeros(4, 3, 4)
+    transforms[:, 0, 3] = torch.tensor([0.0, 10.0, 1.0, 11.0])
+    exposure = Exposure(transforms, np.array([0.0, 0.0, 1.0, 1.0]), np.array([0, 1, 0, 1]))
+    assert exposure.at(0.5)[0, 3] == 0.5
+    assert exposure.at(0.5, 1)[0, 3] == 10.5
+    with pytest.raises(ValueError, match="strictly increasing"):
+        Exposure(transforms, np.array([0.0, 0.0, 1.0, 1.0]), np.array([0, 0, 1, 1]))

@@ -40,7 +40,7 @@ def make(
     """
     use_all_cores()
     from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.data.world import MOUNTS, StreetOptions, World, draw_street, drive
+    from dreamdrive.data.world import MOUNTS, Drive, Mount, StreetOptions, World, draw_street, drive
     from dreamdrive.data.world.files import write_world
 
     wanted = parse_size(size)
@@ -54,7 +54,7 @@ def make(
     console = Console()
     start = time.perf_counter()
     with Bars(console) as bars:
-        drives = {
+        drives: dict[Mount, Drive] = {
             mount: drive(
                 street,
                 frames,

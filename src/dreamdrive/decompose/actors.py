@@ -206,7 +206,7 @@ def _merge(
     options: ActorOptions,
 ) -> Cast:
     seen = np.flatnonzero(~clip.held_out)
-    times = clip.times_s[seen]
+    times = np.unique(clip.times_s[seen])
     interval = float(np.median(np.diff(times)))
     means = chosen.means.numpy().astype(np.float64)
     log_scales = chosen.log_scales.numpy().copy()

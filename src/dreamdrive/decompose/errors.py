@@ -36,11 +36,12 @@ def error_maps(
     for i in np.flatnonzero(~clip.held_out).tolist():
         rendered = render(gaussians, geometry.cameras[i])
         image = rendered.colour + (1 - rendered.alpha)[..., None] * sky.colour(geometry.cameras[i])
-        image = exposure.apply(image, float(clip.times_s[i])).clamp(0, 1)
+        image = exposure.apply(image, float(clip.times_s[i]), int(clip.camera[i])).clamp(0, 1)
         reference = torch.from_numpy(clip.frames[i] / np.float32(255))
         far = (image - reference).abs() if name == "l1" else (1 - ssim_map(image, reference)) / 2
         error = far.mean(dim=2).numpy()
-        errors[i] = np.where(clip.valid[i] & (geometry.fixed_regions == 0), error, 0)
+        street = geometry.fixed_regions[clip.camera[i]] == 0
+        errors[i] = np.where(clip.valid[i] & street, error, 0)
     return errors
 
 

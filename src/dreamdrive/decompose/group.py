@@ -145,8 +145,7 @@ def _space_time_labels(
     frames = gaussians.source_frame.numpy()[index]
     labels = np.full(len(index), -1, dtype=np.int64)
     component = np.full(len(index), -1, dtype=np.int64)
-    seen = np.flatnonzero(~clip.held_out).tolist()
-    for before, frame in zip([None, *seen[:-1]], seen, strict=True):
+    for before, frame in _successive(clip):
         rows = np.flatnonzero(frames == frame)
         if not len(rows):
             continue
@@ -159,6 +158,14 @@ def _space_time_labels(
             labels[rows] = _handed_on(points[earlier], labels[earlier], flow, points[rows], options)
         labels[rows] = _completed(labels[rows], component[rows], int(labels.max()) + 1, options)
     return _joined(labels, component, frames, options) if len(labels) else labels
+
+
+def _successive(clip: Clip) -> list[tuple[int | None, int]]:
+    """The frames that may be seen, each after the one before it of the same camera."""
+    cameras = np.unique(clip.camera).tolist()
+    return [
+        pair for c in cameras for pair in zip([None, *clip.seen_of(c)[:-1]], clip.seen_of(c), strict=True)
+    ]
 
 
 def _handed_on(

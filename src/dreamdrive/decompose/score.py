@@ -101,7 +101,7 @@ def score(
         raise ValueError("score: the Gaussians carry no features")
     inputs = _inputs(gaussians, options.position_frequencies)
     targets = _targets(clip, geometry, errors, options)
-    visible = {frame: _in_window(gaussians, sorted(targets), frame, options.window) for frame in targets}
+    visible = {frame: _in_window(gaussians, clip, frame, options.window) for frame in targets}
     network = ScoreNetwork(gaussians.features.shape[1], options, seed)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate)
     generator = torch.Generator().manual_seed(seed)
@@ -135,12 +135,16 @@ def _splat(
     return mean.clamp(1e-4, 1 - 1e-4), alpha
 
 
-def _in_window(gaussians: Gaussians, frames: list[int], frame: int, window: int | None) -> Int[Tensor, " m"]:
-    """Gaussians whose source is within ``window`` training frames of ``frame``."""
+def _in_window(gaussians: Gaussians, clip: Clip, frame: int, window: int | None) -> Int[Tensor, " m"]:
+    """Gaussians whose source is within ``window`` training frames of ``frame``, each in its own camera."""
     if window is None:
         return torch.arange(len(gaussians))
-    rank = torch.searchsorted(torch.tensor(frames), gaussians.source_frame)
-    return torch.nonzero((rank - frames.index(frame)).abs() <= window).squeeze(1)
+    rank = np.zeros(len(clip), dtype=np.int64)
+    for camera in np.unique(clip.camera).tolist():
+        seen = clip.seen_of(camera)
+        rank[seen] = np.arange(len(seen))
+    source = torch.from_numpy(rank)[gaussians.source_frame]
+    return torch.nonzero((source - int(rank[frame])).abs() <= window).squeeze(1)
 
 
 def _inputs(gaussians: Gaussians, frequencies: int) -> Float[Tensor, "n d"]:
@@ -164,7 +168,7 @@ def _targets(
         target = np.clip(blurred[i] / options.error_scale, 0, 1)
         if options.target == "error_and_evidence":
             target = np.maximum(target, geometry.moving[i])
-        weight = (clip.valid[i] & (geometry.fixed_regions == 0)).astype(np.float32)
+        weight = (clip.valid[i] & (geometry.fixed_regions[clip.camera[i]] == 0)).astype(np.float32)
         targets[i] = (_shrunk(target, options.shrink), _shrunk(weight, options.shrink))
     return targets
 

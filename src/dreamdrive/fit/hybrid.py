@@ -91,10 +91,11 @@ def fit(
         deformation=None if moving is None else moving.requires_grad_(False),
         actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
         sky=start.sky,
-        exposure=model.exposure.freeze(clip.times_s, ~clip.held_out),
+        exposure=model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera),
         cameras=geometry.cameras,
         times_s=clip.times_s,
         held_out=clip.held_out,
+        camera=clip.camera if len(clip.rig) > 1 else None,
     )
 
 

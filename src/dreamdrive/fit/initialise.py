@@ -100,7 +100,7 @@ def _usable(clip: Clip, geometry: Geometry, frame: int, options: SeedOptions) ->
     if options.sky_fringe_px:
         size = 2 * options.sky_fringe_px + 1
         sky = cv2.dilate(sky, np.ones((size, size), np.uint8))
-    free = clip.valid[frame] & (geometry.fixed_regions == 0) & (sky == 0)
+    free = clip.valid[frame] & (geometry.fixed_regions[clip.camera[frame]] == 0) & (sky == 0)
     return free & (geometry.depth_m[frame] > 0)
 
 

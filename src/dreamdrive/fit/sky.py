@@ -49,7 +49,7 @@ def _with_backdrop(sky: Sky, clip: Clip, geometry: Geometry) -> Sky:
     the colour of the sky is the first thing one sees.
     """
     _, seen = _gathered(clip, geometry, sky, _sky_only(clip, geometry))
-    free = clip.valid & (geometry.fixed_regions == 0)
+    free = clip.valid & (geometry.fixed_regions[clip.camera] == 0)
     still = [free[i] & ~_near_moving(geometry, i) for i in range(len(clip))]
     blurred = _filled(*_gathered(clip, geometry, sky, still))
     reach = cv2.dilate((seen > 0).astype(np.uint8), np.ones((5, 5), np.uint8))[..., None] > 0
@@ -60,7 +60,7 @@ def _with_backdrop(sky: Sky, clip: Clip, geometry: Geometry) -> Sky:
 
 
 def _sky_only(clip: Clip, geometry: Geometry) -> list[Bool[np.ndarray, "h w"]]:
-    free = clip.valid & (geometry.fixed_regions == 0)
+    free = clip.valid & (geometry.fixed_regions[clip.camera] == 0)
     return [_clear_sky(geometry.sky[i]) & free[i] for i in range(len(clip))]
 
 

@@ -48,7 +48,9 @@ def fit_static(
     static = Parameters(gaussians, footprints(gaussians), LearningRates())
     model = Model(static, None, None, estimate_sky(clip, geometry), ExposureNetwork(len(clip), seed))
     optimise(model, views, [NoDensifier()], options, seed, progress)
-    return StaticFit(static.frozen(), model.sky, model.exposure.freeze(clip.times_s, ~clip.held_out))
+    return StaticFit(
+        static.frozen(), model.sky, model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera)
+    )
 
 
 def footprints(gaussians: Gaussians) -> torch.Tensor:

@@ -54,13 +54,14 @@ def _view(clip: Clip, geometry: Geometry, index: int, shrink: int) -> View:
         values = np.ascontiguousarray(values, dtype=np.float32)
         return values if shrink == 1 else cv2.resize(values, (width, height), interpolation=cv2.INTER_NEAREST)
 
+    street = geometry.fixed_regions[clip.camera[index]] == 0
     trust = geometry.confidence[index] * (geometry.moving[index] < 0.5) * (geometry.depth_m[index] > 0)
     return View(
         index=index,
         time_s=float(clip.times_s[index]),
         camera=geometry.cameras[index].resized(width, height),
         image=torch.from_numpy(area(clip.frames[index] / np.float32(255))),
-        mask=torch.from_numpy(area(clip.valid[index] & (geometry.fixed_regions == 0)) > 0.99),
+        mask=torch.from_numpy(area(clip.valid[index] & street) > 0.99),
         sky=torch.from_numpy(area(geometry.sky[index]) > 0.99),
         depth_m=torch.from_numpy(nearest(geometry.depth_m[index])),
         depth_weight=torch.from_numpy(nearest(trust)),

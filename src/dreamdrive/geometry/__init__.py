@@ -9,6 +9,7 @@ from dreamdrive.geometry.dust3r import DUST3R
 from dreamdrive.geometry.feedforward import FEED_FORWARD
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.refine import refined
+from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -42,7 +43,7 @@ def reconstruct(
     """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
 
     Args:
-        clip: Frames, with what is known of their geometry.
+        clip: Frames, with what is known of their geometry; those of several cameras see ``surround``.
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
         method: Name of the method.
@@ -54,4 +55,6 @@ def reconstruct(
     """
     backend = backend_of(method, weights)
     how = partial(backend.reconstruct, camera_height_m=camera_height_m, seed=seed, weights=weights)
-    return refined(clip, how) if refine_poses else how(clip)
+    if refine_poses:
+        return refined(clip, how)
+    return how(clip) if len(clip.rig) == 1 else reconstruct_cameras(clip, how)

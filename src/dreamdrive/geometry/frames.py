@@ -16,12 +16,10 @@ def check_frames(clip: Clip, backend: str) -> None:
         backend: For messages.
 
     Raises:
-        InputError: Fewer than two frames, several cameras, or frames that are all alike.
+        InputError: Fewer than two frames, or frames that are all alike.
     """
-    if len(clip) < 2 or len(clip.rig) > 1:
-        raise InputError(
-            f"geometry {backend} takes two frames or more of one camera; got {len(clip)} of {len(clip.rig)}"
-        )
+    if len(clip) < 2:
+        raise InputError(f"geometry {backend} takes two frames or more; got {len(clip)}")
     first = clip.frames[0].astype(np.int16)
     if all(float(np.abs(frame - first).mean()) < _ALIKE for frame in clip.frames[1:]):
         raise InputError(

@@ -45,7 +45,7 @@ def _marked(clip: Clip, geometry: Geometry, frame: int) -> np.ndarray:
     picture = clip.frames[frame].copy()
     _tint(picture, geometry.sky[frame], _SKY_RGB)
     for index, name in enumerate(geometry.region_names):
-        region = geometry.fixed_regions == index + 1
+        region = geometry.fixed_regions[clip.camera[frame]] == index + 1
         if region.any():
             _tint(picture, region, _REGION_RGB)
             rows, columns = np.nonzero(region)

@@ -1,6 +1,9 @@
 """The prior of a recorded clip: the recording itself, with its appearance as features."""
 
+from pathlib import Path
+
 from dreamdrive.data import read_clip
+from dreamdrive.data.rig import is_rig, read_rig_clip
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.protocol import Prior, Progress, silent
@@ -9,13 +12,15 @@ from dreamdrive.scene.control import Control
 
 
 def replay(control: Control, progress: Progress = silent) -> Clip:
-    """Read a video or a folder of images; Z_ref is ``features["appearance"]``.
+    """Read a video, a folder of images or the cameras of a rig; Z_ref is ``features["appearance"]``.
 
     Raises:
         InputError: There is no input, or it cannot be used.
     """
     if control.path is None:
         raise InputError("the prior replay needs an input: a video or a folder of images")
+    if is_rig(control.path):
+        return _of_rig(control, control.path)
     clip = read_clip(
         control.path,
         frames=control.frames,
@@ -24,6 +29,21 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
         intrinsics=control.intrinsics,
         poses=control.poses,
         hfov_deg=control.hfov_deg,
+        hold_out=control.hold_out,
+    )
+    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+def _of_rig(control: Control, path: Path) -> Clip:
+    """The frames of several cameras."""
+    if control.intrinsics is not None or control.hfov_deg is not None:
+        raise InputError(f"{path} has several cameras; their calibration is named in its rig.json")
+    clip = read_rig_clip(
+        path,
+        frames=control.frames,
+        fps=control.fps,
+        size=control.size,
+        poses=control.poses,
         hold_out=control.hold_out,
     )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))

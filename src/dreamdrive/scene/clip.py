@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -21,6 +22,7 @@ class Known:
         sky: Sky masks (F, H, W).
         metric: Whether poses, depth and points are in metres; otherwise all share a unit that is not known.
         points: Sparse points of the street (P, 3), in the world of the poses.
+        ground: The road plane, in the world of the poses.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
@@ -29,17 +31,19 @@ class Known:
     sky: Bool[np.ndarray, "f h w"] | None = None
     metric: bool = True
     points: Float[np.ndarray, "p 3"] | None = None
+    ground: Ground | None = None
 
 
 @dataclass(frozen=True)
 class Clip:
-    """Frames of one drive.
+    """Frames of one drive in the order of time; those of several cameras at one time in that of the rig.
 
     Attributes:
         frames: RGB (F, H, W, 3).
         times_s: Time of each frame (F,).
         camera: Index into ``rig`` of each frame (F,).
-        rig: Pinholes of the frames' size; their poses are the mounting, the identity for a single camera.
+        rig: Pinholes of the frames' size; their poses are the mounting on the car (``car_from_camera``, in
+            metres), the identity for a single camera.
         valid: False where the frame holds no picture, such as the corners of an undistorted image (F, H, W).
         held_out: Frames that no fit may see (F,).
         source_index: Index of each frame in the source, in file or decode order (F,).
@@ -79,6 +83,23 @@ class Clip:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self.frames.shape[2], self.frames.shape[1]
+
+    @property
+    def step(self) -> Int[np.ndarray, " f"]:
+        """Number of earlier frames of the same camera, for each frame (F,)."""
+        step = np.zeros(len(self), dtype=np.int64)
+        for camera in np.unique(self.camera):
+            own = self.camera == camera
+            step[own] = np.arange(np.count_nonzero(own))
+        return step
+
+    def of_camera(self, camera: int) -> Int[np.ndarray, " k"]:
+        """Indices of the frames of one camera of the rig, in the order of time."""
+        return np.flatnonzero(self.camera == camera)
+
+    def seen_of(self, camera: int) -> list[int]:
+        """Indices of those of them that a fit may see."""
+        return np.flatnonzero((self.camera == camera) & ~self.held_out).tolist()
 
     def with_features(self, **features: Float[np.ndarray, "f _ _ _"]) -> "Clip":
         """The clip with more named features."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
@@ -14,27 +14,43 @@ from dreamdrive import _native
 
 @dataclass(frozen=True)
 class Exposure:
-    """Affine colour transforms (F, 3, 4) of the frames they were trained on, and their times (F,)."""
+    """Affine colour transforms (F, 3, 4) of the frames they were trained on.
+
+    Attributes:
+        transforms: One [A | b] a frame.
+        times_s: Times of the frames (F,), strictly increasing for each camera.
+        camera: Which camera of the rig each is of (F,); None where there is one only.
+    """
 
     transforms: Float[Tensor, "f 3 4"]
     times_s: Float[np.ndarray, " f"]
+    camera: Int[np.ndarray, " f"] | None = None
 
     def __post_init__(self) -> None:
-        if len(self.times_s) == 0 or (np.diff(self.times_s) <= 0).any():
+        cameras = [0] if self.camera is None else np.unique(self.camera).tolist()
+        times = [self._of(camera)[1] for camera in cameras]
+        if len(self.times_s) == 0 or any((np.diff(each) <= 0).any() for each in times):
             raise ValueError("exposure: expected at least one frame and strictly increasing times")
 
-    def at(self, t_s: float) -> Float[Tensor, "3 4"]:
+    def at(self, t_s: float, camera: int = 0) -> Float[Tensor, "3 4"]:
         """The transform at a time: linear between the neighbouring trained frames, constant outside."""
-        after = int(np.searchsorted(self.times_s, t_s, side="right"))
-        if after == 0 or after == len(self.times_s):
-            return self.transforms[min(after, len(self.times_s) - 1)]
+        transforms, times_s = self._of(camera)
+        after = int(np.searchsorted(times_s, t_s, side="right"))
+        if after == 0 or after == len(times_s):
+            return transforms[min(after, len(times_s) - 1)]
         before = after - 1
-        weight = (t_s - self.times_s[before]) / (self.times_s[after] - self.times_s[before])
-        return torch.lerp(self.transforms[before], self.transforms[after], float(weight))
+        weight = (t_s - times_s[before]) / (times_s[after] - times_s[before])
+        return torch.lerp(transforms[before], transforms[after], float(weight))
 
-    def apply(self, image: Float[Tensor, "h w 3"], t_s: float) -> Float[Tensor, "h w 3"]:
-        """An image of the scene as the camera would have recorded it at ``t_s``; not clipped."""
-        return transform_colour(image, self.at(t_s))
+    def apply(self, image: Float[Tensor, "h w 3"], t_s: float, camera: int = 0) -> Float[Tensor, "h w 3"]:
+        """An image of the scene as a camera of the rig would have recorded it at ``t_s``; not clipped."""
+        return transform_colour(image, self.at(t_s, camera))
+
+    def _of(self, camera: int) -> tuple[Float[Tensor, "k 3 4"], Float[np.ndarray, " k"]]:
+        if self.camera is None:
+            return self.transforms, self.times_s
+        own = np.flatnonzero(self.camera == camera)
+        return self.transforms[own], self.times_s[own]
 
 
 def transform_colour(image: Float[Tensor, "h w 3"], affine: Float[Tensor, "3 4"]) -> Float[Tensor, "h w 3"]:
@@ -107,9 +123,16 @@ class ExposureNetwork(nn.Module):
         return torch.eye(3, 4, dtype=change.dtype, device=change.device) + change.view(3, 4)
 
     @torch.no_grad()
-    def freeze(self, times_s: Float[np.ndarray, " f"], trained: Bool[np.ndarray, " f"]) -> Exposure:
-        """The transforms of the frames that were trained on, of all frames at ``times_s`` (F,)."""
+    def freeze(
+        self,
+        times_s: Float[np.ndarray, " f"],
+        trained: Bool[np.ndarray, " f"],
+        camera: Int[np.ndarray, " f"] | None = None,
+    ) -> Exposure:
+        """The transforms of those of all frames, at ``times_s`` (F,) by ``camera``, that were trained on."""
         if len(times_s) != len(self.embedding):
             raise ValueError(f"exposure: {len(times_s)} times for {len(self.embedding)} frames")
         index = np.flatnonzero(trained)
-        return Exposure(torch.stack([self(int(i)) for i in index]).clone(), np.asarray(times_s)[index])
+        several = None if camera is None or not camera.any() else camera[index]
+        transforms = torch.stack([self(int(i)) for i in index]).clone()
+        return Exposure(transforms, np.asarray(times_s)[index], several)

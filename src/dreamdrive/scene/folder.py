@@ -105,6 +105,8 @@ def _tensors(scene: Scene) -> dict[str, dict[str, Tensor]]:
             "transforms": scene.exposure.transforms,
             "times_s": torch.from_numpy(np.asarray(scene.exposure.times_s, dtype=np.float64)),
         }
+        if scene.exposure.camera is not None:
+            tensors["exposure"]["camera"] = torch.from_numpy(scene.exposure.camera)
     return tensors
 
 
@@ -118,6 +120,7 @@ def _values(scene: Scene) -> dict[str, Any]:
         "cameras": [{**asdict(c), "world_from_camera": c.world_from_camera.tolist()} for c in scene.cameras],
         "times_s": scene.times_s.tolist(),
         "held_out": scene.held_out.tolist(),
+        **({} if scene.camera is None else {"camera": scene.camera.tolist()}),
         "deformation": None if scene.deformation is None else described(scene.deformation),
         "sky": None
         if scene.sky is None
@@ -180,12 +183,18 @@ def _rebuild(index: dict[str, Any], part: Callable[[str], dict[str, Tensor] | No
         deformation=None if motion is None else rebuilt(index["deformation"], motion),
         actors=tuple(Actor(**_arrays(a, "times_s", "positions_m")) for a in index["actors"]),
         sky=None if sky is None else Sky(sky["texture"], **{n: tuple(r) for n, r in index["sky"].items()}),
-        exposure=None if exposure is None else Exposure(exposure["transforms"], exposure["times_s"].numpy()),
+        exposure=None if exposure is None else _exposure(exposure),
         cameras=tuple(Camera(**_arrays(c, "world_from_camera")) for c in index["cameras"]),
         times_s=np.array(index["times_s"], dtype=np.float64),
         held_out=np.array(index["held_out"], dtype=bool),
+        camera=np.array(index["camera"], dtype=np.int64) if "camera" in index else None,
         provenance=index["provenance"],
     )
+
+
+def _exposure(part: dict[str, Tensor]) -> Exposure:
+    camera = part["camera"].numpy() if "camera" in part else None
+    return Exposure(part["transforms"], part["times_s"].numpy(), camera)
 
 
 def _arrays(values: dict[str, Any], *names: str) -> dict[str, Any]:

@@ -54,6 +54,11 @@ class Ground:
     normal_world: Float[np.ndarray, "3"]
     offset_m: float
 
+    def seen_from(self, world_from_camera: Float[np.ndarray, "4 4"]) -> "Ground":
+        """The same plane in the frame of a camera at that pose."""
+        rotation, place = world_from_camera[:3, :3], world_from_camera[:3, 3]
+        return Ground(rotation.T @ self.normal_world, float(self.height_m(place)))
+
     def height_m(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
         """Height of points (..., 3) above the plane."""
         return np.asarray(points_world @ self.normal_world + self.offset_m)
@@ -77,7 +82,8 @@ class Geometry:
         sky: Sky masks (F, H, W).
         moving: Evidence that a pixel belongs to something that moves (F, H, W) in [0, 1].
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
-            camera (bonnet, mirror, bar, overlay) and stays empty in the scene (H, W).
+            camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
+            clip's rig (K, H, W).
         region_names: Names of the regions in ``fixed_regions``.
         ground: The road plane, where found.
         scale: What fixed the metric scale.
@@ -92,7 +98,7 @@ class Geometry:
     confidence: Float[np.ndarray, "f h w"]
     sky: Bool[np.ndarray, "f h w"]
     moving: Float[np.ndarray, "f h w"]
-    fixed_regions: Int[np.ndarray, "h w"]
+    fixed_regions: Int[np.ndarray, "k h w"]
     region_names: tuple[str, ...]
     ground: Ground | None
     scale: Scale

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
@@ -34,6 +34,8 @@ class Scene:
         times_s: Their times (F,).
         held_out: Which of them no fit has seen (F,).
         provenance: What the scene was made from, as JSON values.
+        camera: Which camera of a rig each view is of (F,), the first one's being the drive; None where there
+            is one camera only.
     """
 
     static: Gaussians
@@ -46,16 +48,28 @@ class Scene:
     times_s: Float[np.ndarray, " f"]
     held_out: Bool[np.ndarray, " f"]
     provenance: dict[str, Any] = field(default_factory=dict)
+    camera: Int[np.ndarray, " f"] | None = None
 
     def __post_init__(self) -> None:
-        if not len(self.cameras) == len(self.times_s) == len(self.held_out):
-            counts = len(self.cameras), len(self.times_s), len(self.held_out)
-            raise ValueError(f"scene: cameras, times and held-out marks differ in number: {counts}")
+        counts = [len(self.cameras), len(self.times_s), len(self.held_out)]
+        counts += [] if self.camera is None else [len(self.camera)]
+        if len(set(counts)) > 1:
+            raise ValueError(
+                f"scene: numbers of cameras, times, held-out marks (and rig indices) differ: {counts}"
+            )
 
     @property
     def trajectory(self) -> Trajectory:
-        """The recorded drive."""
-        return Trajectory(np.stack([c.world_from_camera for c in self.cameras]), self.times_s)
+        """The recorded drive, of the rig's first camera."""
+        poses = [self.cameras[i].world_from_camera for i in self.front]
+        return Trajectory(np.stack(poses), self.times_s[self.front])
+
+    @property
+    def front(self) -> Int[np.ndarray, " k"]:
+        """Indices of the views of the rig's first camera."""
+        if self.camera is None:
+            return np.arange(len(self.cameras))
+        return np.flatnonzero(self.camera == self.camera[0])
 
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:

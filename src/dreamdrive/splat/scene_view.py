@@ -50,6 +50,7 @@ def render_scene(
     exposure: bool = True,
     channels: Float[Tensor, "n c"] | None = None,
     part: Part = "all",
+    of_rig: int = 0,
 ) -> SceneView:
     """Render a scene at ``t_s`` from any camera; no gradients.
 
@@ -60,6 +61,7 @@ def render_scene(
         exposure: Whether to apply the recording's exposure at this time.
         channels: Further values of each Gaussian of the part, in the order of ``Scene.at``.
         part: All Gaussians, or the static or the dynamic ones alone; the dynamic ones stand before black.
+        of_rig: Whose exposure it is, of several cameras.
     """
     gaussians, is_dynamic = _select(scene, t_s, part)
     marked = is_dynamic[:, None] if channels is None else torch.cat([is_dynamic[:, None], channels], dim=-1)
@@ -68,7 +70,7 @@ def render_scene(
     if scene.sky is not None and part != "dynamic":
         colour = colour + (1 - drawn.alpha)[..., None] * scene.sky.colour(camera)
     if exposure and scene.exposure is not None:
-        colour = scene.exposure.apply(colour, t_s)
+        colour = scene.exposure.apply(colour, t_s, of_rig)
     return SceneView(
         colour=colour.clamp(0, 1),
         alpha=drawn.alpha,

@@ -1,6 +1,6 @@
 """The procedural street world: layouts drawn at random or given, rendered by rays, with exact truth."""
 
-from dreamdrive.data.world.drive import MOUNTS, Drive, WorldBox, drive, make_street
+from dreamdrive.data.world.drive import MOUNTS, Drive, Mount, WorldBox, drive, front_from_mount, make_street
 from dreamdrive.data.world.materials import Semantic
 from dreamdrive.data.world.render import WorldView
 from dreamdrive.data.world.streets import StreetOptions, draw_street
@@ -9,6 +9,7 @@ from dreamdrive.data.world.world import World
 __all__ = [
     "MOUNTS",
     "Drive",
+    "Mount",
     "Semantic",
     "StreetOptions",
     "World",
@@ -16,5 +17,6 @@ __all__ = [
     "WorldView",
     "draw_street",
     "drive",
+    "front_from_mount",
     "make_street",
 ]

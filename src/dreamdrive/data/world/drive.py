@@ -26,6 +26,8 @@ _MOUNT_YAW_RAD: dict[Mount, float] = {
     "back_left": np.deg2rad(110),
     "back_right": -np.deg2rad(110),
 }
+# Axes of a camera that looks ahead: x right, y down, z ahead.
+_LEVEL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 MOUNTS: tuple[Mount, ...] = tuple(_MOUNT_YAW_RAD)
 """The cameras of the car, the front one first."""
 _MOUNT_OUT_M = 0.5
@@ -121,20 +123,33 @@ def ego_poses(
     """``map_from_camera`` (F, 4, 4) of a camera of the recording car, which nods and rolls a little."""
     pitch = ego.shake_rad * np.sin(4.1 * times_s + 0.7)
     roll = 0.7 * ego.shake_rad * np.sin(2.3 * times_s + 1.9)
-    turn = _MOUNT_YAW_RAD[mount]
-    out = 0.0 if mount == "front" else _MOUNT_OUT_M
+    mounted = _mounted(mount)
     poses: list[np.ndarray] = []
-    # Axes of a camera that looks ahead: x right, y down, z ahead.
-    level = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
     for place, p, r in zip(track_function(ego.track)(times_s), pitch, roll, strict=True):
         pose = upright(place)
         about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
         about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
-        mounted = upright(np.array([out * np.cos(turn), out * np.sin(turn), turn]))
-        pose[:3, :3] = pose[:3, :3] @ about_y @ about_x @ mounted[:3, :3] @ level
-        pose[:3, 3] = (upright(place) @ mounted)[:3, 3] + [0, 0, ego.camera_height_m]
+        nodding = pose[:3, :3] @ about_y @ about_x
+        pose[:3, :3] = nodding @ mounted[:3, :3] @ _LEVEL
+        pose[:3, 3] += nodding @ mounted[:3, 3] + [0, 0, ego.camera_height_m]
         poses.append(pose)
     return np.stack(poses)
+
+
+def front_from_mount(mount: Mount) -> Float[np.ndarray, "4 4"]:
+    """Pose (4, 4) of a camera of the car in the frame of its front camera."""
+    mounted = _mounted(mount)
+    pose = np.eye(4)
+    pose[:3, :3] = _LEVEL.T @ mounted[:3, :3] @ _LEVEL
+    pose[:3, 3] = _LEVEL.T @ mounted[:3, 3]
+    return pose
+
+
+def _mounted(mount: Mount) -> Float[np.ndarray, "4 4"]:
+    """Pose of a camera on the car: x ahead, y left, z up from the front camera."""
+    turn = _MOUNT_YAW_RAD[mount]
+    out = 0.0 if mount == "front" else _MOUNT_OUT_M
+    return upright(np.array([out * np.cos(turn), out * np.sin(turn), turn]))
 
 
 def drive(

@@ -11,7 +11,8 @@ import numpy as np
 
 from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
-from dreamdrive.data.world.drive import Drive, WorldBox, road_plane
+from dreamdrive.data.rig import write_rig
+from dreamdrive.data.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
 from dreamdrive.data.world.materials import Semantic
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
@@ -19,7 +20,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Layout
 
 
-def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = False) -> None:
+def write_world(drives: Mapping[Mount, Drive], path: Path, *, replace: bool = False) -> None:
     """Write a world folder; it appears whole or not at all.
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
@@ -28,10 +29,10 @@ def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = Fals
     trajectory for ``--poses``); ``depth.npz`` (``depth_m``, 0 in the sky); ``flow.npz`` (``flow_px``, to the
     next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
     ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
-    several in folders of their names.
+    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``.
 
     Args:
-        drives: One for each camera, by its name.
+        drives: One for each camera, by its mount.
         path: The folder.
         replace: Whether an existing world folder may be replaced.
 
@@ -46,6 +47,8 @@ def write_world(drives: Mapping[str, Drive], path: Path, *, replace: bool = Fals
         seconds = float(first.times_s[-1])
         _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
         _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
+        if len(drives) > 1:
+            write_rig({name: front_from_mount(name) for name in drives}, folder)
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)

@@ -35,7 +35,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         confidence=dense.confidence,
         sky=dense.sky,
         moving=dense.moving,
-        fixed_regions=posed.fixed_regions,
+        fixed_regions=posed.fixed_regions[None],
         region_names=posed.region_names,
         ground=posed.ground,
         scale=posed.scale,

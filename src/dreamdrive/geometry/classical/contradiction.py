@@ -55,13 +55,11 @@ def check(clip: Clip, evidence: Evidence) -> None:
         evidence: The first look at them.
 
     Raises:
-        InputError: The frames of the first camera clearly show another motion.
+        InputError: The frames clearly show another motion.
     """
     if clip.known.world_from_camera is None:
         return
-    of = clip.camera == clip.camera[0]
-    camera = clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px)
-    found = explain(evidence.grey[of], evidence.street[of], camera, clip.known.world_from_camera[of])
+    found = explain(evidence.grey, evidence.street, evidence.small, clip.known.world_from_camera)
     if not found.contradictory:
         return
     focal = "" if clip.known.intrinsics else "; the focal length is a guess: if it is known, give it too"

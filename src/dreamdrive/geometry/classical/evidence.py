@@ -47,7 +47,7 @@ def look(clip: Clip) -> Evidence:
     in_motion = np.zeros(len(clip), bool)
     in_motion[:-1] |= moves.moving
     in_motion[1:] |= moves.moving
-    if moves.standing or len(clip.rig) > 1:
+    if moves.standing:
         in_motion[:] = False
     fixed = masks.find_fixed(grey, np.logical_and.reduce(valid), in_motion, clip.size)
     street = valid & ~_resize(((fixed.regions > 0) | fixed.objects)[None], size)

@@ -22,7 +22,7 @@ def depth_points(clip: Clip) -> Float[np.ndarray, "p 3"]:
         return np.zeros((0, 3))
     clouds: list[np.ndarray] = []
     for frame in np.unique(np.linspace(0, len(clip) - 1, min(8, len(clip))).round().astype(int)):
-        camera = clip.rig[int(clip.camera[frame])]
+        camera = clip.rig[0]
         pose = np.eye(4) if clip.known.world_from_camera is None else clip.known.world_from_camera[frame]
         stride = max(1, round(np.sqrt(camera.width_px * camera.height_px / POINTS_A_FRAME)))
         depth = clip.known.depth_m[frame, ::stride, ::stride]

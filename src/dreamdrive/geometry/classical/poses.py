@@ -61,13 +61,13 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
     tried and judged, and frame-to-frame odometry takes over when it is refused.
 
     Args:
-        clip: Frames of one camera, or of several whose poses are known.
+        clip: Frames of one camera.
         camera_height_m: Height of the camera above the road, when the user gave it; None assumes 1.5 m.
         seed: Seed of everything random; the same seed gives the same poses.
 
     Raises:
-        InputError: Without frames; for several cameras without poses; for a camera height that is not
-            positive; for known poses that contradict the frames.
+        InputError: Without frames; for a camera height that is not positive; for known poses that contradict
+            the frames.
     """
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
@@ -94,11 +94,6 @@ def _check(clip: Clip, camera_height_m: float | None) -> None:
         raise InputError("The clip holds no frame; at least two are needed for geometry from motion.")
     if camera_height_m is not None and not (np.isfinite(camera_height_m) and camera_height_m > 0):
         raise InputError(f"The camera height is {camera_height_m} m; give a positive height above the road.")
-    if len(clip.rig) > 1 and clip.known.world_from_camera is None:
-        raise InputError(
-            f"The clip has {len(clip.rig)} cameras and no poses; classical geometry poses one camera only. "
-            "Give the poses, or select the frames of one camera."
-        )
 
 
 def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int) -> Posed:
@@ -129,8 +124,13 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
 
 def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
     """The user's poses, moved so that the first frame's camera is the world; the road is only looked for."""
-    street = _known_street(clip, evidence)
-    metric = scale.as_given(street, "poses", 0.0, "the given poses", height_m, seed)
+    assert clip.known.world_from_camera is not None
+    if clip.known.ground is None:
+        street = _known_street(clip, evidence)
+        metric = scale.as_given(street, "poses", 0.0, "the given poses", height_m, seed)
+    else:
+        ground = clip.known.ground.seen_from(clip.known.world_from_camera[0])
+        metric = Metric(1.0, ground, Scale("poses", 0.0), ())
     return _with_known(clip, evidence, metric, ["the given poses are used", *metric.notes])
 
 
@@ -153,21 +153,13 @@ def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed:
 
 
 def _known_street(clip: Clip, evidence: Evidence) -> Street:
-    """The frames of the first frame's camera with the known poses, in these poses' unit."""
+    """The frames with the known poses, in these poses' unit."""
     assert clip.known.world_from_camera is not None
     points = depth_points(clip)
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    one_camera = clip.camera == clip.camera[0]
-    return Street(
-        evidence.grey[one_camera],
-        evidence.street[one_camera],
-        clip.rig[int(clip.camera[0])].resized(evidence.small.width_px, evidence.small.height_px),
-        poses[one_camera],
-        points,
-        clip.times_s[one_camera],
-    )
+    return Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
 
 
 def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
@@ -239,7 +231,7 @@ def as_posed(
     """The cameras of all frames, and what was noticed before and by posing them.
 
     Args:
-        clip: The frames; the first camera of the rig is replaced by ``camera``.
+        clip: The frames.
         evidence: The first look at them.
         poses: World-from-camera (F, 4, 4) in metres, the first the identity.
         camera: Pinhole of the clip's size.
@@ -248,8 +240,7 @@ def as_posed(
         notes: What posing them showed, a sentence each.
         details: Figures of the method.
     """
-    rig = [camera, *clip.rig[1:]]
-    cameras = tuple(rig[int(index)].at(pose) for index, pose in zip(clip.camera, poses, strict=True))
+    cameras = tuple(camera.at(pose) for pose in poses)
     figures = {
         "flow_px_at_320": float(np.median(evidence.motion.flow_px)) if len(clip) > 1 else 0.0,
         "moving_steps": int(evidence.motion.moving.sum()),

@@ -1,0 +1,161 @@
+"""Recordings of several cameras on one car: a folder with ``rig.json`` and the frames of each camera."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.data.clip_reader import read_clip
+from dreamdrive.data.json_file import read_json
+from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import check_rigid
+from dreamdrive.scene.clip import Clip
+
+RIG = "rig.json"
+_EXPECTED = (
+    'expected {"cameras": [{"frames": folder, "intrinsics": file, "car_from_camera": 4x4 in metres}, ...]}'
+)
+
+
+@dataclass(frozen=True)
+class Mounted:
+    """A camera of a rig.
+
+    Attributes:
+        frames: Its folder of images or its video.
+        intrinsics: Its calibration file; None where there is none.
+        car_from_camera: Where it is mounted (4, 4), x right, y down, z ahead, in metres.
+    """
+
+    frames: Path
+    intrinsics: Path | None
+    car_from_camera: Float[np.ndarray, "4 4"]
+
+
+def is_rig(path: Path) -> bool:
+    """Whether a path is a folder that describes several cameras."""
+    return (path / RIG).is_file()
+
+
+def read_rig(path: Path) -> tuple[Mounted, ...]:
+    """The cameras of a rig; paths in its file count from its folder.
+
+    Raises:
+        InputError: The description is missing or malformed.
+    """
+    values = read_json(path / RIG, "input")
+    listed = values.get("cameras")
+    if not isinstance(listed, list) or not listed:
+        raise InputError(f"{path / RIG} lists no cameras; {_EXPECTED}")
+    return tuple(_mounted(path, index, entry) for index, entry in enumerate(listed))
+
+
+def write_rig(cameras: Mapping[str, Float[np.ndarray, "4 4"]], path: Path) -> None:
+    """Describe cameras whose frames lie in ``NAME/frames`` and whose calibration is ``NAME/meta.json``.
+
+    Args:
+        cameras: ``car_from_camera`` of each, by its name.
+        path: The folder that holds them.
+    """
+    listed = [
+        {"frames": f"{name}/frames", "intrinsics": f"{name}/meta.json", "car_from_camera": pose.tolist()}
+        for name, pose in cameras.items()
+    ]
+    (path / RIG).write_text(json.dumps({"cameras": listed}, indent=1) + "\n", encoding="utf-8")
+
+
+def read_rig_clip(
+    path: Path,
+    *,
+    frames: str | None = None,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    poses: Path | None = None,
+    hold_out: int | None = None,
+) -> Clip:
+    """Read the frames of all cameras of a rig, as ``read_clip`` reads those of one.
+
+    Args:
+        path: Folder with ``rig.json``.
+        frames: ``START:STOP:STEP`` over the frames of each camera.
+        fps: Rate of each camera.
+        size: Exact width and height of all frames.
+        poses: Pose file of the first camera; the mountings give those of the others.
+        hold_out: Withhold the selected times i with i mod N = N // 2.
+
+    Raises:
+        InputError: See ``read_rig`` and ``read_clip``; or the cameras differ in their numbers of frames, in
+            their times or in size.
+    """
+    cameras = read_rig(path)
+    parts = [
+        read_clip(
+            camera.frames,
+            frames=frames,
+            fps=fps,
+            size=size,
+            intrinsics=camera.intrinsics,
+            poses=poses if index == 0 else None,
+            hold_out=hold_out,
+        )
+        for index, camera in enumerate(cameras)
+    ]
+    for camera, part in zip(cameras, parts, strict=True):
+        if len(part) != len(parts[0]) or part.size != parts[0].size:
+            got, wanted = (f"{len(p)} frames of {p.size[0]}x{p.size[1]}" for p in (part, parts[0]))
+            raise InputError(
+                f"{camera.frames} gives {got}, {cameras[0].frames} gives {wanted}; expected the same"
+            )
+    return _woven(path, cameras, parts)
+
+
+def _mounted(path: Path, index: int, entry: Any) -> Mounted:
+    name = f"{path / RIG}: camera {index}"
+    if not isinstance(entry, dict) or not isinstance(entry.get("frames"), str):
+        raise InputError(f"{name} names no frames; {_EXPECTED}")
+    given = entry.get("intrinsics")
+    if given is not None and not isinstance(given, str):
+        raise InputError(f"{name} has intrinsics that are no file name; {_EXPECTED}")
+    try:
+        pose = np.array(entry.get("car_from_camera"), dtype=np.float64)
+        if pose.shape != (4, 4):
+            raise ValueError(f"it has shape {pose.shape}")
+        check_rigid(pose, "car_from_camera")
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} has no car_from_camera that is a rigid 4x4 pose: {error}") from None
+    return Mounted(path / entry["frames"], None if given is None else path / given, pose)
+
+
+def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
+    """One clip in the order of time, the cameras of a time in the order of the rig."""
+    steps, count = len(parts[0]), len(parts)
+    part, row = np.tile(np.arange(count), steps), np.repeat(np.arange(steps), count)
+    # Cameras of a rig go off within a fraction of a frame: the first one's times stand for all.
+    times_s = parts[0].times_s[row]
+    first = parts[0].known.world_from_camera
+    known = replace(parts[0].known, intrinsics=all(each.known.intrinsics for each in parts))
+    if first is not None:
+        from_first = np.linalg.inv(cameras[0].car_from_camera)
+        mounted = np.stack([from_first @ camera.car_from_camera for camera in cameras])
+        known = replace(known, world_from_camera=first[row] @ mounted[part])
+    notes = [note for each in parts for note in each.provenance["notes"]]
+    return Clip(
+        frames=np.stack([parts[p].frames[r] for p, r in zip(part, row, strict=True)]),
+        times_s=times_s,
+        camera=part,
+        rig=tuple(each.rig[0].at(c.car_from_camera) for each, c in zip(parts, cameras, strict=True)),
+        valid=np.stack([parts[p].valid[r] for p, r in zip(part, row, strict=True)]),
+        held_out=parts[0].held_out[row],
+        source_index=parts[0].source_index[row],
+        known=known,
+        provenance={
+            **parts[0].provenance,
+            "input": str(path),
+            "lens": None,
+            "notes": list(dict.fromkeys(notes)),
+        },
+    )

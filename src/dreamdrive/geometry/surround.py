@@ -1,0 +1,175 @@
+"""Clips of several cameras on one car: each camera by itself, in the world of the first."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation, Slerp
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.geometry import Geometry
+
+
+def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
+    """Reconstruct the first camera, then the others from where it tells that they were.
+
+    The path of the first camera and the mountings of the rig give the poses of all others, unless poses are
+    known; metres and the road are those of the first camera.
+
+    Args:
+        clip: Frames of several cameras, with the mountings in ``rig``.
+        reconstruct: The way of getting geometry from frames of one camera.
+
+    Raises:
+        InputError: Neither poses nor mountings are known; or see ``reconstruct``.
+    """
+    lead = int(clip.camera[0])
+    if clip.known.world_from_camera is None and _unmounted(clip):
+        raise InputError(
+            f"the clip has {len(clip.rig)} cameras, and neither their poses nor how they are mounted is "
+            "known; give the poses, or the frames of one camera"
+        )
+    first = reconstruct(only(clip, lead))
+    poses = _poses(clip, lead, first)
+    parts = {lead: first}
+    for camera in np.unique(clip.camera).tolist():
+        if camera != lead:
+            parts[camera] = _other(clip, camera, poses, first, reconstruct)
+    return _merged(clip, lead, parts, poses)
+
+
+def only(clip: Clip, camera: int) -> Clip:
+    """The frames of one camera of the rig, with what is known of them."""
+    rows = clip.of_camera(camera)
+    known = clip.known
+    return replace(
+        clip,
+        frames=clip.frames[rows],
+        times_s=clip.times_s[rows],
+        camera=np.zeros(len(rows), dtype=np.int64),
+        rig=(clip.rig[camera].at(np.eye(4)),),
+        valid=clip.valid[rows],
+        held_out=clip.held_out[rows],
+        source_index=clip.source_index[rows],
+        features={name: values[rows] for name, values in clip.features.items()},
+        latents=None if clip.latents is None else clip.latents[rows],
+        known=replace(
+            known,
+            world_from_camera=None if known.world_from_camera is None else known.world_from_camera[rows],
+            depth_m=None if known.depth_m is None else known.depth_m[rows],
+            sky=None if known.sky is None else known.sky[rows],
+        ),
+    )
+
+
+def _unmounted(clip: Clip) -> bool:
+    """Whether two cameras of the rig are at the same place, looking the same way: no mounting was given."""
+    mountings = [camera.world_from_camera for camera in clip.rig]
+    return any(np.allclose(mountings[0], other) for other in mountings[1:])
+
+
+def _poses(clip: Clip, lead: int, first: Geometry) -> Float[np.ndarray, "f 4 4"]:
+    """Poses of all frames in the world of the first camera, in metres."""
+    if clip.known.world_from_camera is not None:
+        known = clip.known.world_from_camera.astype(np.float64)
+        poses = np.linalg.inv(known[0]) @ known
+        poses[:, :3, 3] *= float(first.details.get("metres_per_unit", 1.0))
+        return poses
+    led = np.stack([camera.world_from_camera for camera in first.cameras])
+    from_lead = np.linalg.inv(clip.rig[lead].world_from_camera)
+    lead_poses = _at(led, clip.times_s[clip.of_camera(lead)], clip.times_s)
+    return np.stack(
+        [
+            pose @ from_lead @ clip.rig[int(camera)].world_from_camera
+            for pose, camera in zip(lead_poses, clip.camera, strict=True)
+        ]
+    )
+
+
+def _at(
+    poses: Float[np.ndarray, "k 4 4"], known_s: Float[np.ndarray, " k"], times_s: Float[np.ndarray, " f"]
+) -> Float[np.ndarray, "f 4 4"]:
+    """Poses at other times: between the known ones, and the nearest beyond their ends."""
+    if len(poses) == 1:
+        return np.repeat(poses, len(times_s), axis=0)
+    times = np.clip(times_s, known_s[0], known_s[-1])
+    between = np.tile(np.eye(4), (len(times), 1, 1))
+    between[:, :3, :3] = Slerp(known_s, Rotation.from_matrix(poses[:, :3, :3]))(times).as_matrix()
+    for axis in range(3):
+        between[:, axis, 3] = np.interp(times, known_s, poses[:, axis, 3])
+    return between
+
+
+def _other(
+    clip: Clip,
+    camera: int,
+    poses: Float[np.ndarray, "f 4 4"],
+    first: Geometry,
+    reconstruct: Callable[[Clip], Geometry],
+) -> Geometry:
+    """One of the other cameras, from known poses over the known road."""
+    part = only(clip, camera)
+    known: Known = replace(
+        part.known,
+        world_from_camera=poses[clip.of_camera(camera)],
+        metric=True,
+        points=None,
+        ground=first.ground,
+        depth_m=None if part.known.depth_m is None else _in_metres(part.known.depth_m, clip, first),
+    )
+    try:
+        return reconstruct(replace(part, known=known))
+    except InputError as error:
+        raise InputError(f"camera {camera} of the rig: {error}") from error
+
+
+def _in_metres(
+    depth: Float[np.ndarray, "k h w"], clip: Clip, first: Geometry
+) -> Float[np.ndarray, "k h w"] | None:
+    if clip.known.metric:
+        return depth
+    factor = first.details.get("metres_per_unit")
+    return None if factor is None else depth * np.float32(factor)
+
+
+def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.ndarray, "f 4 4"]) -> Geometry:
+    """All cameras in one, in the order of the clip."""
+    first = parts[lead]
+    names = tuple(dict.fromkeys(name for part in parts.values() for name in part.region_names))
+    fixed = np.zeros((len(clip.rig), *first.fixed_regions.shape[1:]), first.fixed_regions.dtype)
+    for camera, part in parts.items():
+        renamed = np.array([0, *(names.index(name) + 1 for name in part.region_names)])
+        fixed[camera] = renamed[part.fixed_regions[0]]
+    cameras = [
+        parts[int(camera)].cameras[step].at(pose)
+        for camera, step, pose in zip(clip.camera, clip.step, poses, strict=True)
+    ]
+    said = [
+        note if k == lead else f"camera {k}: {note}" for k, part in parts.items() for note in part.detected
+    ]
+    return replace(
+        first,
+        cameras=tuple(cameras),
+        depth_m=_woven(clip, {k: part.depth_m for k, part in parts.items()}),
+        confidence=_woven(clip, {k: part.confidence for k, part in parts.items()}),
+        sky=_woven(clip, {k: part.sky for k, part in parts.items()}),
+        moving=_woven(clip, {k: part.moving for k, part in parts.items()}),
+        fixed_regions=fixed,
+        region_names=names,
+        detected=tuple(dict.fromkeys(said)),
+        details={
+            **first.details,
+            "cameras": {str(k): part.details for k, part in parts.items() if k != lead},
+        },
+    )
+
+
+def _woven(clip: Clip, parts: dict[int, np.ndarray]) -> np.ndarray:
+    """Maps of all frames (F, H, W) from those of each camera."""
+    some = next(iter(parts.values()))
+    whole = np.zeros((len(clip), *some.shape[1:]), some.dtype)
+    for camera, values in parts.items():
+        whole[clip.of_camera(camera)] = values
+    return whole
