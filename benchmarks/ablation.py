@@ -86,6 +86,7 @@ VARIANTS = {
     "no-features": Variant("F_score without Z_ref", features=False),
     "error-alone": Variant("the colour error alone as target (eq. 6)", scored(target="error")),
     "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
+    "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
     "all-frames": Variant("scores splatted into all frames, as the paper", scored(window=None)),
     "paper": Variant("both of the above, as the paper", scored(target="error", window=None)),
     "tau-0.20": Variant("tau = 0.20", grouped(threshold=0.20)),

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.features import pixel_features
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.geometry import Geometry
 
@@ -59,7 +60,7 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         options: Density and sizes of the seeds.
 
     Returns:
-        Gaussians with features Z_ref (appearance, then moving evidence, then confidence).
+        Gaussians with features Z_ref, see ``scene.features``.
 
     Raises:
         ValueError: If no pixel has depth.
@@ -155,17 +156,6 @@ def _seeds(
         features=pixel_features(clip, geometry, frame)[chosen],
         frame=frame,
     )
-
-
-def pixel_features(clip: Clip, geometry: Geometry, frame: int) -> Float[np.ndarray, "h w c"]:
-    """Z_ref of one frame at the frame's size: all of the clip's features, moving evidence, confidence."""
-    size = clip.size
-    maps = [geometry.moving[frame][..., None], geometry.confidence[frame][..., None]]
-    for name in sorted(clip.features):
-        feature = np.asarray(clip.features[name][frame], dtype=np.float32)
-        resized = cv2.resize(feature, size, interpolation=cv2.INTER_LINEAR)
-        maps.append(resized.reshape(size[1], size[0], -1))
-    return np.concatenate(maps, axis=2).astype(np.float32)
 
 
 def _tangent(
