@@ -14,10 +14,10 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-import torch
+from _ablation_features import with_efficientnet
 from _street_case import NOVEL, Case, References, Start, start
 from _street_fit import fit_case, load, measure, save, told_apart, with_steps
 from _street_jobs import QUALITY
@@ -26,6 +26,7 @@ from _workers import threads, work_off
 
 from dreamdrive.fit import Representation
 from dreamdrive.options import Quality
+from dreamdrive.scene.features import OF_GEOMETRY
 from dreamdrive.splat import native_info
 
 SEEDS = (0, 1, 2, 3)
@@ -39,13 +40,13 @@ class Variant:
     Attributes:
         about: For the table.
         change: Of the options.
-        features: Whether F_score sees Z_ref.
+        features: What F_score sees as Z_ref: appearance, nothing, or a network's features.
         representation: What is fitted.
     """
 
     about: str
     change: Callable[[Quality], Quality] = lambda quality: quality
-    features: bool = True
+    features: Literal["appearance", "none", "efficientnet"] = "appearance"
     representation: Representation = "hybrid"
 
 
@@ -83,7 +84,8 @@ def ungrouped(quality: Quality) -> Quality:
 VARIANTS = {
     "hybrid": Variant("all parts"),
     "no-grouping": Variant("each Gaussian's own score against tau, no tracks", ungrouped),
-    "no-features": Variant("F_score without Z_ref", features=False),
+    "no-features": Variant("F_score without Z_ref", features="none"),
+    "efficientnet": Variant("features of EfficientNet-Lite0 as Z_ref", features="efficientnet"),
     "error-alone": Variant("the colour error alone as target (eq. 6)", scored(target="error")),
     "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
     "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
@@ -134,12 +136,17 @@ class Cut:
         return self.runs / "ablation" / f"{self.name}.json"
 
 
-def begun(begin: Start, variant: Variant) -> Start:
+def begun(begin: Start, variant: Variant, quality: Quality) -> Start:
     """What the variant is fitted to."""
-    features = begin.seeds.features
-    if variant.features or features is None:
+    if variant.features == "appearance":
         return begin
-    return replace(begin, seeds=replace(begin.seeds, features=torch.zeros_like(features)))
+    if variant.features == "efficientnet":
+        return with_efficientnet(begin, quality)
+    features = begin.seeds.features
+    assert features is not None
+    bare = features.clone()
+    bare[:, OF_GEOMETRY:] = 0
+    return replace(begin, seeds=replace(begin.seeds, features=bare))
 
 
 def make(cut: Cut) -> None:
@@ -148,7 +155,7 @@ def make(cut: Cut) -> None:
     quality = variant.change(QUALITY)
     steps = quality.static.steps
     cases = cut.runs / ("cases" if steps == QUALITY.static.steps else f"cases-{steps}")
-    begin = begun(start(case, quality, cases), variant)
+    begin = begun(start(case, quality, cases), variant, quality)
     fitted = fit_case(begin, variant.representation, quality, lambda *_: None)
     views, _, _ = measure(fitted, case, [], cut.runs / "truth")
     record = {

@@ -17,9 +17,8 @@ from dreamdrive.splat import one_torch_thread, render, ssim_map
 
 ErrorName = Literal["l1", "dssim", "features"]
 
-_FEATURE_RANGE = (
-    4.0  # a clip's features have unit variance: two deviations to either side count as all there is
-)
+# Features of a clip have unit variance: two deviations to either side count as all there is.
+_FEATURE_RANGE = 4.0
 
 
 @one_torch_thread()

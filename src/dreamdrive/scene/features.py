@@ -12,7 +12,7 @@ OF_GEOMETRY = 2
 
 
 def pixel_features(clip: Clip, geometry: Geometry, frame: int) -> Float[np.ndarray, "h w c"]:
-    """Z_ref of one frame at the frame's size: moving evidence, confidence, then all of the clip's features."""
+    """Z_ref of one frame at the frame's size: what geometry gives, then all features of the clip by name."""
     size = clip.size
     maps = [geometry.moving[frame][..., None], geometry.confidence[frame][..., None]]
     for name in sorted(clip.features):
