@@ -9,7 +9,7 @@ from dreamdrive.scene.control import Control
 
 
 def replay(control: Control, progress: Progress = silent) -> Clip:
-    """Read a video or a folder of images; Z_ref is ``features["appearance"]``.
+    """Read a video or a folder of images; Z_ref is ``features["appearance"]``, and what a file adds to it.
 
     Raises:
         InputError: There is no input, or it cannot be used.
@@ -24,16 +24,25 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
         intrinsics=control.intrinsics,
         poses=control.poses,
         hfov_deg=control.hfov_deg,
+        trajectory=control.trajectory,
+        features=control.features,
         hold_out=control.hold_out,
     )
+    if "appearance" in clip.features:
+        return clip
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
 
 
 REPLAY = Prior(
     name="replay",
     make=replay,
-    takes=frozenset({"path", "frames", "fps", "size", "intrinsics", "poses", "hfov_deg", "hold_out"}),
-    gives="the frames as they are; poses, where they are given",
+    takes=frozenset(
+        {
+            *("path", "frames", "fps", "size", "intrinsics", "poses", "hfov_deg", "hold_out"),
+            *("trajectory", "features"),
+        }
+    ),
+    gives="the frames as they are; poses, features and the path asked for, where they are given",
     about="a recording, or a video that another program made",
     licence="none but that of the recording",
     memory="that of the frames",
