@@ -123,7 +123,7 @@ def write_features(path: Path, features: FeatureFile) -> None:
 
 
 def _problem(array: np.ndarray) -> str | None:
-    if array.dtype not in (np.float16, np.float32):
+    if array.dtype.name not in ("float16", "float32"):
         return f"holds {array.dtype}; expected float16 or float32"
     if array.ndim != 4 or 0 in array.shape:
         return f"has the shape {array.shape}; expected (frames, rows, columns, channels)"
