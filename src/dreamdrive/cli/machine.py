@@ -3,6 +3,8 @@
 import os
 import signal
 
+from dreamdrive.memory import available_bytes
+
 
 def available_cores() -> int:
     """Cores this process may run on."""
@@ -13,12 +15,8 @@ def available_cores() -> int:
 
 def available_memory_mb() -> int | None:
     """Memory that is free for use, in megabytes; None where the system does not tell."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            lines = dict(line.split(":", 1) for line in file)
-        return int(lines["MemAvailable"].split()[0]) // 1000
-    except (OSError, KeyError, ValueError):
-        return None
+    free = available_bytes()
+    return None if free is None else free // 1_000_000
 
 
 def use_all_cores() -> None:

@@ -13,6 +13,7 @@ from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
+from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.world import world
 from dreamdrive.errors import InputError
@@ -23,6 +24,7 @@ COMMANDS = {
     "export": export,
     "evaluate": evaluate,
     "world": world,
+    "prior": prior,
     "doctor": doctor,
 }
 _USER_ERROR, _INTERRUPTED = 2, 130

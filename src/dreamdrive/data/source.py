@@ -31,7 +31,6 @@ def open_source(path: Path) -> Source:
 def one_frame(path: Path) -> InputError:
     """The error for an input of one picture."""
     return InputError(
-        f"{path} gives a single frame, and a recorded clip needs at least two. One photo will be taken by "
-        "the priors street (the one that ships in the box), vista and svd, which are not available yet; "
-        "until then give a video or a folder of images"
+        f"{path} gives a single frame, and a recorded clip needs at least two. One photo is taken by the "
+        "priors vista and svd, which need the weights of their networks: --prior vista --weights PATH"
     )

@@ -10,10 +10,10 @@ from dreamdrive.prior.diffusers_i2v import DIFFUSERS
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.replay import REPLAY, replay
 from dreamdrive.prior.street_world import STREET_WORLD, street_world
+from dreamdrive.prior.vista import SVD, VISTA
 
-PRIORS: Mapping[str, Prior] = MappingProxyType(
-    {prior.name: prior for prior in (REPLAY, STREET_WORLD, COSMOS, DIFFUSERS)}
-)
+_ALL = (REPLAY, STREET_WORLD, SVD, VISTA, COSMOS, DIFFUSERS)
+PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in _ALL})
 """Every prior by the name that ``--prior`` takes."""
 
 

@@ -1,0 +1,72 @@
+"""Video models as priors: Stable Video Diffusion and Vista, one network on diffusers' classes."""
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.vista.kinds import KINDS, KindName
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+
+INSTALL = 'pip install "dreamdrive[video-prior]"'
+_TAKES = frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"})
+_MEMORY = (
+    "at 1024x576 on a GPU in half precision about 9 GB for the UNet and 13 GB for the decoder (reckoned, not "
+    "measured); on a CPU 17 GB, and hours; a run that does not fit is refused before it starts"
+)
+
+
+def svd(control: Control, progress: Progress = silent) -> Clip:
+    """A photo goes on for 25 frames by Stable Video Diffusion; see ``make.make_clip``.
+
+    Raises:
+        InputError: See ``make.make_clip``.
+    """
+    return _make("svd", control, progress)
+
+
+def vista(control: Control, progress: Progress = silent) -> Clip:
+    """A street goes on from a photo or leading frames by Vista; see ``make.make_clip``.
+
+    Raises:
+        InputError: See ``make.make_clip``.
+    """
+    return _make("vista", control, progress)
+
+
+def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
+    try:
+        from dreamdrive.prior.vista.make import make_clip
+    except ImportError as error:
+        raise InputError(f"prior {kind}: {error.name} cannot be imported ({error}): {INSTALL}") from None
+    return make_clip(KINDS[kind], control, progress)
+
+
+SVD = Prior(
+    name="svd",
+    make=svd,
+    takes=_TAKES,
+    gives="25 frames at 7 Hz, latents, features; no poses",
+    about="a photo goes on for 25 frames (Stable Video Diffusion)",
+    licence=(
+        "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, which limits "
+        "commercial use"
+    ),
+    memory=_MEMORY,
+    weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",
+    package="diffusers",
+    install=INSTALL,
+)
+VISTA = Prior(
+    name="vista",
+    make=vista,
+    takes=_TAKES | {"action"},
+    gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
+    about="a street goes on from a photo or up to three frames, as told by an action (Vista)",
+    licence=(
+        "Vista's code and weights Apache-2.0 by its authors; the weights derive from Stable Video Diffusion, "
+        "whose licence by Stability AI limits commercial use"
+    ),
+    memory=_MEMORY,
+    weights="vista.safetensors of OpenDriveLab/Vista, or a folder that dreamdrive prior convert made of it",
+    package="diffusers",
+    install=INSTALL,
+)

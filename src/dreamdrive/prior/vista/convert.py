@@ -1,0 +1,128 @@
+"""From an official single file to a folder in diffusers' layout, a tensor at a time."""
+
+import json
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from torch import Tensor
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.vista.configs import Shapes
+from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
+from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
+from dreamdrive.scene.atomic import new_folder
+
+DtypeName = Literal["float16", "float32"]
+_DTYPES: dict[str, tuple[torch.dtype, str, int]] = {
+    "float16": (torch.float16, "F16", 2),
+    "float32": (torch.float32, "F32", 4),
+}
+_CLASSES: dict[Part, dict[str, str]] = {
+    "unet": {"_class_name": "UNetSpatioTemporalConditionModel"},
+    "vae": {"_class_name": "AutoencoderKLTemporalDecoder"},
+    "image_encoder": {"model_type": "clip_vision_model"},
+}
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Converted:
+    """What was made.
+
+    Attributes:
+        stored: What it was made from.
+        ignored: How many tensors were left out, by what they are.
+    """
+
+    stored: Stored
+    ignored: dict[str, int]
+
+
+def convert(
+    file: Path,
+    folder: Path,
+    dtype: DtypeName = "float16",
+    *,
+    replace: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> Converted:
+    """Write the folder; it appears whole or not at all, and one tensor at a time is in memory.
+
+    Args:
+        file: Vista's or SVD's single ``.safetensors``. LoRA that is not merged yet is merged.
+        folder: Where ``unet``, ``vae`` and ``image_encoder`` come, and ``prior.json``, which says which kind.
+        dtype: Of UNet and image encoder. The autoencoder, which needs it, is always stored in float32.
+        replace: Whether an earlier folder of this kind may be replaced.
+        progress: Told of every tensor.
+
+    Raises:
+        InputError: The file does not hold all of such a model, or the folder cannot be written.
+    """
+    if file.is_dir() and (file / "unet").is_dir():
+        raise InputError(f"{file} has diffusers' layout already; --weights takes it as it is")
+    stored = open_weights(file)
+    total, done = sum(len(stored.parts[part].shapes) for part in PARTS), 0
+    with new_folder(folder, replace=replace, mark=NOTE) as partial:
+        for part in PARTS:
+            own = stored.parts[part]
+            (partial / part).mkdir()
+            config = json.dumps(_CLASSES[part] | own.config, indent=1)
+            (partial / part / "config.json").write_text(config + "\n")
+            start = done
+
+            def tell(count: int, start: int = start) -> None:
+                progress(start + count, total)
+
+            write_tensors(
+                partial / part / FILES[part][0], own.shapes, own.read, "float32" if part == "vae" else dtype, tell
+            )
+            done += len(own.shapes)
+        note = {"kind": stored.kind.name, "dtype": dtype, "from": stored.path.name}
+        (partial / NOTE).write_text(json.dumps(note, indent=1) + "\n")
+    counted = {
+        what: sum(bool(pattern.match(key)) for key in stored.ignored) for what, pattern in IGNORED.items()
+    }
+    return Converted(stored, {what: count for what, count in counted.items() if count})
+
+
+def write_tensors(
+    path: Path,
+    shapes: Shapes,
+    read: Callable[[str], Tensor],
+    dtype: DtypeName,
+    tell: Callable[[int], None] = lambda count: None,
+) -> None:
+    """Write a ``.safetensors``: length and text of the header, then the numbers, as each tensor is read.
+
+    The library's own writer wants all tensors at once.
+
+    Args:
+        path: The file.
+        shapes: Of the tensors.
+        read: Gives one by its name.
+        dtype: To store them in.
+        tell: Told how many are written.
+
+    Raises:
+        InputError: A number is too large for the type, or not finite.
+    """
+    kind, code, width = _DTYPES[dtype]
+    header: dict[str, Any] = {"__metadata__": {"format": "pt"}}
+    end = 0
+    for name, shape in shapes.items():
+        begin, end = end, end + width * torch.Size(shape).numel()
+        header[name] = {"dtype": code, "shape": list(shape), "data_offsets": [begin, end]}
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    with path.open("wb") as file:
+        file.write(struct.pack("<Q", len(text)) + text)
+        for count, name in enumerate(shapes, start=1):
+            value = read(name).to(kind).contiguous()
+            if not bool(torch.isfinite(value).all()):
+                raise InputError(f"{name} holds numbers that are not finite in {dtype}; try --dtype float32")
+            file.write(value.numpy().tobytes())
+            tell(count)

@@ -1,0 +1,89 @@
+"""The stored networks as what sampling, decoding and features ask for. Importing this loads diffusers."""
+
+from collections.abc import Callable
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from dreamdrive.prior.vista.condition import clip_pixels
+from dreamdrive.prior.vista.kinds import MOTION_BUCKET
+from dreamdrive.prior.vista.networks import Networks
+from dreamdrive.prior.vista.rollout import Images, Model, Seen
+from dreamdrive.prior.vista.sampler import Branches, Velocity
+
+
+class Engine:
+    """Networks at work; what it takes and gives lies on the CPU but for what a velocity sees.
+
+    Attributes:
+        networks: One at a time is in memory.
+    """
+
+    def __init__(self, networks: Networks) -> None:
+        self.networks = networks
+
+    def model(self) -> Model:
+        """What a rollout asks for."""
+        return Model(self.encode, self.decode, self.describe, self.velocity)
+
+    def encode(self, images: Images) -> Float[Tensor, "n c h w"]:
+        """Latents of frames in [-1, 1]: the mode, not scaled; one frame at a time."""
+        vae = self.networks.vae()
+        coded = [vae.encode(image[None].to(self._device)).latent_dist.mode() for image in images]
+        return torch.cat(coded)
+
+    def decode(self, latents: Float[Tensor, "t c h w"]) -> Float[Tensor, "t 3 h2 w2"]:
+        """Frames of latents that are not scaled, all at once."""
+        return self.networks.vae().decode(latents.float().to(self._device), num_frames=len(latents)).sample
+
+    def describe(self, images: Images) -> Float[Tensor, " d"]:
+        """What CLIP says of one frame in [-1, 1]."""
+        encoder = self.networks.image_encoder()
+        return encoder(clip_pixels(images.to(self._device), encoder.config.image_size)).image_embeds[0]
+
+    def velocity(self, seen: Seen) -> Velocity:
+        """The UNet under the conditions of a round, with and without them: one after the other, which takes half
+        the memory of both at once. Without them frame and action are zeros.
+        """
+
+        def answer(x: Float[Tensor, "t c h w"], time: float, mask: Float[Tensor, " t"]) -> Branches:
+            return self.look(seen, x, time, mask, 0.0), self.look(seen, x, time, mask, 1.0)
+
+        return answer
+
+    def look(
+        self, seen: Seen, x: Float[Tensor, "t c h w"], time: float, mask: Float[Tensor, " t"], given: float = 1.0
+    ) -> Float[Tensor, "t c h w"]:
+        """One look of the UNet.
+
+        Args:
+            seen: The conditions.
+            x: Scaled noisy latents.
+            time: 0.25 ln sigma.
+            mask: One for frames that are known.
+            given: One with the conditions, zero without.
+        """
+        unet, kind = self.networks.unet(), self.networks.stored.kind
+        to = {"device": self._device, "dtype": self.networks.dtype}
+        parts = [seen.image] if seen.action is None else [seen.image, seen.action.to(seen.image)]
+        beside = (given * seen.latent.to(x))[None].expand(len(x), -1, -1, -1)
+        ids = torch.tensor([[kind.rate_hz - 1, MOTION_BUCKET, kind.noise]], device=self._device)
+        context = given * torch.cat(parts)[None, None].to(**to)
+        return unet(torch.cat([x, beside], dim=1)[None].to(**to), time, context, ids, mask)[0].float()
+
+    @property
+    def _device(self) -> torch.device:
+        return self.networks.device
+
+
+def counted(progress: Callable[[int, int], None], total: int) -> Callable[[], None]:
+    """A function to call after each of ``total`` steps."""
+    done = 0
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    return tell

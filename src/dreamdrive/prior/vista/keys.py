@@ -1,0 +1,293 @@
+"""From the names in the official single files to those of diffusers and transformers, as rules.
+
+The files are ``vista.safetensors`` (Gao et al., NeurIPS 2024) and ``svd_xt.safetensors`` (Blattmann et al., 2023).
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+Part = Literal["unet", "vae", "image_encoder"]
+PARTS: tuple[Part, ...] = ("unet", "vae", "image_encoder")
+UNET = "model.diffusion_model."
+_VISUAL = "conditioner.embedders.0.open_clip.model.visual."
+_CONDITION = "conditioner.embedders.3.encoder."
+_DECODER = "first_stage_model.decoder."
+
+IGNORED = {
+    "the text half of CLIP": re.compile(r"conditioner\.embedders\.0\.open_clip\.model\.(?!visual\.)"),
+    "a second decoder": re.compile(r"conditioner\.embedders\.3\.encoder\.(decoder|post_quant_conv)\."),
+    "a second encoder": re.compile(r"first_stage_model\.encoder\."),
+}
+"""What the files hold and nothing here needs."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How one tensor of a network is made of those in the file.
+
+    Attributes:
+        source: Key of the tensor.
+        columns: Key of another one that is put beside it, along dimension 1.
+        third: Which third of the rows it is.
+        transposed: Whether rows and columns change places.
+        flat: Whether it is a 1x1 convolution that is applied as a matrix.
+        low_rank: Keys of U and D whose product is added (LoRA of rank r, scale 1).
+    """
+
+    source: str
+    columns: str | None = None
+    third: int | None = None
+    transposed: bool = False
+    flat: bool = False
+    low_rank: tuple[str, str] | None = None
+
+    def make(self, get: Callable[[str], Tensor]) -> Tensor:
+        """The tensor.
+
+        Args:
+            get: Reads a tensor of the file by its key.
+        """
+        value = get(self.source)
+        if self.low_rank is not None:
+            up, down = (get(key).float() for key in self.low_rank)
+            value = (value.float() + up @ down).to(value.dtype)
+        if self.third is not None:
+            value = value.chunk(3)[self.third]
+        if self.flat and value.ndim > 2:
+            value = value[..., 0, 0]
+        if self.columns is not None:
+            value = torch.cat([value, get(self.columns)], dim=1)
+        return value.T.contiguous() if self.transposed else value
+
+
+@dataclass
+class Recipes:
+    """What a file gives.
+
+    Attributes:
+        parts: The recipe of each tensor, by part and name.
+        ignored: Keys of no use.
+        unknown: Keys that no rule knows.
+        actions: Keys of the action adapters.
+    """
+
+    parts: dict[Part, dict[str, Recipe]] = field(default_factory=lambda: {part: {} for part in PARTS})
+    ignored: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    actions: list[str] = field(default_factory=list)
+
+    def shapes(self, part: Part, stored: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+        """Shapes of a part's tensors, from those of the file's."""
+        get = {key: torch.empty(shape, device="meta") for key, shape in stored.items()}.__getitem__
+        return {name: tuple(recipe.make(get).shape) for name, recipe in self.parts[part].items()}
+
+
+def recipes_of(keys: Iterable[str]) -> Recipes:
+    """The recipes for a file that holds these keys."""
+    keys = sorted(keys)
+    found, joined = Recipes(), list[str]()
+    per_level, top = _per_level(keys), _top_level(keys)
+    for key in keys:
+        if any(pattern.match(key) for pattern in IGNORED.values()):
+            found.ignored.append(key)
+        elif _ADDED.search(key):
+            joined.append(key)
+        else:
+            part, made = _translate(key, per_level, top)
+            if not made:
+                found.unknown.append(key)
+            found.parts[part].update(made)
+    for key in joined:
+        _join(found, key, per_level, set(keys))
+    return found
+
+
+_ADDED = re.compile(r"(.*\.attn\d)\.(q|k|v|out)_adapter_(action_control|up|down)\.weight")
+_RESIDUAL = {
+    "in_layers.0": "norm1",
+    "in_layers.2": "conv1",
+    "emb_layers.1": "time_emb_proj",
+    "out_layers.0": "norm2",
+    "out_layers.3": "conv2",
+    "skip_connection": "conv_shortcut",
+}
+_ATTENTION = {"norm": "group_norm", "q": "to_q", "k": "to_k", "v": "to_v", "proj_out": "to_out.0"}
+_EMBEDDINGS = {
+    "time_embed.0": "time_embedding.linear_1",
+    "time_embed.2": "time_embedding.linear_2",
+    "label_emb.0.0": "add_embedding.linear_1",
+    "label_emb.0.2": "add_embedding.linear_2",
+    "cond_time_stack_embed.0": "cond_time_embedding.linear_1",
+    "cond_time_stack_embed.2": "cond_time_embedding.linear_2",
+    "input_blocks.0.0": "conv_in",
+    "out.0": "conv_norm_out",
+    "out.2": "conv_out",
+}
+_VISUAL_NAMES = {
+    "class_embedding": "vision_model.embeddings.class_embedding",
+    "conv1.weight": "vision_model.embeddings.patch_embedding.weight",
+    "positional_embedding": "vision_model.embeddings.position_embedding.weight",
+    "ln_pre.weight": "vision_model.pre_layrnorm.weight",  # the library's spelling
+    "ln_pre.bias": "vision_model.pre_layrnorm.bias",
+    "ln_post.weight": "vision_model.post_layernorm.weight",
+    "ln_post.bias": "vision_model.post_layernorm.bias",
+}
+_VISUAL_LAYER = {
+    "ln_1": "layer_norm1",
+    "ln_2": "layer_norm2",
+    "mlp.c_fc": "mlp.fc1",
+    "mlp.c_proj": "mlp.fc2",
+    "attn.out_proj": "self_attn.out_proj",
+}
+
+
+def _per_level(keys: list[str]) -> int:
+    """Residual blocks a level of the UNet: the first down-sampling comes right behind them."""
+    found = (re.match(re.escape(UNET) + r"input_blocks\.(\d+)\.0\.op\.", key) for key in keys)
+    return min((int(match[1]) for match in found if match), default=3) - 1
+
+
+def _top_level(keys: list[str]) -> int:
+    """The highest level of the decoder, which it starts with."""
+    found = (re.match(re.escape(_DECODER) + r"up\.(\d+)\.", key) for key in keys)
+    return max((int(match[1]) for match in found if match), default=3)
+
+
+def _translate(key: str, per_level: int, top: int) -> tuple[Part, dict[str, Recipe]]:
+    """Which part a key belongs to, and what it makes there; nothing where no rule knows it."""
+    if key.startswith(_VISUAL):
+        return "image_encoder", _visual(key)
+    if key.startswith((_CONDITION, _DECODER)):
+        return "vae", _autoencoder(key, top)
+    name = _unet(key.removeprefix(UNET), per_level) if key.startswith(UNET) else None
+    return "unet", {} if name is None else {name: Recipe(key)}
+
+
+def _unet(name: str, per_level: int) -> str | None:
+    if (stem := _swap(name, _EMBEDDINGS)) is not None:
+        return stem
+    match = re.match(r"(input_blocks|output_blocks|middle_block)\.(\d+)\.(.*)", name)
+    if match is None:
+        return None
+    side, index, rest = match[1], int(match[2]), match[3]
+    if side == "middle_block":
+        inner = _attention(rest) if index == 1 else _residual(rest)
+        place = "attentions.0" if index == 1 else f"resnets.{index // 2}"
+        return None if inner is None else f"mid_block.{place}.{inner}"
+    level, block = divmod(index - 1 if side == "input_blocks" else index, per_level + 1)
+    place = f"{'down' if side == 'input_blocks' else 'up'}_blocks.{level}"
+    which, _, rest = rest.partition(".")
+    if rest.startswith("op."):
+        return f"{place}.downsamplers.0.conv.{rest.removeprefix('op.')}"
+    if rest.startswith("conv."):
+        return f"{place}.upsamplers.0.{rest}"
+    inner = _residual(rest) if which == "0" else _attention(rest)
+    kind = "resnets" if which == "0" else "attentions"
+    return None if inner is None else f"{place}.{kind}.{block}.{inner}"
+
+
+def _residual(rest: str) -> str | None:
+    if rest == "time_mixer.mix_factor":
+        return rest
+    if rest.startswith("time_stack."):
+        inner = _swap(rest.removeprefix("time_stack."), _RESIDUAL)
+        return None if inner is None else f"temporal_res_block.{inner}"
+    inner = _swap(rest, _RESIDUAL)
+    return None if inner is None else f"spatial_res_block.{inner}"
+
+
+def _attention(rest: str) -> str:
+    places = {"time_pos_embed.0": "time_pos_embed.linear_1", "time_pos_embed.2": "time_pos_embed.linear_2"}
+    return _swap(rest, places) or re.sub(r"^time_stack\.", "temporal_transformer_blocks.", rest)
+
+
+def _swap(name: str, names: dict[str, str]) -> str | None:
+    """The name with its stem replaced; None where the stem is not among them."""
+    stem, _, kind = name.rpartition(".")
+    return f"{names[stem]}.{kind}" if stem in names else None
+
+
+def _autoencoder(key: str, top: int) -> dict[str, Recipe]:
+    if key.startswith(_DECODER):
+        half, name = "decoder", key.removeprefix(_DECODER)
+    else:
+        half, _, name = key.removeprefix(_CONDITION).partition(".")
+    if half == "quant_conv":
+        return {f"quant_conv.{name}": Recipe(key)}
+    if match := re.match(r"mid\.attn_1\.(\w+)\.(weight|bias)", name):
+        if match[1] not in _ATTENTION:
+            return {}
+        flat = match[1] != "norm"
+        return {f"{half}.mid_block.attentions.0.{_ATTENTION[match[1]]}.{match[2]}": Recipe(key, flat=flat)}
+    name = name.replace("conv_out.time_mix_conv.", "time_conv_out.")
+    if match := re.match(r"(down|up|mid)\.(?:(\d+)\.block\.|block_)(\d+)\.(.*)", name):
+        side, level, block, rest = match.groups()
+        place = "mid_block" if level is None else f"{side}_blocks.{_level(side, level, top)}"
+        number = int(block) - (level is None)
+        return {f"{half}.{place}.resnets.{number}.{_block(half, rest)}": Recipe(key)}
+    if match := re.match(r"(down|up)\.(\d+)\.(down|up)sample\.(conv\..*)", name):
+        side, level, _, rest = match.groups()
+        return {f"{half}.{side}_blocks.{_level(side, level, top)}.{side}samplers.0.{rest}": Recipe(key)}
+    return {f"{half}.{re.sub('^norm_out', 'conv_norm_out', name)}": Recipe(key)}
+
+
+def _level(side: str, level: str, top: int) -> int:
+    """Counted in the order of the work, which in the decoder begins with the highest."""
+    return top - int(level) if side == "up" else int(level)
+
+
+def _block(half: str, rest: str) -> str:
+    """Inside a residual block of the autoencoder; the decoder's have a part over time."""
+    if half == "encoder":
+        return rest.replace("nin_shortcut", "conv_shortcut")
+    if rest.startswith("time_stack."):
+        inner = _swap(rest.removeprefix("time_stack."), _RESIDUAL)
+        return f"temporal_res_block.{inner}"
+    if rest == "mix_factor":
+        return "time_mixer.mix_factor"
+    return f"spatial_res_block.{rest.replace('nin_shortcut', 'conv_shortcut')}"
+
+
+def _visual(key: str) -> dict[str, Recipe]:
+    name = key.removeprefix(_VISUAL)
+    if name in _VISUAL_NAMES:
+        return {_VISUAL_NAMES[name]: Recipe(key)}
+    if name == "proj":
+        return {"visual_projection.weight": Recipe(key, transposed=True)}
+    match = re.match(r"transformer\.resblocks\.(\d+)\.(.*)", name)
+    if match is None:
+        return {}
+    place, rest = f"vision_model.encoder.layers.{match[1]}", match[2]
+    if rest.startswith("attn.in_proj_"):
+        kind = rest.removeprefix("attn.in_proj_")
+        return {
+            f"{place}.self_attn.{which}_proj.{kind}": Recipe(key, third=i) for i, which in enumerate("qkv")
+        }
+    inner = _swap(rest, _VISUAL_LAYER)
+    return {} if inner is None else {f"{place}.{inner}": Recipe(key)}
+
+
+def _join(found: Recipes, key: str, per_level: int, keys: set[str]) -> None:
+    """Add the columns of the actions, or LoRA that is not merged yet, to the matrix that they belong to."""
+    match = _ADDED.fullmatch(key)
+    name = None
+    if match is not None and key.startswith(UNET):
+        to = "to_out.0" if match[2] == "out" else f"to_{match[2]}"
+        name = _unet(f"{match[1]}.{to}.weight".removeprefix(UNET), per_level)
+    unet = found.parts["unet"]
+    if match is None or name is None or name not in unet:
+        found.unknown.append(key)
+    elif match[3] == "action_control":
+        found.actions.append(key)
+        unet[name] = replace(unet[name], columns=key)
+    else:
+        up, down = (f"{match[1]}.{match[2]}_adapter_{which}.weight" for which in ("up", "down"))
+        if up in keys and down in keys:
+            unet[name] = replace(unet[name], low_rank=(up, down))
+        else:
+            found.unknown.append(key)

@@ -1,0 +1,114 @@
+"""Euler sampling of a video model in the noise scale of EDM (Karras et al., NeurIPS 2022), as Vista does it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+SIGMA_MAX, SIGMA_MIN, RHO = 700.0, 0.002, 7.0
+
+Branches = tuple[Float[Tensor, "t c h w"], Float[Tensor, "t c h w"]]
+"""The network's answers without and with the conditions."""
+Velocity = Callable[[Float[Tensor, "t c h w"], float, Float[Tensor, " t"]], Branches]
+"""From the scaled latents, the time 0.25 ln sigma and the mask of fixed frames to the network's answers."""
+Schedule = Literal["constant", "triangle", "linear"]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Frames that are known.
+
+    Attributes:
+        mask: One for those, zero for the others (T,).
+        latents: Clean latents (T, C, h, w); those of the other frames do not count.
+    """
+
+    mask: Float[Tensor, " t"]
+    latents: Float[Tensor, "t c h w"]
+
+    def put(self, latents: Float[Tensor, "t c h w"]) -> Float[Tensor, "t c h w"]:
+        """The latents with the known frames in their places."""
+        return torch.where(self.mask[:, None, None, None] > 0, self.latents, latents)
+
+
+def sigmas(steps: int) -> list[float]:
+    """Noise at the start of each step, and 0 at the end: ``steps`` + 1 falling numbers."""
+    first, last = SIGMA_MAX ** (1 / RHO), SIGMA_MIN ** (1 / RHO)
+    share = torch.linspace(0, 1, steps, dtype=torch.float64)
+    return [*((first + share * (last - first)) ** RHO).tolist(), 0.0]
+
+
+def guidance(schedule: Schedule, frames: int) -> Float[Tensor, " t"]:
+    """How strongly the conditions count in each frame.
+
+    Args:
+        schedule: ``constant`` is Vista's for a single round, ``triangle`` for several, ``linear`` SVD's.
+        frames: Frames of a round.
+    """
+    if schedule == "constant":
+        return torch.full((frames,), 2.5)
+    if schedule == "linear":
+        return torch.linspace(1.0, 3.0, frames)
+    place = torch.linspace(0, 1, frames)
+    return 1.0 + 1.5 * (1 - (2 * place - 1).abs())
+
+
+def time_of(sigma: float) -> float:
+    """What the network is told of the noise."""
+    return 0.25 * float(torch.log(torch.tensor(sigma, dtype=torch.float64)))
+
+
+def denoise(
+    velocity: Velocity,
+    latents: Float[Tensor, "t c h w"],
+    sigma: float,
+    scale: Float[Tensor, " t"],
+    mask: Float[Tensor, " t"],
+) -> Float[Tensor, "t c h w"]:
+    """The clean latents that the network sees in noisy ones (v-prediction).
+
+    Args:
+        velocity: The network.
+        latents: Noisy latents.
+        sigma: Standard deviation of their noise.
+        scale: Guidance of each frame.
+        mask: One for fixed frames.
+    """
+    without, given = velocity(latents / (sigma**2 + 1) ** 0.5, time_of(sigma), mask)
+    strength = scale.to(latents)[:, None, None, None]
+    answer = (without + strength * (given - without)).to(latents.dtype)
+    return latents / (sigma**2 + 1) - sigma / (sigma**2 + 1) ** 0.5 * answer
+
+
+def sample(
+    velocity: Velocity,
+    noise: Float[Tensor, "t c h w"],
+    scale: Float[Tensor, " t"],
+    fixed: Fixed,
+    steps: int,
+    tell: Callable[[], None] = lambda: None,
+) -> Float[Tensor, "t c h w"]:
+    """Latents of one round from noise.
+
+    Known frames are put in their places before each step and after the last: without noise, as in Vista's
+    training.
+
+    Args:
+        velocity: The network.
+        noise: Of standard deviation 1.
+        scale: Guidance of each frame.
+        fixed: What is known.
+        steps: Of Euler's rule.
+        tell: Called after each step.
+    """
+    levels = sigmas(steps)
+    latents = noise * (levels[0] ** 2 + 1) ** 0.5
+    for sigma, following in zip(levels, levels[1:], strict=False):
+        latents = fixed.put(latents)
+        clean = denoise(velocity, latents, sigma, scale, fixed.mask)
+        latents = latents + (following - sigma) * (latents - clean) / sigma
+        tell()
+    return fixed.put(latents)

@@ -1,0 +1,231 @@
+"""Weights on disk: an official single file, or a folder in diffusers' layout; nothing is read before it is used."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from torch import Tensor
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.vista.configs import Shapes, config_of
+from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
+from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
+from dreamdrive.prior.vista.networks import make_empty
+
+EXPECTED = (
+    "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert made, or "
+    "the folder of stable-video-diffusion-img2vid-xt"
+)
+NOTE = "prior.json"
+"""The file that says which kind a converted folder holds."""
+FILES: dict[Part, tuple[str, ...]] = {
+    "unet": ("diffusion_pytorch_model.safetensors", "diffusion_pytorch_model.fp16.safetensors"),
+    "vae": ("diffusion_pytorch_model.safetensors", "diffusion_pytorch_model.fp16.safetensors"),
+    "image_encoder": ("model.safetensors", "model.fp16.safetensors"),
+}
+TITLES: dict[Part, str] = {"unet": "UNet", "vae": "VAE", "image_encoder": "image encoder"}
+_SECOND_TIME = "cond_time_embedding."
+_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class StoredPart:
+    """One network.
+
+    Attributes:
+        config: Of its class.
+        shapes: Of its tensors.
+        read: Reads one tensor by its name.
+    """
+
+    config: dict[str, Any]
+    shapes: Shapes
+    read: Callable[[str], Tensor]
+
+    @property
+    def count(self) -> int:
+        """How many numbers it has."""
+        return sum(torch.Size(shape).numel() for shape in self.shapes.values())
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A video model on disk, checked by names and shapes.
+
+    Attributes:
+        path: Where it lies.
+        kind: Which model it is.
+        parts: Its networks.
+        ignored: Keys of the file that are left out on purpose.
+    """
+
+    path: Path
+    kind: Kind
+    parts: Mapping[Part, StoredPart]
+    ignored: tuple[str, ...] = ()
+
+    @property
+    def image_columns(self) -> int:
+        """Width of the context that describes the first frame."""
+        return int(self.parts["image_encoder"].config["projection_dim"])
+
+
+def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
+    """Look at weights without reading them.
+
+    Args:
+        path: A file or folder, see ``EXPECTED``.
+        wanted: Which model it should be; None takes both.
+
+    Raises:
+        InputError: Files are missing or damaged, tensors are missing, unknown or of another shape, or it is
+            the other model.
+    """
+    folder = path.is_dir() and (path / "unet").is_dir()
+    stored = _open_folder(path) if folder else _open_file(_single(path))
+    if wanted is not None and stored.kind is not wanted:
+        raise InputError(
+            f"{path} holds {stored.kind.title}, not {wanted.title}: use --prior {stored.kind.name}, or give "
+            f"the weights of {wanted.title}"
+        )
+    for part in PARTS:
+        _check(stored, part)
+    actions = ACTION_COLUMNS if stored.kind is VISTA else 0
+    columns = stored.parts["unet"].config["cross_attention_dim"]
+    if columns != stored.image_columns + actions:
+        raise InputError(
+            f"{path}: the UNet takes a context of {columns} columns; expected {stored.image_columns} of the "
+            f"image encoder and {actions} of the action"
+        )
+    return stored
+
+
+def _single(path: Path) -> Path:
+    """The single file: itself, or the only one in a folder."""
+    if not path.is_dir():
+        return path
+    found = sorted(path.glob("*.safetensors"))
+    if len(found) != 1:
+        raise InputError(f"{path} holds no unet/ and {len(found)} files .safetensors; expected {EXPECTED}")
+    return found[0]
+
+
+def _open(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
+    """Shapes by key, and a reader of one tensor."""
+    if not path.is_file():
+        raise InputError(f"{path} does not exist or is no file; expected {EXPECTED}")
+    try:
+        file = safe_open(path, "pt")
+        shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError) as error:
+        raise InputError(
+            f"{path} is no .safetensors or is cut short ({error}); copy it again, expected {EXPECTED}"
+        ) from None
+    return shapes, file.get_tensor
+
+
+def _open_file(path: Path) -> Stored:
+    shapes, read = _open(path)
+    recipes = recipes_of(shapes)
+    if recipes.unknown:
+        raise InputError(f"{path} holds unknown tensors: {_some(recipes.unknown)}; expected {EXPECTED}")
+    kind = _kind_of(path, recipes)
+    parts = {part: _part(path, part, recipes, shapes, read) for part in PARTS}
+    return Stored(path, kind, parts, tuple(recipes.ignored))
+
+
+def _kind_of(path: Path, recipes: Recipes) -> Kind:
+    """Vista has action adapters and a second time embedding, SVD has neither."""
+    second = any(name.startswith(_SECOND_TIME) for name in recipes.parts["unet"])
+    if second != bool(recipes.actions):
+        lacking = "the UNet's second time embedding" if recipes.actions else "the action adapters"
+        raise InputError(f"{path}: {lacking} (all of it) is missing; expected {EXPECTED}")
+    return VISTA if second else SVD
+
+
+def _part(
+    path: Path, part: Part, recipes: Recipes, shapes: Shapes, read: Callable[[str], Tensor]
+) -> StoredPart:
+    chosen = recipes.parts[part]
+    if not chosen:
+        raise InputError(f"{path}: the {TITLES[part]} is missing altogether; expected {EXPECTED}")
+    try:
+        own = recipes.shapes(part, shapes)
+        config = config_of(part, own)
+    except KeyError as error:
+        raise InputError(
+            f"{path}: the {TITLES[part]} lacks {error.args[0]} and more; expected {EXPECTED}"
+        ) from None
+    except RuntimeError as error:
+        raise InputError(f"{path}: tensors of the {TITLES[part]} do not fit together ({error})") from None
+    return StoredPart(config, own, lambda name: chosen[name].make(read))
+
+
+def _open_folder(path: Path) -> Stored:
+    parts = {part: _folder_part(path, part) for part in PARTS}
+    second = any(name.startswith(_SECOND_TIME) for name in parts["unet"].shapes)
+    kind = VISTA if second else SVD
+    if (path / NOTE).is_file():
+        kind = KINDS.get(str(_read_json(path / NOTE).get("kind")), kind)
+    return Stored(path, kind, parts)
+
+
+def _folder_part(path: Path, part: Part) -> StoredPart:
+    there = [path / part / name for name in FILES[part] if (path / part / name).is_file()]
+    config = path / part / "config.json"
+    if not there or not config.is_file():
+        raise InputError(f"{path / part} lacks config.json or {FILES[part][0]}; expected {EXPECTED}")
+    shapes, read = _open(there[0])
+    # Older versions of transformers stored these counting numbers.
+    shapes = {name: shape for name, shape in shapes.items() if not name.endswith(".position_ids")}
+    return StoredPart(_read_json(config), shapes, read)
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} is damaged: {error}") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path} holds no table of settings")
+    return content
+
+
+def _check(stored: Stored, part: Part) -> None:
+    """Whether the tensors are those of the network, by name and shape."""
+    own = stored.parts[part]
+    try:
+        network = make_empty(part, own.config, stored.kind)
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"{stored.path}: config.json of the {TITLES[part]} is of no use ({error})") from None
+    wanted = {name: tuple(value.shape) for name, value in network.state_dict().items()}
+    given = own.shapes
+    groups = {
+        "missing": sorted(set(wanted) - set(given)),
+        "unknown": sorted(set(given) - set(wanted)),
+        "of another shape": [
+            f"{name} is {given[name]}, not {wanted[name]}"
+            for name in sorted(set(wanted) & set(given))
+            if tuple(given[name]) != wanted[name]
+        ],
+    }
+    if trouble := [f"{len(names)} {what}: {_some(names)}" for what, names in groups.items() if names]:
+        raise InputError(
+            f"{stored.path}: the {_blamed(part, groups)} does not fit ({'; '.join(trouble)}); "
+            f"expected {EXPECTED}"
+        )
+
+
+def _blamed(part: Part, groups: dict[str, list[str]]) -> str:
+    """What to call the part that does not fit: of the UNet, the action adapters may be what is missing."""
+    narrow = [name for name in groups["of another shape"] if ".attn2.to_" in name]
+    whole = part != "unet" or not narrow or len(narrow) < sum(len(names) for names in groups.values())
+    return TITLES[part] if whole else "set of action adapters"
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")

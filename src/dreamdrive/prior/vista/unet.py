@@ -1,0 +1,116 @@
+"""The video UNet of SVD and Vista: diffusers' own, with what Vista adds. Importing this loads diffusers."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import torch
+from diffusers import UNetSpatioTemporalConditionModel
+from diffusers.models.embeddings import TimestepEmbedding
+from diffusers.models.resnet import ResnetBlock2D, TemporalResnetBlock
+from jaxtyping import Float
+from torch import Tensor, nn
+
+_EPS = 1e-5
+"""Of the residual blocks' normalisations in Stability's code; diffusers has 1e-6 in 72 of them."""
+
+
+class VideoUNet(UNetSpatioTemporalConditionModel):
+    """The UNet with a second time embedding, for frames that are known.
+
+    Attributes:
+        cond_time_embedding: The embedding of the time for fixed frames; None in SVD.
+    """
+
+    cond_time_embedding: TimestepEmbedding | None
+    _change: Tensor | None = None
+
+    def forward(  # type: ignore[override]
+        self,
+        sample: Float[Tensor, "b t c h w"],
+        time: float,
+        context: Float[Tensor, "b n d"],
+        time_ids: Float[Tensor, "b 3"],
+        fixed: Float[Tensor, " t"] | None = None,
+    ) -> Float[Tensor, "b t c2 h w"]:
+        """One look at a noisy clip.
+
+        Args:
+            sample: Scaled noisy latents with the condition latents behind them.
+            time: 0.25 ln sigma.
+            context: First frame and action.
+            time_ids: Frame rate - 1, motion bucket, noise on the first frame.
+            fixed: One for frames that are known.
+        """
+        times = torch.full((len(sample),), time, device=sample.device)
+        try:
+            if fixed is not None and self.cond_time_embedding is not None and bool(fixed.any()):
+                self._change = self._of_fixed(times[:1], fixed.to(sample)).repeat(len(sample), 1)
+            made = super().forward(sample, times, context, time_ids, return_dict=False)
+        finally:
+            self._change = None
+        return made[0]
+
+    def prepare(self, *, fixed_frames: bool) -> "VideoUNet":
+        """Set the normalisations and, for Vista, add the second embedding.
+
+        Args:
+            fixed_frames: Whether it knows of fixed frames.
+        """
+        for module in self.modules():
+            if isinstance(module, ResnetBlock2D | TemporalResnetBlock):
+                module.norm1.eps = module.norm2.eps = _EPS
+        self.cond_time_embedding = None
+        if fixed_frames:
+            first = self.time_embedding.linear_1
+            self.cond_time_embedding = TimestepEmbedding(first.in_features, first.out_features)
+            for block in (*self.down_blocks, self.mid_block, *self.up_blocks):
+                block.register_forward_pre_hook(self._changed, with_kwargs=True)
+        return self
+
+    def _of_fixed(self, time: Float[Tensor, "1"], fixed: Float[Tensor, " t"]) -> Float[Tensor, "t d"]:
+        """What to add to the embedding of each frame."""
+        assert self.cond_time_embedding is not None
+        encoded = self.time_proj(time).to(fixed.dtype)
+        change = self.cond_time_embedding(encoded) - self.time_embedding(encoded)
+        return fixed[:, None] * change
+
+    def _changed(
+        self, block: nn.Module, args: tuple[Any, ...], kwargs: dict[str, Any]
+    ) -> tuple[tuple[Any, ...], dict[str, Any]] | None:
+        """Before a block: the embedding that frames of a clip share becomes one for each frame."""
+        if self._change is None:
+            return None
+        return args, {**kwargs, "temb": kwargs["temb"] + self._change}
+
+
+def make_unet(config: Mapping[str, Any], *, fixed_frames: bool) -> VideoUNet:
+    """A UNet without weights of use.
+
+    Args:
+        config: Of ``UNetSpatioTemporalConditionModel``.
+        fixed_frames: Whether it is Vista's.
+    """
+    known = {key: value for key, value in config.items() if not key.startswith("_")}
+    return VideoUNet(**known).prepare(fixed_frames=fixed_frames)
+
+
+def watch(unet: VideoUNet, name: str, keep: Callable[[Tensor], None]) -> Any:
+    """Hand over what a block makes, each time it runs.
+
+    Args:
+        unet: The network.
+        name: Of the block, such as ``down_blocks.1.attentions.1``.
+        keep: Takes the output (B T, C, h, w).
+
+    Returns:
+        What to ``remove()`` afterwards.
+
+    Raises:
+        AttributeError: There is no such block.
+    """
+
+    def hand_over(module: nn.Module, args: object, output: Any) -> None:
+        first = output if isinstance(output, Tensor) else output[0]
+        keep(first)
+
+    return unet.get_submodule(name).register_forward_hook(hand_over)
