@@ -112,7 +112,8 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     filled = fill(model.world_from_camera, clip.times_s)
     poses, points = rebase(filled, model.points)
     small = camera.resized(evidence.small.width_px, evidence.small.height_px)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
+    asked_m_s = scale.asked_m_s(clip)
+    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
     ratios = depth_ratios(clip, camera, poses, points, model.seen)
     if len(ratios):
         metric = scale.from_depth(ratios, street, height_m, seed)
@@ -167,6 +168,7 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
         poses[one_camera],
         points,
         clip.times_s[one_camera],
+        scale.asked_m_s(clip),
     )
 
 
