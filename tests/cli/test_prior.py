@@ -11,6 +11,7 @@ from tests.data.pictures import texture
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import read_features
+from dreamdrive.scene.action import Command
 
 SMALL = ("--frames", "0:2", "--size", "64x48")
 
@@ -63,38 +64,42 @@ def test_what_cannot_be_sampled_is_said(run: Run, tmp_path: Path, arguments: lis
     assert not (tmp_path / "made").exists()
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
-def test_features_of_a_recording_are_written(run: Run, tmp_path: Path) -> None:
-    pytest.importorskip("diffusers")
-    tiny = pytest.importorskip("tests.prior.vista.tiny")
-    from dreamdrive.prior.vista.kinds import SVD
+def test_features_of_a_recording_are_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    features = pytest.importorskip("dreamdrive.prior.vista.features")
+    seen: dict[str, object] = {}
 
-    weights = tmp_path / "weights"
-    tiny.save_folder(weights, SVD)
+    def look(frames, weights, options, **more):
+        seen.update(more, options=options, frames=frames)
+        return features.VideoFeatures("vista:one", np.ones((len(frames), 2, 4, 3), np.float16), ("so",))
+
+    monkeypatch.setattr(features, "video_features", look)
+    (tmp_path / "weights").mkdir()
     (tmp_path / "drive").mkdir()
-    for index in range(2):
-        cv2.imwrite(str(tmp_path / f"drive/{index}.png"), texture(64, 64, index))
+    for index in range(3):
+        cv2.imwrite(str(tmp_path / f"drive/{index}.png"), texture(300, 1200, index))
     out = tmp_path / "f.safetensors"
+    command = ["prior", "features", tmp_path / "drive", "-o", out, "--weights", tmp_path / "weights"]
     result = run(
-        "prior",
-        "features",
-        tmp_path / "drive",
-        "-o",
-        out,
-        "--weights",
-        weights,
-        "--channels",
-        4,
-        "--sigma",
-        0.1,
+        *command, "--sigma", 0.1, "--frames", "0:3:2", "--size", "128x64", "--action", "command=left"
     )
     assert result.code == 0, result
+    assert "vista:one, 2 frames of 4x2, 3 channels" in result.out
     made = read_features(out)
-    (name,) = made.arrays
-    assert name.startswith("svd:")
-    assert made.arrays[name].shape[::3] == (2, 4)
+    assert made.arrays["vista:one"].shape == (2, 2, 4, 3)
     assert made.provenance["features"]["sigma"] == 0.1
-    assert read_clip(tmp_path / "drive", features=out).features[name].shape[0] == 2
-    wrong = run("prior", "features", tmp_path / "drive", "-o", out, "--weights", weights, "--channels", 900)
-    assert wrong.code == 2
-    assert "1 to 128 channels" in wrong.err
+    assert made.provenance["notes"] == ["so"]
+    assert made.provenance["action"] == {"direction": "left"}
+    assert (seen["size"], seen["action"]) == ((128, 64), Command("left"))
+    assert seen["frames"].shape == (2, 256, 1024, 3)
+    clip = read_clip(tmp_path / "drive", frames="0:3:2", features=out)
+    np.testing.assert_array_equal(clip.features["vista:one"], made.arrays["vista:one"])
+    for option, value, message in (
+        ("--channels", 900, "1 to 128 channels"),
+        ("-o", tmp_path / "f.npz", "ends in .safetensors"),
+        ("--weights", "none", "--weights none does not exist"),
+    ):
+        wrong = run(*command, option, value)
+        assert wrong.code == 2
+        assert message in wrong.err
