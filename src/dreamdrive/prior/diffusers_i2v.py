@@ -169,8 +169,17 @@ def _size(kind: Kind, control: Control) -> tuple[int, int]:
 
 
 def _own_frames(pipeline: Any) -> int:
-    """How many frames a model makes whose pipeline leaves that to its network, as SVD's does."""
-    return int(pipeline.unet.config.num_frames)
+    """How many frames a model makes whose pipeline leaves that to its network, as SVD's does.
+
+    Raises:
+        InputError: Its network does not tell.
+    """
+    network = getattr(pipeline, "unet", None)
+    if network is None or "num_frames" not in network.config:
+        raise InputError(
+            f"{type(pipeline).__name__} has no number of frames of its own: give --frames 0:STOP"
+        )
+    return int(network.config["num_frames"])
 
 
 DIFFUSERS = Prior(
