@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dreamdrive.prior.street_world import street_world
 from dreamdrive.report import against_request
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
 from dreamdrive.scene.trajectory import Trajectory
 from tests.prior.paths import circle
@@ -16,7 +15,16 @@ from tests.prior.paths import circle
 
 @pytest.fixture(scope="module")
 def clip() -> Clip:
-    return street_world(Control(frames="0:12", size=(32, 32)))
+    shape = 12, 4, 4
+    return Clip(
+        frames=np.zeros((*shape, 3), np.uint8),
+        times_s=np.arange(12) / 10,
+        camera=np.zeros(12, np.int64),
+        rig=(Camera(4.0, 4.0, 2.0, 2.0, 4, 4),),
+        valid=np.ones(shape, bool),
+        held_out=np.zeros(12, bool),
+        source_index=np.arange(12),
+    )
 
 
 def geometry(clip: Clip, path: Trajectory) -> Geometry:

@@ -77,7 +77,7 @@ def _about(prior: str, control: Control) -> dict[str, Any]:
     }
 
 
-def _detailed(path: Path) -> tuple[int, int]:
+def detailed_size(path: Path) -> tuple[int, int]:
     """Width and height at which frames keep the detail that a network of ``_SEEN_PX`` columns sees."""
     width, height = next(iter(open_source(path).read(range(1)))).size
     shrink = min(1.0, _SEEN_PX / width)
@@ -122,7 +122,7 @@ def clip_features(
             f"--sigma {chosen.sigma:g} --channels {chosen.channels}: expected a deviation of 0 or more and "
             f"1 to {MAX_CHANNELS} channels"
         )
-    clip = read_clip(path, frames=frames, size=_detailed(path))
+    clip = read_clip(path, frames=frames, size=detailed_size(path))
     found = video_features(
         clip.frames, folder, chosen, size=size, action=action, seed=seed, progress=progress
     )

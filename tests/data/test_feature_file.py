@@ -14,7 +14,7 @@ from tests.data.pictures import texture
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.errors import InputError
-from dreamdrive.prior import REPLAY
+from dreamdrive.prior.replay import REPLAY
 from dreamdrive.scene.control import Control
 
 ABOUT = {"model": "a stand-in", "steps": 3}

@@ -6,21 +6,35 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.data.pictures import texture
 from tests.prior.paths import circle
 
 from dreamdrive.data.recording import rate_hz, write_recording
 from dreamdrive.errors import InputError
-from dreamdrive.prior import REPLAY
-from dreamdrive.prior.street_world import street_world
-from dreamdrive.scene.clip import Clip
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.replay import REPLAY
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 
 
 @pytest.fixture(scope="module")
 def clip() -> Clip:
-    made = street_world(Control(frames="0:3", size=(64, 48), fps=5.0), truth=True)
-    asked = circle(8.0, 0.01, seconds=0.4, rate_hz=5)
-    return replace(made, requested=asked)
+    frames = np.stack([texture(48, 64, index)[..., ::-1] for index in range(3)])
+    valid = np.ones(frames.shape[:3], bool)
+    return Clip(
+        frames=frames,
+        times_s=np.arange(3) / 5,
+        camera=np.zeros(3, np.int64),
+        rig=(Camera(50.0, 51.0, 31.0, 25.5, 64, 48),),
+        valid=valid,
+        held_out=np.zeros(3, bool),
+        source_index=np.arange(3),
+        features={"appearance": appearance(frames, valid), "other": np.ones((3, 2, 2, 1), np.float32)},
+        known=Known(circle(7.0, seconds=0.4, rate_hz=5).world_from_camera, intrinsics=True),
+        requested=circle(8.0, 0.01, seconds=0.4, rate_hz=5),
+        provenance={"notes": ["made up"]},
+    )
 
 
 def test_replay_takes_up_what_was_written(clip: Clip, tmp_path: Path) -> None:
@@ -42,7 +56,9 @@ def test_replay_takes_up_what_was_written(clip: Clip, tmp_path: Path) -> None:
         )
     )
     np.testing.assert_array_equal(again.frames, clip.frames)
-    np.testing.assert_array_equal(again.features["appearance"], clip.features["appearance"])
+    assert again.features.keys() == clip.features.keys()
+    for name, array in clip.features.items():
+        np.testing.assert_array_equal(again.features[name], array)
     np.testing.assert_allclose(again.times_s, clip.times_s)
     np.testing.assert_allclose(again.rig[0].matrix, clip.rig[0].matrix)
     assert again.known.intrinsics

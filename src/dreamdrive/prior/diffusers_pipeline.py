@@ -80,7 +80,7 @@ def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
         arguments: Of the call.
 
     Raises:
-        InputError: It refuses an argument.
+        InputError: It refuses an argument, or the GPU has not the memory.
     """
 
     def tell(_: object, step: int, __: object, values: dict[str, Any]) -> dict[str, Any]:
@@ -92,6 +92,11 @@ def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
     except ValueError as error:
         name = type(pipeline).__name__
         raise InputError(f"{name} refuses what it was asked for: {_first_line(error)}") from error
+    except torch.OutOfMemoryError as error:
+        raise InputError(
+            f"the GPU's memory does not suffice ({_first_line(error)}); choose a smaller --size or fewer "
+            "--frames"
+        ) from error
 
 
 def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
@@ -129,8 +134,12 @@ def make_clip(
         asked: The path that was asked for, one pose a frame of the video.
 
     Raises:
-        InputError: The frames cannot be selected.
+        InputError: The frames cannot be selected, or are not finite.
     """
+    if not np.isfinite(video).all():
+        raise InputError(
+            "the model gave frames that hold NaN; its weights are damaged or overflow in bfloat16"
+        )
     wanted = Selection.parse(control.frames).resolve(len(video), "the video that was made")
     index = np.array(wanted)
     frames = np.rint(np.clip(video[index], 0, 1) * 255).astype(np.uint8)

@@ -176,6 +176,7 @@ def asked_m_s(clip: Clip) -> float | None:
 
 
 def _speed(street: Street, factor: float) -> float:
+    """Median speed (m/s) where ``factor`` makes metres of the poses."""
     return _median_speed(street.world_from_camera, street.times_s) * factor
 
 
