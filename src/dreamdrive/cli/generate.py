@@ -47,8 +47,8 @@ def generate(
     Args:
         input: A video, a folder of images or a layout as JSON; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
-        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; svd and
-            vista go on from a photo and take --weights, see docs/prior_vista.md. Without it the input decides.
+        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; svd
+            and vista go on from a photo, see docs/prior_vista.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
