@@ -47,8 +47,8 @@ SVD = Prior(
     gives="25 frames at 7 Hz, latents, features; no poses",
     about="a photo goes on for 25 frames (Stable Video Diffusion)",
     licence=(
-        "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, which limits "
-        "commercial use"
+        "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, "
+        "which limits commercial use"
     ),
     memory=_MEMORY,
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",

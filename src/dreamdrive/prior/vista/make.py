@@ -1,7 +1,6 @@
 """A photo, or a few leading frames, becomes a clip. Importing this loads diffusers."""
 
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.vista.condition import embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
 from dreamdrive.prior.vista.engine import Engine, counted
-from dreamdrive.prior.vista.features import BLOCK, extract
+from dreamdrive.prior.vista.features import BLOCK, extract, windows
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.load import start
 from dreamdrive.prior.vista.memory import Plan
@@ -57,13 +56,13 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     wanted = _wanted(control.frames, kind, per_round)
     held_out = held_out_mask(len(wanted), control.hold_out)
     rounds = rounds_for(int(wanted[-1]) + 1, kind, per_round)
+    made = per_round + (rounds - 1) * (per_round - kind.overlap)
     engine, actions = Engine(networks), _actions(control, kind, rounds)
-    spans = -(-len(wanted) // per_round)
-    tell = counted(progress, rounds * steps + 1 + spans)
+    tell = counted(progress, rounds * steps + 1 + len(windows(made, per_round)))
     with torch.inference_mode():
         latents = _sample(engine, kind, leading, actions, steps, rounds, per_round, plan, control.seed, tell)
         images = decode_in_chunks(engine.decode, latents / SCALE, plan.chunk)
-        frames, latents = to_frames(images)[wanted], latents.cpu()[torch.from_numpy(wanted)]
+        frames, latents = to_frames(images), latents.cpu()
         tell()
         features = extract(
             engine,
@@ -75,6 +74,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
             progress=lambda done, total: tell(),
         )
     networks.free()
+    frames, latents, features = frames[wanted], latents[torch.from_numpy(wanted)], features[wanted]
     valid = np.ones(frames.shape[:3], dtype=bool)
     return Clip(
         frames=frames,
@@ -100,16 +100,16 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
     """Indices of the frames to keep, among all that are made."""
     selection = Selection.parse(frames)
     if selection.needs_count:
-        raise InputError(f"--frames {frames}: count from the first frame; {kind.title} makes as many as are asked")
+        raise InputError(f"--frames {frames}: count from the first frame; there is no last one")
     if selection.stop is None:
         selection = replace(selection, stop=max(per_round, selection.start + per_round))
     wanted = np.array(list(selection.resolve(None, "the generated clip")), dtype=np.int64)
     if kind.overlap == 0 and wanted[-1] >= per_round:
         raise InputError(
-            f"--frames {frames}: {kind.title} makes {per_round} frames and cannot go on from them; give a STOP of "
-            f"at most {per_round}, or use --prior vista"
+            f"--frames {frames}: {kind.title} makes {per_round} frames and cannot go on from them; give "
+            f"a STOP of at most {per_round}, or use --prior vista"
         )
-    if not 2 <= len(wanted) or wanted[-1] >= _MOST_FRAMES:
+    if len(wanted) < 2 or wanted[-1] >= _MOST_FRAMES:
         raise InputError(
             f"--frames {frames} asks for {len(wanted)} frames up to number {wanted[-1]}; expected two or more "
             f"below {_MOST_FRAMES}"
@@ -169,8 +169,8 @@ def _provenance(
     assert control.path is not None
     notes = [
         f"The frames are generated: {kind.title} made them of {control.path.name} in {rounds} "
-        f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and scale "
-        "are not known and have to be found in the frames.",
+        f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and "
+        "scale are not known and have to be found in the frames.",
         *leading.notes,
     ]
     if len(leading.frames) > 1:
@@ -203,5 +203,3 @@ def _provenance(
 def _named(action: Any) -> dict[str, Any]:
     values = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(action).items()}
     return {"kind": type(action).__name__.lower(), **values}
-
-
