@@ -7,11 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.prior.paths import circle
 from tests.prior.vista.photos import save_photo
 from tests.prior.vista.tiny import FRAMES
 
+from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS
+from dreamdrive.prior.path_to_action import waypoints
+from dreamdrive.prior.vista.condition import numbers_of
 from dreamdrive.scene.action import Command, Goal
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
@@ -74,6 +78,23 @@ def test_seed_and_action_decide(clip: Clip, control: Control) -> None:
     np.testing.assert_array_equal(first, frames())
     assert (frames(seed=4) != first).any()
     assert (frames(action=Command("left")) != first).any()
+
+
+def test_a_path_is_told_as_its_waypoints(
+    control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = circle(8.0, 0.03)
+    write_trajectory(path, tmp_path / "path.json")
+    told: list[object] = []
+    monkeypatch.setattr(
+        "dreamdrive.prior.vista.make.numbers_of", lambda action: told.append(action) or numbers_of(action)
+    )
+    made = PRIORS["vista"](replace(control, frames="1:4", trajectory=tmp_path / "path.json"))
+    assert told == [waypoints(path)]
+    assert made.requested is not None
+    np.testing.assert_allclose(made.requested.world_from_camera, path.world_from_camera[:3], atol=1e-9)
+    assert made.known.world_from_camera is None
+    assert "A path was asked for, as four waypoints" in made.provenance["notes"][-1]
 
 
 def test_svd_makes_its_frames_at_7_hz(control: Control, svd_dir: Path) -> None:

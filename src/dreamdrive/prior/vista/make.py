@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
@@ -19,11 +20,13 @@ from dreamdrive.prior.vista.features import BLOCK, extract, windows
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.load import start
 from dreamdrive.prior.vista.memory import Plan
+from dreamdrive.prior.vista.path import asked_path, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
 from dreamdrive.scene.action import Goal
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.trajectory import Trajectory
 
 _MOST_FRAMES = 1000
 
@@ -57,7 +60,11 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     held_out = held_out_mask(len(wanted), control.hold_out)
     rounds = rounds_for(int(wanted[-1]) + 1, kind, per_round)
     made = per_round + (rounds - 1) * (per_round - kind.overlap)
-    engine, actions = Engine(networks), _actions(control, kind, rounds)
+    path_asked = None if control.trajectory is None else read_trajectory(control.trajectory)
+    engine, actions = (
+        Engine(networks),
+        _actions(control, path_asked, kind, rounds, per_round, int(wanted[-1])),
+    )
     tell = counted(progress, rounds * steps + 1 + len(windows(made, per_round)))
     with torch.inference_mode():
         latents = _sample(engine, kind, leading, actions, steps, rounds, per_round, plan, control.seed, tell)
@@ -87,6 +94,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         features={"appearance": appearance(frames, valid), f"{kind.name}:{BLOCK}": features},
         latents=latents.permute(0, 2, 3, 1).contiguous().numpy(),
         known=Known(intrinsics=leading.calibration.known),
+        requested=None if path_asked is None else asked_path(path_asked, wanted / kind.rate_hz),
         provenance=_provenance(kind, control, leading, steps, rounds, plan),
     )
 
@@ -117,10 +125,16 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
     return wanted
 
 
-def _actions(control: Control, kind: Kind, rounds: int) -> list[Float[Tensor, " a"] | None]:
+def _actions(
+    control: Control, path: Trajectory | None, kind: Kind, rounds: int, per_round: int, last: int
+) -> list[Float[Tensor, " a"] | None]:
     """Columns of the action in each round; None for SVD, which has none."""
     if kind.overlap == 0:
         return [None] * rounds
+    if path is not None:
+        starts_s = np.arange(rounds) * (per_round - kind.overlap) / kind.rate_hz
+        asked = waypoints_by_round(path, starts_s, last / kind.rate_hz)
+        return [embed_action(numbers_of(action)) for action in asked]
     free = embed_action({})
     if control.action is None:
         return [free] * rounds
@@ -181,6 +195,11 @@ def _provenance(
             "The action was asked for"
             + (f", {again}" if rounds > 1 else "")
             + "; how well the frames follow it is not known."
+        )
+    if control.trajectory is not None:
+        notes.append(
+            "A path was asked for, as four waypoints in each round; how well the frames follow it is for the "
+            "geometry to find."
         )
     return {
         "prior": kind.name,
