@@ -102,6 +102,7 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
     assert report["gaussians"] == {"static": len(scene.static), "dynamic": len(scene.dynamic)}
     assert set(report["scale"]) == {"source", "spread", "others"}
     assert set(report["focal"]) == {"px", "observed"}
+    assert report["requested"] is None
     assert list(report["held_out"]) == ["2"]
     assert set(report["held_out"]["2"]) == {"psnr", "ssim"}
     assert set(report["baselines"]) == {"repeat_previous", "average_neighbours", "flow_interpolation"}
