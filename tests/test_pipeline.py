@@ -51,6 +51,23 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+def test_features_and_paths_count_by_their_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not by their names: another file of the same name makes the prior run again."""
+    requests: list[dict[str, dict[str, str]]] = []
+    monkeypatch.setattr(pipeline, "open_workspace", lambda out, request, **_: requests.append(request))
+    files = {name: tmp_path / f"{name}.file" for name in ("features", "trajectory")}
+    control = Control(tmp_path, frames="0:2", **files)
+    for text in ("one", "other"):
+        for path in files.values():
+            path.write_text(text)
+        assert not generate(control, tmp_path / "out")
+    first, second = (request["digests"] for request in requests)
+    assert all(first[name] != second[name] for name in files)
+    files["features"].unlink()
+    with pytest.raises(InputError, match=r"--features .* does not exist; expected a .safetensors file"):
+        generate(control, tmp_path / "out")
+
+
 def test_the_output_folder_holds_what_is_promised(finished: Path) -> None:
     assert sorted(p.name for p in finished.iterdir()) == [
         "held_out",
@@ -85,6 +102,7 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
     assert report["gaussians"] == {"static": len(scene.static), "dynamic": len(scene.dynamic)}
     assert set(report["scale"]) == {"source", "spread", "others"}
     assert set(report["focal"]) == {"px", "observed"}
+    assert report["requested"] is None
     assert list(report["held_out"]) == ["2"]
     assert set(report["held_out"]["2"]) == {"psnr", "ssim"}
     assert set(report["baselines"]) == {"repeat_previous", "average_neighbours", "flow_interpolation"}

@@ -319,7 +319,7 @@ def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made
 
 def _reading(control: Control) -> dict[str, Any]:
     """The options of reading that are no files."""
-    files = ("path", "intrinsics", "poses", "trajectory", "weights")
+    files = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
     return {k: v for k, v in asdict(control).items() if k not in (*files, "seed")}
 
 
@@ -330,6 +330,7 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
         "trajectory": (control.trajectory, "a file with poses"),
+        "features": (control.features, "a .safetensors file, see docs/replay.md"),
         "prior-weights": (control.weights, "a file of weights or its folder"),
         "geometry-files": (geometry_files, EXPECTED),
         "weights": (weights, "a file of weights or its folder"),

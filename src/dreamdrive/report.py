@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from dreamdrive import __version__
+from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.held_out import Likeness
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -64,6 +65,7 @@ def describe(
         ],
         "scale": asdict(geometry.scale),
         "focal": asdict(geometry.focal),
+        "requested": against_request(clip, geometry),
         "detected": list(geometry.detected),
         "fallback": geometry.fallback,
         "notes": list(clip.provenance.get("notes", [])),
@@ -76,6 +78,17 @@ def describe(
         },
     }
     return cast(dict[str, Any], _finite(report))
+
+
+def against_request(clip: Clip, geometry: Geometry) -> dict[str, Any] | None:
+    """How far the path in the frames is from the one they were asked for; None where none was asked for."""
+    if clip.requested is None:
+        return None
+    lead = clip.of_camera(int(clip.camera[0]))
+    found = np.stack([geometry.cameras[i].world_from_camera for i in lead])
+    error = compare_paths(found, clip.requested.at(clip.times_s[lead]))
+    length_m = clip.requested.length_m
+    return {"length_m": length_m, "error": None if error is None else asdict(error)}
 
 
 def package_versions() -> dict[str, str | None]:

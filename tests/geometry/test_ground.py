@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, straight, turning
@@ -6,7 +8,8 @@ from dreamdrive.geometry.classical import evidence
 from dreamdrive.geometry.classical.ground_points import fit_points
 from dreamdrive.geometry.classical.ground_sweep import Road, sweep
 from dreamdrive.geometry.classical.poses import pose_clip
-from dreamdrive.geometry.classical.scale import Street, from_ground
+from dreamdrive.geometry.classical.scale import Street, asked_m_s, from_ground
+from dreamdrive.scene.trajectory import Trajectory
 
 
 @pytest.mark.parametrize("path", [straight([0.6] * 7), turning(8, 0.6, 3.0)], ids=["straight", "turning"])
@@ -52,6 +55,19 @@ def test_a_blank_road_gives_an_assumed_speed_and_says_so() -> None:
     assert metric.scale.spread >= 0.5
     assert metric.factor * 0.3 / 0.1 == pytest.approx(8.0)
     assert metric.notes
+    asked = from_ground(replace(street, asked_m_s=5.0), None, True, 0)
+    assert asked.factor * 0.3 / 0.1 == pytest.approx(5.0)
+    assert "a speed of 5 m/s is taken as asked for" in asked.scale.source
+    assert asked.scale.spread == metric.scale.spread
+
+
+def test_the_speed_that_was_asked_for_is_that_of_the_moving_part() -> None:
+    clip = make_clip(straight([0.6] * 5))
+    assert asked_m_s(clip) is None
+    path = Trajectory(straight([0.0, 0.5, 0.5, 0.5, 0.5]), clip.times_s)
+    assert asked_m_s(replace(clip, requested=path)) == pytest.approx(5.0)
+    stands = Trajectory(straight([0.0] * 5), clip.times_s)
+    assert asked_m_s(replace(clip, requested=stands)) is None
 
 
 def test_the_camera_height_gives_metres() -> None:

@@ -1,3 +1,4 @@
+import dataclasses
 import inspect
 from pathlib import Path
 
@@ -5,10 +6,12 @@ import cv2
 import numpy as np
 import pytest
 from tests.data.pictures import texture
+from tests.prior.paths import circle
 
-from dreamdrive.data import read_clip
+from dreamdrive.data import read_clip, write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS, choose_prior, prior_of, replay
+from dreamdrive.scene.action import Command
 from dreamdrive.scene.control import Control
 
 
@@ -49,3 +52,25 @@ def test_without_a_name_the_input_decides():
     assert prior_of(Path("street/layout.json")) == "street-world"
     assert prior_of(Path("drive.mp4")) == "replay"
     assert prior_of(None) == "replay"
+
+
+def test_the_path_that_a_recording_was_asked_for_is_kept(folder, tmp_path):
+    write_trajectory(circle(5.0, 0.02, seconds=0.5), tmp_path / "asked.json")
+    clip = replay(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "asked.json"))
+    assert clip.requested is not None
+    assert clip.known.world_from_camera is None
+    np.testing.assert_allclose(clip.requested.times_s, [0, 0.2, 0.4])
+    np.testing.assert_allclose(
+        clip.requested.world_from_camera, circle(5.0, 0.02).world_from_camera[[0, 2, 4]], atol=1e-9
+    )
+    write_trajectory(circle(5.0, seconds=9.0, rate_hz=1), tmp_path / "other.json")
+    with pytest.raises(InputError, match=r"--trajectory .* do not meet the 3 selected frames"):
+        replay(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "other.json"))
+
+
+def test_contradictions_are_refused():
+    prior = dataclasses.replace(choose_prior("replay"), takes=frozenset({"trajectory", "action", "steps"}))
+    with pytest.raises(InputError, match="--trajectory and --action both tell where to drive"):
+        prior.check(Control(trajectory=Path("a.json"), action=Command("left")))
+    with pytest.raises(InputError, match="--steps 0: expected 1 or more"):
+        prior.check(Control(steps=0))

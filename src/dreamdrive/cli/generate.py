@@ -16,7 +16,8 @@ def generate(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     prior: Annotated[
-        Literal["replay", "street-world", "svd", "vista"] | None, arg(metavar="NAME", help_behavior_hint="")
+        Literal["replay", "street-world", "svd", "vista", "cosmos", "diffusers"] | None,
+        arg(metavar="NAME", help_behavior_hint=""),
     ] = None,
     geometry: Annotated[
         Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"], arg(metavar="NAME")
@@ -33,6 +34,11 @@ def generate(
     geometry_files: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
+    trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     representation: Literal["static", "deformable", "hexplane", "vibration", "hybrid"] = "hybrid",
     seed: Annotated[int, arg(metavar="S")] = 0,
@@ -47,8 +53,8 @@ def generate(
     Args:
         input: A video, a folder of images or a layout as JSON; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
-        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; svd and
-            vista go on from a photo and take --weights, see docs/prior_vista.md. Without it the input decides.
+        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
+            others are video models, see docs/priors.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
@@ -66,6 +72,13 @@ def generate(
             a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
+        trajectory: Path that a video model shall drive, or that a replayed video was to drive: JSON or TUM.
+        action: What a video model shall do instead: command=left; speed=8,8,8,8 wheel=0,0,0.1,0.1 (m/s and
+            radians, left is positive, at 0.5, 1, 1.5 and 2 s); ahead=4,8,12,16 right=0,0,0,1 (m);
+            goal=0.5,0.55 (shares of the photo's width and height).
+        prompt: What a video model shall show, in words.
+        steps: Steps of a video model's sampler.
+        features: Features of a recording's frames that another program computed, see docs/replay.md.
         hold_out: Withhold every N-th frame to measure how well it is predicted.
         representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
             deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
@@ -74,6 +87,7 @@ def generate(
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
     """
     use_all_cores()
+    from dreamdrive.cli.actions import parse_action
     from dreamdrive.pipeline import generate as run
     from dreamdrive.scene.control import Control
 
@@ -86,6 +100,11 @@ def generate(
         intrinsics=intrinsics,
         poses=poses,
         hfov_deg=hfov,
+        trajectory=trajectory,
+        action=None if action is None else parse_action(action),
+        prompt=prompt,
+        steps=steps,
+        features=features,
         hold_out=hold_out,
         seed=seed,
     )

@@ -1,13 +1,15 @@
-"""``dreamdrive prior``: networks of the generative priors."""
+"""``dreamdrive prior``: priors on their own."""
 
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from rich.console import Console
-from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, Suppress, arg, subcommand
+from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
+from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
 
 
@@ -43,12 +45,153 @@ def convert(
         console.print(f"left out, not needed: {what}, {count} tensors", soft_wrap=True)
 
 
-# As tyro does for the commands themselves; a union needs a second member where there is one command only.
-_Prior = Annotated[Any, subcommand("convert", constructor=convert)] | Annotated[None, Suppress]
+def sample(
+    input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
+    *,
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    prior: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
+    frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
+    fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
+    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
+    intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
+    trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    force: bool = False,
+) -> None:
+    """Run a prior alone, and write frames and features that generate takes up (docs/replay.md).
+
+    Args:
+        input: A photo, a recording or a layout, as the prior takes it.
+        out: Folder to write.
+        prior: As for generate; without it the input decides.
+        weights: Its network: a file, a folder, or the name of a model that the hub's cache holds.
+        frames: Frames to keep, counted from 0; STOP says how many are made.
+        fps: Rate of the frames, before the step of --frames.
+        size: Size of the frames.
+        intrinsics: Calibration of the input.
+        hfov: Horizontal field of view of the input, where there is no calibration.
+        trajectory: Path to drive: JSON or TUM.
+        action: What to do instead, as for generate, such as command=left.
+        prompt: What to show, in words.
+        steps: Steps of the sampler.
+        seed: Seed of everything random.
+        force: Replace a folder that is there already.
+    """
+    use_all_cores()
+    from dreamdrive.cli.actions import parse_action
+    from dreamdrive.data.recording import rate_hz
+    from dreamdrive.sampling import sample as run
+    from dreamdrive.scene.control import Control
+
+    control = Control(
+        path=input,
+        frames=frames,
+        fps=fps,
+        size=None if size is None else parse_size(size),
+        intrinsics=intrinsics,
+        hfov_deg=hfov,
+        trajectory=trajectory,
+        action=None if action is None else parse_action(action),
+        prompt=prompt,
+        steps=steps,
+        seed=seed,
+    )
+    console = Console(highlight=False)
+    with Bars(console) as bars:
+        clip = run(
+            control,
+            out,
+            prior=prior,
+            weights=weights,
+            force=force,
+            progress=lambda done, total: bars("prior", done, total),
+        )
+    width, height = clip.size
+    console.print(f"{out}: {len(clip)} frames of {width}x{height}", soft_wrap=True, markup=False)
+    for note in clip.provenance.get("notes", []):
+        console.print(note, soft_wrap=True, markup=False)
+    options = [f"--fps {rate_hz(clip):g}", f"--size {width}x{height}"]
+    options += [
+        f"--{option} {out / name}"
+        for option, name in (
+            ("intrinsics", "intrinsics.json"),
+            ("poses", "poses.json"),
+            ("trajectory", "requested.json"),
+            ("features", "features.safetensors"),
+        )
+        if (out / name).is_file()
+    ]
+    go_on = f"dreamdrive generate {out} -o OUT {' '.join(options)}"
+    console.print(f"to go on: {go_on}", soft_wrap=True, markup=False)
+
+
+def features(
+    clip: Annotated[Positional[Path], arg(metavar="CLIP")],
+    *,
+    out: Annotated[Path, arg(aliases=["-o"], metavar="FILE")],
+    weights: Annotated[str, arg(metavar="PATH|NAME")],
+    frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
+    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
+    block: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    sigma: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.3)")] = None,
+    channels: Annotated[int | None, arg(metavar="C", help_behavior_hint="(default: 16)")] = None,
+    action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    seed: Annotated[int, arg(metavar="S")] = 0,
+) -> None:
+    """Take the features of a recorded clip from the network of Vista or Stable Video Diffusion.
+
+    Args:
+        clip: A video or a folder of images, at about the rate of the model (Vista 10 Hz, SVD 7 Hz).
+        out: File to write, for generate --features.
+        weights: Of Vista or SVD: a file, a folder, or the name of a model that the hub's cache holds.
+        frames: Frames of the clip to use; give generate the same.
+        size: Size at which the network sees the frames, in multiples of 64; without it the nearest.
+        block: Name of a block of the UNet.
+        sigma: Noise on the latents, whose own deviation is about 1.
+        channels: Principal components to keep.
+        action: What the car does, for Vista, as for generate.
+        seed: Seed of the noise.
+    """
+    if find_spec("diffusers") is None:
+        raise InputError('the package diffusers is missing: pip install "dreamdrive[video-prior]"')
+    use_all_cores()
+    from dreamdrive.cli.actions import parse_action
+    from dreamdrive.sampling import clip_features
+
+    options = {"block": block, "sigma": sigma, "channels": channels}
+    console = Console(highlight=False)
+    with Bars(console) as bars:
+        made = clip_features(
+            clip,
+            out,
+            weights,
+            {name: value for name, value in options.items() if value is not None},
+            frames=frames,
+            size=None if size is None else parse_size(size),
+            action=None if action is None else parse_action(action),
+            seed=seed,
+            progress=lambda done, total: bars("features", done, total),
+        )
+    for name, array in made.arrays.items():
+        count, rows, columns, kept = array.shape
+        words = f"{name}, {count} frames of {columns}x{rows}, {kept} channels"
+        console.print(f"{out}: {words}", soft_wrap=True, markup=False)
+
+
+_Prior = (
+    Annotated[Any, subcommand("sample", constructor=sample)]
+    | Annotated[Any, subcommand("features", constructor=features)]
+    | Annotated[Any, subcommand("convert", constructor=convert)]
+)
 
 
 def prior(what: Annotated[_Prior, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]
-    """Networks of the generative priors.
+    """Generative priors alone: frames, features, networks.
 
     Args:
         what: What to do.

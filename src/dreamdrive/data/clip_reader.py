@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import ImageFolder
 from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
@@ -21,6 +22,7 @@ from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.trajectory import Trajectory
 
 FOLDER_RATE_HZ = 10.0
 """Rate at which the images of a folder count unless told."""
@@ -37,6 +39,8 @@ def read_clip(
     intrinsics: Path | None = None,
     poses: Path | None = None,
     hfov_deg: float | None = None,
+    trajectory: Path | None = None,
+    features: Path | None = None,
     hold_out: int | None = None,
 ) -> Clip:
     """Read a video or a folder of images as a clip.
@@ -53,6 +57,8 @@ def read_clip(
         intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
         poses: Pose file (see ``poses.read_poses``).
         hfov_deg: Horizontal field of view of the source, instead of ``intrinsics``.
+        trajectory: Path that whoever made the recording was asked to drive, in a pose file.
+        features: Features of the source's pictures (see ``feature_file.read_features``).
         hold_out: Withhold the selected frames i with i mod N = N // 2.
 
     Raises:
@@ -67,16 +73,22 @@ def read_clip(
     index = np.array(picked.index)
     times_s, said = _times(source, index, picked.times_s, fps)
     notes = [*said, *picked.notes]
-    known_poses = None
-    if poses is not None:
-        known_poses, said = read_poses(poses, path.resolve().name, index, times_s, source.count)
-        notes += said
+
+    def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
+        if file is None:
+            return None
+        found, said = read_poses(file, path.resolve().name, index, times_s, source.count, option)
+        notes.extend(said)
+        return found
+
+    known_poses, asked = poses_in(poses, "--poses"), poses_in(trajectory, "--trajectory")
     valid = np.stack(picked.valid)
     if not valid.any():
         raise InputError(
             f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
         )
     sampler = picked.sampler
+    given = None if features is None else read_features(features).of_frames(index, source.count, features)
     return Clip(
         frames=np.stack(picked.frames),
         times_s=times_s - times_s[0],
@@ -85,8 +97,11 @@ def read_clip(
         valid=valid,
         held_out=held_out_mask(len(index), hold_out),
         source_index=index,
+        features={} if given is None else given.cropped(sampler.sizing, sampler.lens, features),
         known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
-        provenance=_provenance(source, picked, notes),
+        requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
+        provenance=_provenance(source, picked, notes)
+        | ({} if given is None else {"features": given.provenance}),
     )
 
 

@@ -70,7 +70,7 @@ def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizi
         InputError: The size is odd (H.264 cannot hold it) or tiny, or more than 2 % would be cut away.
     """
     if wanted is None:
-        return _cover(source, _default(source))
+        return cover(source, _default(source))
     text = f"--size {wanted[0]}x{wanted[1]}"
     if min(wanted) < MIN_SIDE_PX:
         raise InputError(
@@ -89,7 +89,7 @@ def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizi
             f"{100 * MAX_CROP:.0f} % is cropped); the nearest sizes are {by_width[0]}x{by_width[1]} "
             f"and {by_height[0]}x{by_height[1]}"
         )
-    return _cover(source, wanted)
+    return cover(source, wanted)
 
 
 def _even(number: float) -> int:
@@ -110,7 +110,8 @@ def _default(source: tuple[int, int]) -> tuple[int, int]:
     return width, height
 
 
-def _cover(source: tuple[int, int], target: tuple[int, int]) -> Sizing:
+def cover(source: tuple[int, int], target: tuple[int, int]) -> Sizing:
+    """How frames of ``source`` cover ``target``, whatever has to be cut away for that."""
     scale = max(target[0] / source[0], target[1] / source[1])
     scaled = (max(target[0], round(source[0] * scale)), max(target[1], round(source[1] * scale)))
     offset = ((scaled[0] - target[0]) // 2, (scaled[1] - target[1]) // 2)

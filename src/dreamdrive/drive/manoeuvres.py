@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
@@ -37,7 +37,7 @@ def stop(recorded: Trajectory, up: Up, after: float = 0.75) -> Trajectory:
     # The integral of 1 - smoothstep, which falls from the recorded pace at 0 to standing at 1.
     reached = np.where(share < 1, share - share**3 + 0.5 * share**4, 0.5)
     start_s, end_s = recorded.times_s[0], recorded.times_s[-1]
-    path = at_times(recorded, start_s + reached * after * (end_s - start_s))
+    path = recorded.at(start_s + reached * after * (end_s - start_s))
     return Trajectory(path, recorded.times_s)
 
 
@@ -124,24 +124,11 @@ def manoeuvre(name: str, recorded: Trajectory, up: Up, shift_m: float = 2.0) -> 
     return shift(recorded, up, shift_m) if name == "shift" else MANOEUVRES[name](recorded, up)
 
 
-def at_times(path: Trajectory, times_s: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 4 4"]:
-    """Poses (N, 4, 4) of a path at any times; positions linear and rotations slerped, the ends held."""
-    if len(path) == 1:
-        return np.repeat(path.world_from_camera, len(times_s), axis=0)
-    times = np.clip(times_s, path.times_s[0], path.times_s[-1])
-    poses = np.tile(np.eye(4), (len(times), 1, 1))
-    turns = Slerp(path.times_s, Rotation.from_matrix(path.world_from_camera[:, :3, :3]))
-    poses[:, :3, :3] = turns(times).as_matrix()
-    for axis in range(3):
-        poses[:, axis, 3] = np.interp(times, path.times_s, path.positions_m[:, axis])
-    return poses
-
-
 def resampled(path: Trajectory, fps: float) -> Trajectory:
     """A path at ``fps`` poses a second from its first to its last time."""
     start_s, end_s = float(path.times_s[0]), float(path.times_s[-1])
     times_s = start_s + np.arange(int((end_s - start_s) * fps + 1e-6) + 1) / fps
-    return Trajectory(at_times(path, times_s), times_s)
+    return Trajectory(path.at(times_s), times_s)
 
 
 def _share(values: np.ndarray) -> np.ndarray:

@@ -67,7 +67,8 @@ def _metric(
     points = depth_points(replace(clip, rig=(measured.camera,), known=known))
     poses, points = rebase(poses, points)
     small = measured.camera.resized(evidence.small.width_px, evidence.small.height_px)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
+    asked_m_s = scales.asked_m_s(clip)
+    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
     if measured.unit is None:
         return scales.from_ground(street, height_m, measured.focal_observed, seed)
     return scales.as_given(street, measured.unit, measured.unit_spread, measured.unit, height_m, seed)

@@ -48,7 +48,8 @@ class Prior(Backend):
         """Whether it could start and honour all that is asked.
 
         Raises:
-            InputError: A field is given that it does not take, or weights or a package are missing.
+            InputError: A field is given that it does not take or that contradicts another, or weights or a
+                package are missing.
         """
         given = [field.name for field in fields(control) if getattr(control, field.name) is not None]
         if refused := [name for name in given if name not in self.takes | {"seed", "weights"}]:
@@ -56,6 +57,10 @@ class Prior(Backend):
                 f"the prior {self.name} takes no {' and no '.join(refused)}; "
                 f"it takes {', '.join(sorted(self.takes))}"
             )
+        if control.trajectory is not None and control.action is not None:
+            raise InputError("--trajectory and --action both tell where to drive; give one of them")
+        if control.steps is not None and control.steps < 1:
+            raise InputError(f"--steps {control.steps}: expected 1 or more")
         self.check_start("prior", control.weights)
 
     def __call__(self, control: Control, progress: Progress = silent) -> Clip:

@@ -12,7 +12,9 @@ from dreamdrive.scene.control import Control
 
 
 def replay(control: Control, progress: Progress = silent) -> Clip:
-    """Read a video, a folder of images or the cameras of a rig; Z_ref is ``features["appearance"]``.
+    """Read a video, a folder of images or the cameras of a rig.
+
+    Z_ref is ``features["appearance"]``, and what a file adds to it.
 
     Raises:
         InputError: There is no input, or it cannot be used.
@@ -29,15 +31,20 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
         intrinsics=control.intrinsics,
         poses=control.poses,
         hfov_deg=control.hfov_deg,
+        trajectory=control.trajectory,
+        features=control.features,
         hold_out=control.hold_out,
     )
+    if "appearance" in clip.features:
+        return clip
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
 
 
 def _of_rig(control: Control, path: Path) -> Clip:
     """The frames of several cameras."""
-    if control.intrinsics is not None or control.hfov_deg is not None:
-        raise InputError(f"{path} has several cameras; their calibration is named in its rig.json")
+    for name in ("intrinsics", "hfov_deg", "trajectory", "features"):
+        if getattr(control, name) is not None:
+            raise InputError(f"{path} has several cameras and takes no {name}; its rig.json names calibration")
     clip = read_rig_clip(
         path,
         frames=control.frames,
@@ -52,8 +59,13 @@ def _of_rig(control: Control, path: Path) -> Clip:
 REPLAY = Prior(
     name="replay",
     make=replay,
-    takes=frozenset({"path", "frames", "fps", "size", "intrinsics", "poses", "hfov_deg", "hold_out"}),
-    gives="the frames as they are; poses, where they are given",
+    takes=frozenset(
+        {
+            *("path", "frames", "fps", "size", "intrinsics", "poses", "hfov_deg", "hold_out"),
+            *("trajectory", "features"),
+        }
+    ),
+    gives="the frames as they are; poses, features and the path asked for, where they are given",
     about="a recording, or a video that another program made",
     licence="none but that of the recording",
     memory="that of the frames",

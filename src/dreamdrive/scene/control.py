@@ -23,6 +23,7 @@ class Control:
         prompt: What shall be seen, in words.
         steps: Steps of a diffusion sampler.
         weights: The prior's network, a file or folder.
+        features: File with features of the input's frames.
         hold_out: Withhold the selected frames i with i mod N = N // 2.
         seed: Seed of everything the prior draws.
     """
@@ -39,5 +40,6 @@ class Control:
     prompt: str | None = None
     steps: int | None = None
     weights: Path | None = None
+    features: Path | None = None
     hold_out: int | None = None
     seed: int = 0

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation, Slerp
 
 from dreamdrive.scene.camera import check_rigid
 
@@ -39,3 +40,15 @@ class Trajectory:
     def length_m(self) -> float:
         """Length of the path."""
         return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
+
+    def at(self, times_s: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 4 4"]:
+        """Poses (N, 4, 4) at any times; positions linear and rotations slerped, the ends held."""
+        if len(self) == 1:
+            return np.repeat(self.world_from_camera, len(times_s), axis=0)
+        times = np.clip(times_s, self.times_s[0], self.times_s[-1])
+        poses = np.tile(np.eye(4), (len(times), 1, 1))
+        turns = Slerp(self.times_s, Rotation.from_matrix(self.world_from_camera[:, :3, :3]))
+        poses[:, :3, :3] = turns(times).as_matrix()
+        for axis in range(3):
+            poses[:, axis, 3] = np.interp(times, self.times_s, self.positions_m[:, axis])
+        return poses

@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,18 @@ import torch
 from safetensors.torch import save_file
 from torch import Tensor
 
-from dreamdrive.prior.vista.keys import PARTS, UNET, Part
+from dreamdrive.prior.vista.keys import UNET, Part
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.prior.vista.stored import FILES
 
+FRAMES = 6
+"""Frames that the UNet sees at once; an official single file does not tell, and counts as 25."""
 IMAGE = 16
 """Columns of the context that describe the first frame."""
 _DECODER, _CONDITION = "first_stage_model.decoder.", "conditioner.embedders.3.encoder."
 _VISUAL = "conditioner.embedders.0.open_clip.model.visual."
-_BLOCKS = ("CrossAttn{}BlockSpatioTemporal", "CrossAttn{}BlockSpatioTemporal", "{}BlockSpatioTemporal")
+_BLOCKS = ("{}BlockSpatioTemporal", "CrossAttn{}BlockSpatioTemporal", "{}BlockSpatioTemporal")
 
 
 def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
@@ -33,7 +36,7 @@ def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
             "num_attention_heads": [1, 1, 1],
             "addition_time_embed_dim": 32,
             "projection_class_embeddings_input_dim": 96,
-            "num_frames": 25,
+            "num_frames": FRAMES,
         },
         "vae": {
             "block_out_channels": [32, 32, 32, 32],
@@ -54,6 +57,7 @@ def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
     }
 
 
+@cache
 def states(kind: Kind, seed: int = 0) -> dict[Part, dict[str, Tensor]]:
     """Random weights of each part: matrices keep the size of what goes through them."""
     draw = torch.Generator().manual_seed(seed)
@@ -139,7 +143,7 @@ def _unet_key(name: str) -> str:
         down = side == "down_blocks"
         if "samplers" in what:
             spot = 3 * int(level) + (3 if down else 2)
-            attends = not down and int(level) > 0
+            attends = not down and int(level) == 1
             inner = rest.replace("conv.", "op.") if down else rest
             return f"{'input' if down else 'output'}_blocks.{spot}.{0 if down else 1 + attends}.{inner}"
         spot = 3 * int(level) + int(index) + down
@@ -178,7 +182,9 @@ def _vae_key(name: str) -> str:
     if match := re.match(r"(down|up)_blocks\.(\d)\.\w+samplers\.0\.(.*)", rest):
         level = int(match[2]) if match[1] == "down" else 3 - int(match[2])
         return f"{prefix}{match[1]}.{level}.{match[1]}sample.{match[3]}"
-    return prefix + rest.replace("conv_norm_out", "norm_out").replace("time_conv_out", "conv_out.time_mix_conv")
+    return prefix + rest.replace("conv_norm_out", "norm_out").replace(
+        "time_conv_out", "conv_out.time_mix_conv"
+    )
 
 
 def _visual_state(state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -206,6 +212,3 @@ def _visual_state(state: dict[str, Tensor]) -> dict[str, Tensor]:
         key = re.sub(r"^vision_model\.(pre|post)_laye?rnorm", r"ln_\1", key)
         found[_VISUAL + key] = value
     return found
-
-
-__all__ = ["IMAGE", "PARTS", "configs", "official", "save_folder", "save_official", "states"]

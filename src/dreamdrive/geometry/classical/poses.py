@@ -107,7 +107,8 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     filled = fill(model.world_from_camera, clip.times_s)
     poses, points = rebase(filled, model.points)
     small = camera.resized(evidence.small.width_px, evidence.small.height_px)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s)
+    asked_m_s = scale.asked_m_s(clip)
+    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
     ratios = depth_ratios(clip, camera, poses, points, model.seen)
     if len(ratios):
         metric = scale.from_depth(ratios, street, height_m, seed)
@@ -159,7 +160,15 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    return Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
+    return Street(
+        evidence.grey,
+        evidence.street,
+        evidence.small,
+        poses,
+        points,
+        clip.times_s,
+        scale.asked_m_s(clip),
+    )
 
 
 def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:

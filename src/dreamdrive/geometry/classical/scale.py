@@ -9,6 +9,7 @@ from dreamdrive.geometry.classical.ground_points import Plane, fit_points
 from dreamdrive.geometry.classical.ground_sweep import Road, sweep
 from dreamdrive.geometry.classical.known import factor_of
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Ground, Scale
 
 USUAL_HEIGHT_M = 1.5
@@ -31,6 +32,7 @@ class Street:
         world_from_camera: Poses (F, 4, 4), the first the identity.
         points: Sparse points (P, 3) in the same units.
         times_s: Times (F,).
+        asked_m_s: Speed of the path that the frames were asked to follow, where they were generated for one.
     """
 
     grey: UInt8[np.ndarray, "f h w"]
@@ -39,6 +41,7 @@ class Street:
     world_from_camera: Float[np.ndarray, "f 4 4"]
     points: Float[np.ndarray, "p 3"]
     times_s: Float[np.ndarray, " f"]
+    asked_m_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def find_ground(
 
 
 def from_ground(street: Street, height_m: float | None, focal_observed: bool, seed: int) -> Metric:
-    """Scale from the height of the camera above the road; from an assumed speed when no road is found.
+    """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
 
     Args:
         street: Posed clip in arbitrary units.
@@ -153,16 +156,33 @@ def as_given(
 
 
 def _from_speed(street: Street, problem: str) -> Metric:
-    factor = ASSUMED_SPEED_M_S / max(_speed(street, 1.0), 1e-9)
-    words = f"none: {problem}; a speed of {ASSUMED_SPEED_M_S:.0f} m/s is assumed"
-    return Metric(
-        factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on an assumed speed",)
+    speed = ASSUMED_SPEED_M_S if street.asked_m_s is None else street.asked_m_s
+    factor = speed / max(_speed(street, 1.0), 1e-9)
+    word, rest = (
+        ("assumed", "an assumed speed")
+        if street.asked_m_s is None
+        else ("taken as asked for", "the speed that was asked for")
     )
+    words = f"none: {problem}; a speed of {speed:.3g} m/s is {word}"
+    return Metric(factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on {rest}",))
+
+
+def asked_m_s(clip: Clip) -> float | None:
+    """Median speed of the path that a clip was asked to follow; None without one or where it stands still."""
+    if clip.requested is None or len(clip) < 2:
+        return None
+    speed = _median_speed(clip.requested.at(clip.times_s), clip.times_s)
+    return speed if speed >= SPEEDS_M_S[0] else None
 
 
 def _speed(street: Street, factor: float) -> float:
-    """Median speed (m/s) of the steps that move."""
-    step = np.linalg.norm(np.diff(street.world_from_camera[:, :3, 3], axis=0), axis=1) * factor
-    speed = step / np.maximum(np.diff(street.times_s), 1e-6)
+    """Median speed (m/s) where ``factor`` makes metres of the poses."""
+    return _median_speed(street.world_from_camera, street.times_s) * factor
+
+
+def _median_speed(poses: Float[np.ndarray, "f 4 4"], times_s: Float[np.ndarray, " f"]) -> float:
+    """Median speed of the steps that move."""
+    step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    speed = step / np.maximum(np.diff(times_s), 1e-6)
     moving = speed > 0.15 * speed.max()
     return float(np.median(speed[moving])) if moving.any() else 0.0

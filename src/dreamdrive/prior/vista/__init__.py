@@ -47,8 +47,8 @@ SVD = Prior(
     gives="25 frames at 7 Hz, latents, features; no poses",
     about="a photo goes on for 25 frames (Stable Video Diffusion)",
     licence=(
-        "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, which limits "
-        "commercial use"
+        "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, "
+        "which limits commercial use"
     ),
     memory=_MEMORY,
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",
@@ -58,7 +58,7 @@ SVD = Prior(
 VISTA = Prior(
     name="vista",
     make=vista,
-    takes=_TAKES | {"action"},
+    takes=_TAKES | {"action", "trajectory"},
     gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
     about="a street goes on from a photo or up to three frames, as told by an action (Vista)",
     licence=(

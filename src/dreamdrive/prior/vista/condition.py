@@ -1,7 +1,7 @@
 """What the network is told beside the noise: the first frame and the action. Importing this loads diffusers.
 
-Units and signs of the actions are those of nuScenes' CAN bus, on which Vista was trained. Its code states none
-of them, so some are [inferred]: from nuScenes' documentation and from what similar code does.
+Units and signs of the actions are those of nuScenes' CAN bus, on which Vista was trained. Its code states
+none of them, so some are [inferred]: from nuScenes' documentation and from what similar code does.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,8 +53,8 @@ def numbers_of(action: Action) -> dict[str, list[float]]:
     assert isinstance(action, Goal)
     if not (0 <= action.column <= 1 and 0 <= action.row <= 1):
         raise InputError(
-            f"the goal is at {action.column:g}, {action.row:g}; expected a point of the first frame, as shares of "
-            "its width and height between 0 and 1"
+            f"the goal is at {action.column:g}, {action.row:g}; expected a point of the first frame, as "
+            "shares of its width and height between 0 and 1"
         )
     return {"goal": [action.column, action.row]}
 

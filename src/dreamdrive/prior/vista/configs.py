@@ -29,14 +29,14 @@ def config_of(part: Part, shapes: Shapes, head: int = HEAD) -> dict[str, Any]:
 
 
 def _levels(shapes: Shapes, prefix: str) -> int:
-    return 1 + max((int(key.split(".")[prefix.count(".")]) for key in shapes if key.startswith(prefix)), default=0)
+    return 1 + max(
+        (int(key.split(".")[prefix.count(".")]) for key in shapes if key.startswith(prefix)), default=0
+    )
 
 
 def _unet(shapes: Shapes, head: int) -> dict[str, Any]:
     levels = _levels(shapes, "down_blocks.")
-    widths = [
-        shapes[f"down_blocks.{i}.resnets.0.spatial_res_block.conv1.weight"][0] for i in range(levels)
-    ]
+    widths = [shapes[f"down_blocks.{i}.resnets.0.spatial_res_block.conv1.weight"][0] for i in range(levels)]
     attends = [any(key.startswith(f"down_blocks.{i}.attentions.") for key in shapes) for i in range(levels)]
     context = shapes["mid_block.attentions.0.transformer_blocks.0.attn2.to_k.weight"][1]
     names = {True: "CrossAttn{}BlockSpatioTemporal", False: "{}BlockSpatioTemporal"}

@@ -78,7 +78,11 @@ def convert(
                 progress(start + count, total)
 
             write_tensors(
-                partial / part / FILES[part][0], own.shapes, own.read, "float32" if part == "vae" else dtype, tell
+                partial / part / FILES[part][0],
+                own.shapes,
+                own.read,
+                "float32" if part == "vae" else dtype,
+                tell,
             )
             done += len(own.shapes)
         note = {"kind": stored.kind.name, "dtype": dtype, "from": stored.path.name}

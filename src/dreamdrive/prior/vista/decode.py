@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -31,11 +30,11 @@ def decode_in_chunks(
         chunk: Frames at once, at least 1.
     """
     made: Tensor | None = None
+    reached = 0
     for part in chunks(len(latents), chunk):
         frames = decode(latents[part.start : part.stop]).cpu()
         if made is None:
             made = frames.new_empty((len(latents), *frames.shape[1:]))
-            reached = 0
         common = reached - part.start
         if common > 0:
             made[part.start : reached] = (made[part.start : reached] + frames[:common]) / 2

@@ -27,24 +27,26 @@ class Engine:
         """What a rollout asks for."""
         return Model(self.encode, self.decode, self.describe, self.velocity)
 
-    def encode(self, images: Images) -> Float[Tensor, "n c h w"]:
+    def encode(self, images: Images) -> Float[Tensor, "n c y x"]:
         """Latents of frames in [-1, 1]: the mode, not scaled; one frame at a time."""
         vae = self.networks.vae()
-        coded = [vae.encode(image[None].to(self._device)).latent_dist.mode() for image in images]
+        coded = [vae.encode(image[None].to(self._device), return_dict=False)[0].mode() for image in images]
         return torch.cat(coded)
 
     def decode(self, latents: Float[Tensor, "t c h w"]) -> Float[Tensor, "t 3 h2 w2"]:
         """Frames of latents that are not scaled, all at once."""
-        return self.networks.vae().decode(latents.float().to(self._device), num_frames=len(latents)).sample
+        given = latents.float().to(self._device)
+        return self.networks.vae().decode(given, num_frames=len(given), return_dict=False)[0]
 
     def describe(self, images: Images) -> Float[Tensor, " d"]:
         """What CLIP says of one frame in [-1, 1]."""
-        encoder = self.networks.image_encoder()
-        return encoder(clip_pixels(images.to(self._device), encoder.config.image_size)).image_embeds[0]
+        encoder, side_px = self.networks.image_encoder(), self.networks.stored.parts["image_encoder"].config
+        return encoder(clip_pixels(images.to(self._device), side_px["image_size"])).image_embeds[0]
 
     def velocity(self, seen: Seen) -> Velocity:
-        """The UNet under the conditions of a round, with and without them: one after the other, which takes half
-        the memory of both at once. Without them frame and action are zeros.
+        """The UNet without and with the conditions of a round; without them frame and action are zeros.
+
+        One after the other, which takes half the memory of both at once.
         """
 
         def answer(x: Float[Tensor, "t c h w"], time: float, mask: Float[Tensor, " t"]) -> Branches:
@@ -53,7 +55,12 @@ class Engine:
         return answer
 
     def look(
-        self, seen: Seen, x: Float[Tensor, "t c h w"], time: float, mask: Float[Tensor, " t"], given: float = 1.0
+        self,
+        seen: Seen,
+        x: Float[Tensor, "t c h w"],
+        time: float,
+        mask: Float[Tensor, " t"],
+        given: float = 1.0,
     ) -> Float[Tensor, "t c h w"]:
         """One look of the UNet.
 
@@ -65,12 +72,12 @@ class Engine:
             given: One with the conditions, zero without.
         """
         unet, kind = self.networks.unet(), self.networks.stored.kind
-        to = {"device": self._device, "dtype": self.networks.dtype}
+        to = (self._device, self.networks.dtype)
         parts = [seen.image] if seen.action is None else [seen.image, seen.action.to(seen.image)]
         beside = (given * seen.latent.to(x))[None].expand(len(x), -1, -1, -1)
         ids = torch.tensor([[kind.rate_hz - 1, MOTION_BUCKET, kind.noise]], device=self._device)
-        context = given * torch.cat(parts)[None, None].to(**to)
-        return unet(torch.cat([x, beside], dim=1)[None].to(**to), time, context, ids, mask)[0].float()
+        context = given * torch.cat(parts)[None, None].to(*to)
+        return unet(torch.cat([x, beside], dim=1)[None].to(*to), time, context, ids, mask)[0].float()
 
     @property
     def _device(self) -> torch.device:

@@ -1,8 +1,8 @@
 """What the video model sees in frames: the activations of a block, as features Z_ref. Loads diffusers.
 
-The paper takes features from "early layers" of its diffusion model. Here the finished frames, made or recorded,
-get a little noise and go through the UNet once, as in DIFT (Tang et al., NeurIPS 2023); nothing depends on how
-they were sampled.
+The paper takes features from "early layers" of its diffusion model. Here the finished frames, made or
+recorded, get a little noise and go through the UNet once, as in DIFT (Tang et al., NeurIPS 2023); nothing
+depends on how they were sampled.
 """
 
 from collections.abc import Sequence
@@ -97,10 +97,14 @@ def video_features(
     with torch.inference_mode():
         latents = SCALE * engine.encode(to_images(resized)).cpu()
         columns = None if action is None else embed_action(numbers_of(action))
-        values = extract(engine, latents, resized, count, options, action=columns, seed=seed, progress=progress)
-    notes = [] if seen_size == (width, height) else [
-        f"The video model saw the frames at {seen_size[0]}x{seen_size[1]} instead of {width}x{height}."
-    ]
+        values = extract(
+            engine, latents, resized, count, options, action=columns, seed=seed, progress=progress
+        )
+    notes = (
+        []
+        if seen_size == (width, height)
+        else [f"The video model saw the frames at {seen_size[0]}x{seen_size[1]} instead of {width}x{height}."]
+    )
     values, said = _onto_clip(values, (width, height))
     chosen = options or FeatureOptions()
     return VideoFeatures(f"{networks.stored.kind.name}:{chosen.block}", values, (*notes, *said))
@@ -164,7 +168,7 @@ def _activations(
     options: FeatureOptions,
     *,
     fixed: bool,
-) -> Float16[np.ndarray, "t h2 w2 c"]:
+) -> Float16[np.ndarray, "t h2 w2 d"]:
     """One window through the UNet, its first frame known as when it is generated."""
     unet = engine.networks.unet()
     mask = torch.zeros(len(latents))

@@ -1,6 +1,7 @@
 """From the names in the official single files to those of diffusers and transformers, as rules.
 
-The files are ``vista.safetensors`` (Gao et al., NeurIPS 2024) and ``svd_xt.safetensors`` (Blattmann et al., 2023).
+The files are ``vista.safetensors`` (Gao et al., NeurIPS 2024) and ``svd_xt.safetensors`` (Blattmann et al.,
+2023).
 """
 
 import re

@@ -1,7 +1,6 @@
 """A photo, or a few leading frames, becomes a clip. Importing this loads diffusers."""
 
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
@@ -16,15 +16,17 @@ from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.vista.condition import embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
 from dreamdrive.prior.vista.engine import Engine, counted
-from dreamdrive.prior.vista.features import BLOCK, extract
+from dreamdrive.prior.vista.features import BLOCK, extract, windows
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.load import start
 from dreamdrive.prior.vista.memory import Plan
+from dreamdrive.prior.vista.path import asked_path, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
 from dreamdrive.scene.action import Goal
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.trajectory import Trajectory
 
 _MOST_FRAMES = 1000
 
@@ -57,13 +59,17 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     wanted = _wanted(control.frames, kind, per_round)
     held_out = held_out_mask(len(wanted), control.hold_out)
     rounds = rounds_for(int(wanted[-1]) + 1, kind, per_round)
-    engine, actions = Engine(networks), _actions(control, kind, rounds)
-    spans = -(-len(wanted) // per_round)
-    tell = counted(progress, rounds * steps + 1 + spans)
+    made = per_round + (rounds - 1) * (per_round - kind.overlap)
+    path_asked = None if control.trajectory is None else read_trajectory(control.trajectory)
+    engine, actions = (
+        Engine(networks),
+        _actions(control, path_asked, kind, rounds, per_round, int(wanted[-1])),
+    )
+    tell = counted(progress, rounds * steps + 1 + len(windows(made, per_round)))
     with torch.inference_mode():
         latents = _sample(engine, kind, leading, actions, steps, rounds, per_round, plan, control.seed, tell)
         images = decode_in_chunks(engine.decode, latents / SCALE, plan.chunk)
-        frames, latents = to_frames(images)[wanted], latents.cpu()[torch.from_numpy(wanted)]
+        frames, latents = to_frames(images), latents.cpu()
         tell()
         features = extract(
             engine,
@@ -75,6 +81,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
             progress=lambda done, total: tell(),
         )
     networks.free()
+    frames, latents, features = frames[wanted], latents[torch.from_numpy(wanted)], features[wanted]
     valid = np.ones(frames.shape[:3], dtype=bool)
     return Clip(
         frames=frames,
@@ -87,6 +94,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         features={"appearance": appearance(frames, valid), f"{kind.name}:{BLOCK}": features},
         latents=latents.permute(0, 2, 3, 1).contiguous().numpy(),
         known=Known(intrinsics=leading.calibration.known),
+        requested=None if path_asked is None else asked_path(path_asked, wanted / kind.rate_hz),
         provenance=_provenance(kind, control, leading, steps, rounds, plan),
     )
 
@@ -100,16 +108,16 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
     """Indices of the frames to keep, among all that are made."""
     selection = Selection.parse(frames)
     if selection.needs_count:
-        raise InputError(f"--frames {frames}: count from the first frame; {kind.title} makes as many as are asked")
+        raise InputError(f"--frames {frames}: count from the first frame; there is no last one")
     if selection.stop is None:
         selection = replace(selection, stop=max(per_round, selection.start + per_round))
     wanted = np.array(list(selection.resolve(None, "the generated clip")), dtype=np.int64)
     if kind.overlap == 0 and wanted[-1] >= per_round:
         raise InputError(
-            f"--frames {frames}: {kind.title} makes {per_round} frames and cannot go on from them; give a STOP of "
-            f"at most {per_round}, or use --prior vista"
+            f"--frames {frames}: {kind.title} makes {per_round} frames and cannot go on from them; give "
+            f"a STOP of at most {per_round}, or use --prior vista"
         )
-    if not 2 <= len(wanted) or wanted[-1] >= _MOST_FRAMES:
+    if len(wanted) < 2 or wanted[-1] >= _MOST_FRAMES:
         raise InputError(
             f"--frames {frames} asks for {len(wanted)} frames up to number {wanted[-1]}; expected two or more "
             f"below {_MOST_FRAMES}"
@@ -117,10 +125,16 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
     return wanted
 
 
-def _actions(control: Control, kind: Kind, rounds: int) -> list[Float[Tensor, " a"] | None]:
+def _actions(
+    control: Control, path: Trajectory | None, kind: Kind, rounds: int, per_round: int, last: int
+) -> list[Float[Tensor, " a"] | None]:
     """Columns of the action in each round; None for SVD, which has none."""
     if kind.overlap == 0:
         return [None] * rounds
+    if path is not None:
+        starts_s = np.arange(rounds) * (per_round - kind.overlap) / kind.rate_hz
+        asked = waypoints_by_round(path, starts_s, last / kind.rate_hz)
+        return [embed_action(numbers_of(action)) for action in asked]
     free = embed_action({})
     if control.action is None:
         return [free] * rounds
@@ -169,8 +183,8 @@ def _provenance(
     assert control.path is not None
     notes = [
         f"The frames are generated: {kind.title} made them of {control.path.name} in {rounds} "
-        f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and scale "
-        "are not known and have to be found in the frames.",
+        f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and "
+        "scale are not known and have to be found in the frames.",
         *leading.notes,
     ]
     if len(leading.frames) > 1:
@@ -181,6 +195,11 @@ def _provenance(
             "The action was asked for"
             + (f", {again}" if rounds > 1 else "")
             + "; how well the frames follow it is not known."
+        )
+    if control.trajectory is not None:
+        notes.append(
+            "A path was asked for, as four waypoints in each round; how well the frames follow it is for the "
+            "geometry to find."
         )
     return {
         "prior": kind.name,
@@ -203,5 +222,3 @@ def _provenance(
 def _named(action: Any) -> dict[str, Any]:
     values = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(action).items()}
     return {"kind": type(action).__name__.lower(), **values}
-
-

@@ -2,8 +2,8 @@
 
 One network at a time is in memory. What each needs beside its weights was found by running the networks of
 official size without numbers (on torch's meta device) and adding up what lived at once; it grows with the
-width of the network's first level, the frames and the pixels. Attention takes no memory of its own in that, as
-the fused kernels have it.
+width of the network's first level, the frames and the pixels. Attention takes no memory of its own in that,
+as the fused kernels have it. On a GPU it was not measured.
 """
 
 from dataclasses import dataclass
@@ -69,27 +69,32 @@ def plan_memory(
     Raises:
         InputError: It does not fit; the message names a size that does.
     """
-    plans = [_plan(stored, size, frames, per_round, chunk, half) for chunk in range(CHUNK, LEAST_CHUNK - 1, -1)]
+    plans = [
+        _plan(stored, size, frames, per_round, chunk, half) for chunk in range(CHUNK, LEAST_CHUNK - 1, -1)
+    ]
     fitting = [plan for plan in plans if available is None or plan.peak <= available]
     if fitting:
         return fitting[0]
-    smaller = [(size[0] - SIDE * i, _side((size[0] - SIDE * i) * size[1] / size[0])) for i in range(1, size[0] // SIDE)]
+    smaller = [
+        (size[0] - SIDE * i, _side((size[0] - SIDE * i) * size[1] / size[0]))
+        for i in range(1, size[0] // SIDE)
+    ]
     suits = (
         each
         for each in smaller
         if _plan(stored, each, frames, per_round, LEAST_CHUNK, half).peak <= (available or 0)
     )
     found = next(suits, None)
-    advice = "no smaller size fits either" if found is None else f"give --size {found[0]}x{found[1]} or smaller"
+    advice = (
+        "no smaller size fits either" if found is None else f"give --size {found[0]}x{found[1]} or smaller"
+    )
     raise InputError(
-        f"{stored.kind.title} at {size[0]}x{size[1]} needs about {plans[-1]}, and {_gb(available or 0)} are free: "
-        f"{advice}, or take a machine with more memory"
+        f"{stored.kind.title} at {size[0]}x{size[1]} needs about {plans[-1]}, and {_gb(available or 0)} are "
+        f"free: {advice}, or take a machine with more memory"
     )
 
 
-def _plan(
-    stored: Stored, size: tuple[int, int], frames: int, per_round: int, chunk: int, half: bool
-) -> Plan:
+def _plan(stored: Stored, size: tuple[int, int], frames: int, per_round: int, chunk: int, half: bool) -> Plan:
     pixels = size[0] * size[1] // 64
     width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
     bytes_ = 2 if half else _FLOAT

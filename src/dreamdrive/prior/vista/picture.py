@@ -115,8 +115,8 @@ def frame(source: tuple[int, int], target: tuple[int, int], name: str) -> Framin
         fits = [SIDE * int(side / larger * MAX_ENLARGED / SIDE) for side in target]
         advice = f", or --size {fits[0]}x{fits[1]}" if min(fits) >= SIDE else ""
         raise InputError(
-            f"{name} is {width}x{height} pixels: too small for {target[0]}x{target[1]}, for which it would be "
-            f"enlarged {larger:.1f} times (at most {MAX_ENLARGED:g}); give a larger photo{advice}"
+            f"{name} is {width}x{height} pixels: too small for {target[0]}x{target[1]}, for which it would "
+            f"be enlarged {larger:.1f} times (at most {MAX_ENLARGED:g}); give a larger photo{advice}"
         )
     return Framing(((width - part[0]) // 2, (height - part[1]) // 2), part, target)
 

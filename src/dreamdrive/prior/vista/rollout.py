@@ -61,21 +61,21 @@ def roll_out(
     model: Model,
     kind: Kind,
     leading: Images,
-    noise: Float[Tensor, "r t c h w"],
+    noise: Float[Tensor, "r t c y x"],
     actions: Sequence[Float[Tensor, " a"] | None],
     steps: int,
     *,
     first: Images | None = None,
     chunk: int = CHUNK,
     tell: Callable[[], None] = lambda: None,
-) -> Float[Tensor, "f c h w"]:
+) -> Float[Tensor, "f c y x"]:
     """Scaled latents of all frames: 25 of the first round, and what each later one adds to its overlap.
 
     Args:
         model: The networks.
         kind: Which model they are.
         leading: One to three known frames in [-1, 1].
-        noise: For each round (R, T, C, h, w), of standard deviation 1.
+        noise: For each round (R, T, C, H/8, W/8), of standard deviation 1.
         actions: For each round.
         steps: Of the sampler in each round.
         first: The first frame as the network is given it beside the noise, where noise was added (SVD).

@@ -1,5 +1,6 @@
-"""Euler sampling of a video model in the noise scale of EDM (Karras et al., NeurIPS 2022), as Vista does it."""
+"""Euler sampling in the noise scale of EDM (Karras et al., NeurIPS 2022), as Vista does it."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -106,7 +107,7 @@ def sample(
     """
     levels = sigmas(steps)
     latents = noise * (levels[0] ** 2 + 1) ** 0.5
-    for sigma, following in zip(levels, levels[1:], strict=False):
+    for sigma, following in itertools.pairwise(levels):
         latents = fixed.put(latents)
         clean = denoise(velocity, latents, sigma, scale, fixed.mask)
         latents = latents + (following - sigma) * (latents - clean) / sigma

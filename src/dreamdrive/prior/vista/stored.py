@@ -1,4 +1,4 @@
-"""Weights on disk: an official single file, or a folder in diffusers' layout; nothing is read before it is used."""
+"""Weights on disk, an official single file or a folder in diffusers' layout; read where they are used."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -17,8 +17,8 @@ from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 
 EXPECTED = (
-    "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert made, or "
-    "the folder of stable-video-diffusion-img2vid-xt"
+    "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert "
+    "made, or the folder of stable-video-diffusion-img2vid-xt"
 )
 NOTE = "prior.json"
 """The file that says which kind a converted folder holds."""
@@ -28,6 +28,12 @@ FILES: dict[Part, tuple[str, ...]] = {
     "image_encoder": ("model.safetensors", "model.fp16.safetensors"),
 }
 TITLES: dict[Part, str] = {"unet": "UNet", "vae": "VAE", "image_encoder": "image encoder"}
+_NEEDED: dict[Part, tuple[str, ...]] = {
+    "unet": ("block_out_channels", "cross_attention_dim"),
+    "vae": ("block_out_channels",),
+    "image_encoder": ("projection_dim", "image_size"),
+}
+"""What of the configuration is used beside the network's making."""
 _SECOND_TIME = "cond_time_embedding."
 _SHOWN = 3
 
@@ -134,7 +140,7 @@ def _open_file(path: Path) -> Stored:
     if recipes.unknown:
         raise InputError(f"{path} holds unknown tensors: {_some(recipes.unknown)}; expected {EXPECTED}")
     kind = _kind_of(path, recipes)
-    parts = {part: _part(path, part, recipes, shapes, read) for part in PARTS}
+    parts: dict[Part, StoredPart] = {part: _part(path, part, recipes, shapes, read) for part in PARTS}
     return Stored(path, kind, parts, tuple(recipes.ignored))
 
 
@@ -166,7 +172,7 @@ def _part(
 
 
 def _open_folder(path: Path) -> Stored:
-    parts = {part: _folder_part(path, part) for part in PARTS}
+    parts: dict[Part, StoredPart] = {part: _folder_part(path, part) for part in PARTS}
     second = any(name.startswith(_SECOND_TIME) for name in parts["unet"].shapes)
     kind = VISTA if second else SVD
     if (path / NOTE).is_file():
@@ -198,6 +204,8 @@ def _read_json(path: Path) -> dict[str, Any]:
 def _check(stored: Stored, part: Part) -> None:
     """Whether the tensors are those of the network, by name and shape."""
     own = stored.parts[part]
+    if lacking := [name for name in _NEEDED[part] if name not in own.config]:
+        raise InputError(f"{stored.path}: config.json of the {TITLES[part]} does not tell {lacking[0]}")
     try:
         network = make_empty(part, own.config, stored.kind)
     except (TypeError, ValueError, KeyError, AttributeError) as error:

@@ -1,0 +1,160 @@
+"""Features of frames on disk: what a model that ran elsewhere thought of each pixel (docs/replay.md).
+
+A ``.safetensors`` file holds one array (F, h, w, C) a name, half or single precision, each covering the whole
+of the input's pictures, and in its metadata under ``provenance`` a JSON object that says where they are from.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Float, Int
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from dreamdrive.data.lens import Lens
+from dreamdrive.data.size import Sizing
+from dreamdrive.errors import InputError
+from dreamdrive.scene.atomic import new_file
+
+MAX_CHANNELS = 128
+"""More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
+_KEY = "provenance"
+_EXPECTED = "a .safetensors file with arrays (frames, rows, columns, channels), see docs/replay.md"
+
+
+@dataclass(frozen=True)
+class FeatureFile:
+    """The content of a file of features.
+
+    Attributes:
+        arrays: Named features (F, h, w, C), all of F frames.
+        provenance: Where they come from, as JSON values.
+    """
+
+    arrays: dict[str, Float[np.ndarray, "f _ _ _"]]
+    provenance: dict[str, Any]
+
+    def of_frames(self, index: Int[np.ndarray, " f"], count: Callable[[], int], path: Path) -> "FeatureFile":
+        """Those of the selected frames.
+
+        Args:
+            index: Index of each selected frame in the source.
+            count: Number of frames in the source; called only where it decides.
+            path: The file, for messages.
+
+        Raises:
+            InputError: There is neither one row a frame of the source nor one a selected frame.
+        """
+        rows = len(next(iter(self.arrays.values())))
+        if rows == len(index):
+            return self
+        if rows != count():
+            raise InputError(
+                f"--features {path} has {rows} frames, but the input has {count()}, {len(index)} of them "
+                "selected; expected features of each frame of the input or of each selected frame"
+            )
+        return FeatureFile({name: array[index] for name, array in self.arrays.items()}, self.provenance)
+
+    def cropped(
+        self, sizing: Sizing, lens: Lens | None, path: Path | None
+    ) -> dict[str, Float[np.ndarray, "f _ _ _"]]:
+        """The features of what is left of the pictures in the clip; bilinear where something was cut away.
+
+        Raises:
+            InputError: A distortion was taken out of the frames, which the features still have.
+        """
+        if lens is not None:
+            raise InputError(
+                f"--features {path} is of the distorted pictures, but --intrinsics takes the distortion out "
+                "of the frames; undistort the input first, and compute the features of that"
+            )
+        if sizing.scaled == sizing.target:
+            return self.arrays
+        made: dict[str, np.ndarray] = {}
+        for name, array in self.arrays.items():
+            for axis, side in ((1, 1), (2, 0)):
+                array = _resampled(array, axis, sizing.offset[side], sizing.target[side], sizing.scaled[side])
+            made[name] = array
+        return made
+
+
+def read_features(path: Path) -> FeatureFile:
+    """Read a file of features.
+
+    Raises:
+        InputError: The file is missing, or malformed in a way that the message names.
+    """
+    where = f"--features {path}"
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = file.metadata() or {}
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError, TypeError, ValueError, AttributeError, KeyError) as error:
+        raise InputError(f"{where} cannot be read ({error}); expected {_EXPECTED}") from None
+    if not arrays:
+        raise InputError(f"{where} holds no array; expected {_EXPECTED}")
+    for name, array in arrays.items():
+        if problem := _problem(array):
+            raise InputError(f"{where}: {name!r} {problem}")
+    if len({len(array) for array in arrays.values()}) > 1:
+        counts = ", ".join(f"{name!r} {len(array)}" for name, array in arrays.items())
+        raise InputError(f"{where}: its arrays have different numbers of frames: {counts}")
+    return FeatureFile(arrays, _provenance(metadata, where))
+
+
+def write_features(path: Path, features: FeatureFile) -> None:
+    """Write a file that ``read_features`` reads; it appears whole or not at all.
+
+    Raises:
+        InputError: The file cannot be written.
+        ValueError: An array cannot be read back.
+    """
+    for name, array in features.arrays.items():
+        if problem := _problem(array):
+            raise ValueError(f"features {name!r} {problem}")
+    arrays = {name: np.ascontiguousarray(array) for name, array in features.arrays.items()}
+    blob = save(arrays, metadata={_KEY: json.dumps(features.provenance)})
+    with new_file(path) as partial:
+        partial.write_bytes(blob)
+
+
+def _problem(array: np.ndarray) -> str | None:
+    if array.dtype.name not in ("float16", "float32"):
+        return f"holds {array.dtype}; expected float16 or float32"
+    if array.ndim != 4 or 0 in array.shape:
+        return f"has the shape {array.shape}; expected (frames, rows, columns, channels)"
+    if array.shape[3] > MAX_CHANNELS:
+        return (
+            f"has {array.shape[3]} channels; expected at most {MAX_CHANNELS}: keep the first principal "
+            "components, 16 to 32 of them"
+        )
+    return None if np.isfinite(array).all() else "holds NaN or infinite numbers"
+
+
+def _provenance(metadata: dict[str, str], where: str) -> dict[str, Any]:
+    if _KEY not in metadata:
+        raise InputError(
+            f"{where} does not say where it comes from: expected a JSON object in its metadata under {_KEY!r}"
+        )
+    try:
+        values = json.loads(metadata[_KEY])
+    except (ValueError, RecursionError):
+        values = None
+    if not isinstance(values, dict):
+        raise InputError(f"{where}: its metadata under {_KEY!r} is no JSON object")
+    return cast("dict[str, Any]", values)
+
+
+def _resampled(array: np.ndarray, axis: int, offset: int, target: int, scaled: int) -> np.ndarray:
+    """The part of an axis from ``offset`` on, ``target`` of ``scaled`` pixels long, on as many cells."""
+    cells = array.shape[axis]
+    at = (offset + (np.arange(cells) + 0.5) / cells * target) / scaled * cells - 0.5
+    at = np.clip(at, 0, cells - 1)
+    low = np.minimum(np.floor(at).astype(int), max(cells - 2, 0))
+    share = (at - low).reshape([-1 if k == axis else 1 for k in range(array.ndim)]).astype(np.float32)
+    first, second = (np.take(array, np.minimum(low + k, cells - 1), axis) for k in (0, 1))
+    return (first * (1 - share) + second * share).astype(array.dtype)

@@ -1,0 +1,176 @@
+"""What all pipelines of diffusers have in common: how they are loaded, and how their video becomes a clip."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from dreamdrive.data.json_file import read_json
+from dreamdrive.data.photo import Photo, read_photo
+from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.errors import InputError
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.protocol import Progress
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.trajectory import Trajectory
+
+PROMPT = "The view ahead from a car that drives along a street."
+"""What pipelines that take words are told unless the user says it."""
+PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
+
+
+def class_name(folder: Path) -> str:
+    """The class of the pipeline in a folder.
+
+    Raises:
+        InputError: It is no folder of a pipeline, or the pipeline brings code of its own.
+    """
+    index = folder / "model_index.json"
+    if not index.is_file():
+        raise InputError(
+            f"--weights {folder}: expected the folder of a diffusers pipeline, with {index.name}"
+        )
+    name = read_json(index, "--weights").get("_class_name")
+    if not isinstance(name, str):
+        raise InputError(f"--weights {index} names no class of diffusers, but {name!r}")
+    return name
+
+
+def load(kind: Any, folder: Path, **options: Any) -> Any:
+    """A pipeline from its folder, on the GPU where there is one; nothing is downloaded or unpickled.
+
+    Args:
+        kind: Its class.
+        folder: The folder, with weights as ``.safetensors``.
+        options: Further arguments of ``from_pretrained``.
+
+    Raises:
+        InputError: A part is missing or of another kind.
+    """
+    gpu = torch.cuda.is_available()
+    try:
+        pipeline = kind.from_pretrained(
+            folder,
+            torch_dtype=torch.bfloat16 if gpu else torch.float32,
+            local_files_only=True,
+            use_safetensors=True,
+            **options,
+        )
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, ImportError, RuntimeError) as error:
+        raise InputError(
+            f"--weights {folder} cannot be loaded as {kind.__name__}: {_first_line(error)}; expected all its "
+            "parts with weights as .safetensors"
+        ) from error
+    pipeline.set_progress_bar_config(disable=True)
+    if gpu:
+        pipeline.enable_model_cpu_offload()
+    return pipeline
+
+
+def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
+    """What a pipeline returns.
+
+    Args:
+        pipeline: The pipeline.
+        steps: Steps of its sampler.
+        progress: Told of every step.
+        arguments: Of the call.
+
+    Raises:
+        InputError: It refuses an argument, or the GPU has not the memory.
+    """
+
+    def tell(_: object, step: int, __: object, values: dict[str, Any]) -> dict[str, Any]:
+        progress(step + 1, steps)
+        return values
+
+    try:
+        return pipeline(num_inference_steps=steps, callback_on_step_end=tell, output_type="np", **arguments)
+    except ValueError as error:
+        name = type(pipeline).__name__
+        raise InputError(f"{name} refuses what it was asked for: {_first_line(error)}") from error
+    except torch.OutOfMemoryError as error:
+        raise InputError(
+            f"the GPU's memory does not suffice ({_first_line(error)}); choose a smaller --size or fewer "
+            "--frames"
+        ) from error
+
+
+def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
+    """The picture that the video starts from.
+
+    Raises:
+        InputError: There is none, or it cannot be used.
+    """
+    if control.path is None:
+        raise InputError(f"the prior {prior} needs an input: a photo, or a recording for its first frame")
+    return read_photo(control.path, size, control.intrinsics, control.hfov_deg)
+
+
+def frame_count(control: Control, usual: int) -> int:
+    """How many frames have to be made for ``--frames``."""
+    return Selection.parse(control.frames).stop or usual
+
+
+def make_clip(
+    control: Control,
+    photo: Photo,
+    video: Float[np.ndarray, "t h w 3"],
+    rate_hz: float,
+    provenance: dict[str, Any],
+    asked: Trajectory | None = None,
+) -> Clip:
+    """The clip of a video that a model made from a photo.
+
+    Args:
+        control: Which frames are wanted, and which withheld.
+        photo: What it started from.
+        video: RGB in [0, 1], frame 0 the photo.
+        rate_hz: Frames a second.
+        provenance: What to remember; its notes come after those of the photo.
+        asked: The path that was asked for, one pose a frame of the video.
+
+    Raises:
+        InputError: The frames cannot be selected, or are not finite.
+    """
+    if not np.isfinite(video).all():
+        raise InputError(
+            "the model gave frames that hold NaN; its weights are damaged or overflow in bfloat16"
+        )
+    wanted = Selection.parse(control.frames).resolve(len(video), "the video that was made")
+    index = np.array(wanted)
+    frames = np.rint(np.clip(video[index], 0, 1) * 255).astype(np.uint8)
+    height, width = frames.shape[1:3]
+    times_s = (index - index[0]) / rate_hz
+    valid = np.ones(frames.shape[:3], dtype=bool)
+    same = (width, height) == (photo.camera.width_px, photo.camera.height_px)
+    return Clip(
+        frames=frames,
+        times_s=times_s,
+        camera=np.zeros(len(index), dtype=np.int64),
+        rig=(photo.camera.resized(width, height),),
+        valid=valid,
+        held_out=held_out_mask(len(index), control.hold_out),
+        source_index=index,
+        features={"appearance": appearance(frames, valid)},
+        known=Known(intrinsics=photo.calibrated and same),
+        requested=None if asked is None else _selected(asked, index, times_s),
+        provenance={**provenance, "notes": [*photo.notes, *provenance["notes"]]},
+    )
+
+
+def _selected(asked: Trajectory, index: np.ndarray, times_s: np.ndarray) -> Trajectory:
+    poses = asked.world_from_camera[index]
+    return Trajectory(np.linalg.inv(poses[0]) @ poses, times_s)
+
+
+def generator(seed: int) -> torch.Generator:
+    """On the CPU, so that a seed gives the same noise on every machine."""
+    return torch.Generator("cpu").manual_seed(seed)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n")[0].rstrip(".")

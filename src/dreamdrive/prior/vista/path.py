@@ -1,0 +1,41 @@
+"""A wanted path as Vista is told it: four waypoints in each round."""
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.path_to_action import from_first, waypoints
+from dreamdrive.scene.action import AT_S, Waypoints
+from dreamdrive.scene.trajectory import Trajectory
+
+
+def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last_s: float) -> list[Waypoints]:
+    """The waypoints of rounds, each from where the path is when the round starts.
+
+    Args:
+        path: The wanted path.
+        starts_s: When each round starts, from the first pose on.
+        last_s: Time of the last frame, to which the path has to lead.
+
+    Raises:
+        InputError: The path is shorter than the frames or the waypoints need, or no car drives it.
+    """
+    path = from_first(path)
+    needed_s = max(last_s, float(starts_s[-1]) + AT_S[-1])
+    if path.times_s[-1] < needed_s - 1e-6:
+        raise InputError(
+            f"trajectory: it lasts {path.times_s[-1]:.3g} s; expected at least {needed_s:.3g} s for these "
+            "frames: give a longer path or fewer --frames"
+        )
+    knots_s = np.array([0.0, *AT_S])
+    return [waypoints(Trajectory(path.at(start + knots_s), knots_s)) for start in starts_s]
+
+
+def asked_path(path: Trajectory, times_s: Float[np.ndarray, " f"]) -> Trajectory:
+    """The path at the frames of a clip, from the first of them on.
+
+    Args:
+        path: The wanted path.
+        times_s: Time of each frame since the first that is made.
+    """
+    return from_first(Trajectory(from_first(path).at(times_s), times_s))

@@ -1,0 +1,45 @@
+"""``dreamdrive prior`` and a photo through ``dreamdrive generate``."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.cli.conftest import Run
+from tests.prior.vista.photos import save_photo
+from tests.prior.vista.tiny import save_folder, save_official
+from tests.test_pipeline import shorten
+
+from dreamdrive.prior.vista.kinds import SVD, VISTA
+from dreamdrive.prior.vista.stored import open_weights
+
+
+def test_a_single_file_becomes_a_folder(run: Run, tmp_path: Path) -> None:
+    file = save_official(tmp_path / "svd.safetensors", SVD)
+    made = run("prior", "convert", file, tmp_path / "model", "--dtype", "float32")
+    assert made.code == 0, made
+    assert f"Stable Video Diffusion, for --prior svd --weights {tmp_path}/model" in made.out
+    assert "left out, not needed: the text half of CLIP, 1 tensors" in made.out
+    assert open_weights(tmp_path / "model").kind is SVD
+    again = run("prior", "convert", file, tmp_path / "model")
+    assert again.code == 2
+    assert "--force" in again.err
+    wrong = run("prior", "convert", tmp_path / "none.safetensors", tmp_path / "other")
+    assert wrong.code == 2
+    assert "does not exist" in wrong.err
+
+
+@pytest.mark.slow
+def test_a_photo_becomes_a_scene_that_claims_no_geometry(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten(monkeypatch)
+    monkeypatch.setattr("dreamdrive.prior.vista.sampler.sigmas", lambda steps: [700.0, 0.0])
+    photo, weights = save_photo(tmp_path / "photo.jpg"), save_folder(tmp_path / "model", VISTA)
+    out = tmp_path / "out"
+    asked = ("--prior", "vista", "--weights", weights, "-o", out, "--quality", "draft", "--size", "64x64")
+    made = run("generate", photo, *asked)
+    assert made.code == 0, made
+    report = json.loads((out / "report.json").read_text())
+    assert any("They hold no geometry" in note for note in report["notes"])
+    assert report["fallback"]
+    assert (out / "scene").is_dir()

@@ -1,0 +1,47 @@
+"""Photos to start from."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from tests.data.pictures import texture
+
+from dreamdrive.data.photo import read_photo
+
+
+def test_a_photo_is_cut_to_the_size_and_its_camera_with_it(tmp_path):
+    path = tmp_path / "photo.png"
+    cv2.imwrite(str(path), texture(60, 128, 0))
+    photo = read_photo(path, (64, 32), hfov_deg=90.0)
+    assert photo.rgb.shape == (32, 64, 3)
+    assert photo.camera.fx_px == pytest.approx(34)
+    assert photo.camera.cx_px == pytest.approx(32, abs=0.5)
+    assert not photo.calibrated
+    assert any("6 % of the photo was cut away" in note for note in photo.notes)
+
+
+def test_a_recording_gives_its_first_frame(tmp_path):
+    for index in range(2):
+        cv2.imwrite(str(tmp_path / f"{index}.png"), texture(32, 64, index))
+    photo = read_photo(tmp_path, (64, 32))
+    np.testing.assert_array_equal(photo.rgb[..., ::-1], texture(32, 64, 0))
+    assert any("first frame of" in note for note in photo.notes)
+
+
+def test_a_known_lens_is_taken_out(tmp_path):
+    path = tmp_path / "photo.png"
+    cv2.imwrite(str(path), texture(32, 64, 0))
+    values = {"width": 64, "height": 32, "intrinsics": {"fx": 40, "fy": 40, "cx": 31.5, "cy": 15.5}}
+    (tmp_path / "plain.json").write_text(json.dumps(values))
+    bent = values | {"distortion": {"model": "opencv", "coefficients": [-0.2, 0, 0, 0]}}
+    (tmp_path / "bent.json").write_text(json.dumps(bent))
+    plain = read_photo(path, (64, 32), tmp_path / "plain.json")
+    assert plain.calibrated
+    assert plain.camera.cx_px == 32
+    assert (read_photo(path, (64, 32), tmp_path / "bent.json").rgb != plain.rgb).any()
+
+
+def test_a_small_photo_is_said_to_be_enlarged(tmp_path):
+    cv2.imwrite(str(tmp_path / "photo.png"), texture(16, 32, 0))
+    assert any("enlarged 2.00 times" in n for n in read_photo(tmp_path / "photo.png", (64, 32)).notes)

@@ -1,0 +1,118 @@
+"""Rounds and decoding in chunks, with stand-ins for the networks, against the public code."""
+
+import itertools
+
+import pytest
+import torch
+from tests.prior.vista.conftest import Golden
+from torch import Tensor
+from torch.nn.functional import avg_pool2d
+
+from dreamdrive.prior.vista.decode import CHUNK, SHARED, chunks, decode_in_chunks
+from dreamdrive.prior.vista.kinds import SVD, VISTA
+from dreamdrive.prior.vista.rollout import SCALE, Model, Seen, roll_out, rounds_for
+from dreamdrive.prior.vista.sampler import Branches, Velocity
+
+
+def stand_in(given: dict[str, Tensor], described: list[Tensor]) -> Model:
+    """The golden README's linear networks; notes which images are described."""
+
+    def encode(images: Tensor) -> Tensor:
+        return torch.einsum("oc,bchw->bohw", given["enc"], avg_pool2d(images, 2))
+
+    def decode(latents: Tensor) -> Tensor:
+        small = torch.einsum("oc,bchw->bohw", given["dec"], latents)
+        large = small.repeat_interleave(2, 2).repeat_interleave(2, 3)
+        return large + 0.01 * torch.arange(len(latents))[:, None, None, None]
+
+    def describe(images: Tensor) -> Tensor:
+        described.append(images)
+        return images.mean(dim=(0, 2, 3))
+
+    def velocity(seen: Seen) -> Velocity:
+        def answer(x: Tensor, time: float, mask: Tensor) -> Branches:
+            rest = 0.05 * time + 0.1 * mask[:, None, None, None]
+            made = [
+                torch.einsum(
+                    "oc,bchw->bohw", given["net"], torch.cat([x, (on * seen.latent).expand_as(x)], 1)
+                )
+                + 0.1 * on * seen.image.mean()
+                + rest
+                for on in (0, 1)
+            ]
+            return made[0], made[1]
+
+        return answer
+
+    return Model(encode, decode, describe, velocity)
+
+
+@pytest.mark.parametrize("rounds", [1, 3])
+def test_rounds(golden: Golden, rounds: int) -> None:
+    given, described = golden.tensors("rollout_standin"), list[Tensor]()
+    model = stand_in(given, described)
+    noise = given[f"r{rounds}.noise"]
+    told: list[None] = []
+    made = roll_out(
+        model, VISTA, given["images"][:1], noise, [None] * rounds, 4, tell=lambda: told.append(None)
+    )
+    assert len(told) == 4 * rounds
+    # Latents reach 44 and frames 240 after three rounds; the differences are those of float32.
+    torch.testing.assert_close(made, given[f"r{rounds}.latents"], atol=2e-5, rtol=5e-6)
+    torch.testing.assert_close(torch.cat(described), given[f"r{rounds}.cond_img"], atol=1e-4, rtol=0)
+    frames = (decode_in_chunks(model.decode, made / SCALE) + 1) / 2
+    torch.testing.assert_close(frames.clamp(0, 1), given[f"r{rounds}.frames"], atol=1e-4, rtol=0)
+
+
+@pytest.mark.parametrize("count", [14, 25, 47])
+def test_chunks_overlap_by_their_mean(golden: Golden, count: int) -> None:
+    given = golden.tensors("rollout_standin")
+    model = stand_in(given, [])
+    made = decode_in_chunks(model.decode, given[f"decode_in_{count}"] / SCALE)
+    torch.testing.assert_close(made, given[f"decode_out_{count}"], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 4, 14])
+@pytest.mark.parametrize("count", [1, 3, 14, 25, 47])
+def test_chunks_cover_all_frames(count: int, chunk: int) -> None:
+    parts = chunks(count, chunk)
+    assert {i for part in parts for i in part} == set(range(count))
+    assert all(0 < len(part) <= chunk for part in parts)
+    assert all(
+        first.stop - second.start == min(SHARED, chunk - 1) for first, second in itertools.pairwise(parts)
+    )
+    latents = torch.randn(count, 4, 2, 2)
+    made = decode_in_chunks(lambda z: z[:, :3], latents, chunk)
+    torch.testing.assert_close(made, latents[:, :3])
+
+
+def test_first_and_second_chunk_are_vistas() -> None:
+    assert chunks(25, CHUNK) == [range(0, 14), range(11, 25)]
+
+
+def test_rounds_for_so_many_frames() -> None:
+    assert [rounds_for(n, VISTA, 25) for n in (2, 25, 26, 47, 48, 69)] == [1, 1, 2, 2, 3, 3]
+    assert rounds_for(25, SVD, 25) == 1
+
+
+def test_leading_frames_stay_and_svd_fixes_none() -> None:
+    images = torch.rand(3, 3, 4, 6) * 2 - 1
+    seen: list[Tensor] = []
+
+    def velocity(conditions: Seen) -> Velocity:
+        def answer(x: Tensor, time: float, mask: Tensor) -> Branches:
+            seen.append(mask)
+            return x, x
+
+        return answer
+
+    def encode(images: Tensor) -> Tensor:
+        return avg_pool2d(images, 2)
+
+    model = Model(encode, encode, lambda image: image.mean(dim=(0, 2, 3)), velocity)
+    noise = torch.randn(1, 5, 3, 2, 3)
+    made = roll_out(model, VISTA, images, noise, [None], 2)
+    torch.testing.assert_close(made[:3], SCALE * encode(images))
+    assert seen[0].tolist() == [1, 1, 1, 0, 0]
+    roll_out(model, SVD, images[:1], noise, [None], 2)
+    assert not seen[-1].any()

@@ -1,0 +1,85 @@
+"""Noise levels, guidance and Euler's rule against the public code."""
+
+import pytest
+import torch
+from tests.prior.vista.conftest import Golden
+from tests.prior.vista.golden import Given, golden_unet
+from torch import Tensor
+
+from dreamdrive.prior.vista.sampler import (
+    Branches,
+    Fixed,
+    Schedule,
+    Velocity,
+    denoise,
+    guidance,
+    sample,
+    sigmas,
+)
+
+NAMES: dict[str, Schedule] = {"VanillaCFG": "constant", "TrianglePredictionGuider": "triangle"}
+
+
+@pytest.mark.parametrize("steps", [5, 10, 25, 50])
+def test_noise_levels(golden: Golden, steps: int) -> None:
+    expected = golden.tensors("sampler")[f"sigmas_{steps}"]
+    torch.testing.assert_close(torch.tensor(sigmas(steps)), expected, atol=0, rtol=4e-6)
+
+
+def test_guidance(golden: Golden) -> None:
+    given = golden.tensors("sampler")
+    for frames in (14, 25):
+        torch.testing.assert_close(guidance("triangle", frames), given[f"triangle_scale_{frames}"][0])
+        # The public ramp ends at 2.5, which nothing uses; that of SVD ends at 3.
+        ramp = 1 + (guidance("linear", frames) - 1) * 1.5 / 2
+        torch.testing.assert_close(ramp, given[f"linear_scale_{frames}"][0])
+
+
+@pytest.mark.parametrize("guider", ["VanillaCFG", "TrianglePredictionGuider", "LinearPredictionGuider"])
+@pytest.mark.parametrize(("name", "known"), [("none", []), ("c0", [0]), ("c012", [0, 1, 2])])
+def test_runs_with_a_linear_network(golden: Golden, guider: str, name: str, known: list[int]) -> None:
+    given = golden.tensors("sampler")
+    mask = torch.zeros(25)
+    mask[known] = 1
+    entered: list[Tensor] = []
+
+    def velocity(x: Tensor, time: float, fixed: Tensor) -> Branches:
+        plain = torch.einsum("oc,bchw->bohw", given["lin_A"], x) + 0.05 * time
+        plain = plain + 0.1 * fixed[:, None, None, None]
+        entered.append(x)
+        return plain, plain + 0.2 * given["ctx"][:, :, None, None]
+
+    scale = guidance(NAMES[guider], 25) if guider in NAMES else given["linear_scale_25"][0]
+    made = sample(velocity, given["noise"], scale, Fixed(mask, given["cond_frame"]), 5)
+    torch.testing.assert_close(made, given[f"{guider}.{name}.out"], atol=2e-5, rtol=0)
+    for x, sigma, expected in zip(entered, sigmas(5), given[f"{guider}.{name}.x_in"], strict=False):
+        torch.testing.assert_close(x * (sigma**2 + 1) ** 0.5, expected, atol=2e-5, rtol=1e-5)
+
+
+def tiny_velocity(golden: Golden, given: dict[str, Tensor]) -> Velocity:
+    unet = golden_unet(golden)
+    unet.add_time_proj = Given(given["vector"][0])  # type: ignore[assignment]
+
+    def velocity(x: Tensor, time: float, mask: Tensor) -> Branches:
+        made: list[Tensor] = []
+        for on in (0.0, 1.0):
+            both = torch.cat([x, on * given["concat"].expand(len(x), -1, -1, -1)], dim=1)
+            made.append(unet(both[None], time, on * given["crossattn"], torch.zeros(1, 3), mask)[0])
+        return made[0], made[1]
+
+    return velocity
+
+
+def test_runs_with_a_tiny_unet(golden: Golden) -> None:
+    given = golden.tensors("sampler_tiny_unet")
+    velocity, frames = tiny_velocity(golden, given), len(given["noise"])
+    mask = torch.zeros(frames)
+    mask[0] = 1
+    constant = guidance("constant", frames)
+    clean = denoise(velocity, given["denoise_sigma3_in"], 3.0, torch.ones(frames), mask)
+    torch.testing.assert_close(clean, given["denoise_sigma3_out"], atol=1e-5, rtol=0)
+    made = sample(velocity, given["noise"], constant, Fixed(mask, given["cond_frame"]), 4)
+    torch.testing.assert_close(made, given["out.vanilla_c0"], atol=5e-5, rtol=0)
+    mask[:3] = 1
+    made = sample(velocity, given["noise"], guidance("triangle", frames), Fixed(mask, given["cond_frame"]), 4)
+    torch.testing.assert_close(made, given["out.triangle_c012"], atol=5e-5, rtol=0)
