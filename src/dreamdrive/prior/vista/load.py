@@ -33,5 +33,5 @@ def start(
     half = device.type == "cuda"
     free = torch.cuda.mem_get_info()[0] if half else available_bytes()
     count = int(stored.parts["unet"].config.get("num_frames", 25))
-    plan = plan_memory(stored, size, frames or count, count, free, half=half)
+    plan = plan_memory(stored, size, max(frames or 0, count), count, free, half=half)
     return Networks(stored, device, half=half), plan, count

@@ -1,11 +1,12 @@
 """A photo, or a few leading frames, becomes a clip. Importing this loads diffusers."""
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from dreamdrive.data import read_trajectory
@@ -23,7 +24,7 @@ from dreamdrive.prior.vista.memory import Plan
 from dreamdrive.prior.vista.path import asked_path, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
-from dreamdrive.scene.action import Goal
+from dreamdrive.scene.action import Action, Goal
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory
@@ -100,18 +101,19 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
 
 
 def _stop(frames: str | None) -> int | None:
-    """Frames that are made at most, as far as the selection alone tells."""
-    return Selection.parse(frames).stop
+    """Frames that are made, as far as the selection alone tells."""
+    stop = Selection.parse(frames).stop
+    return None if stop is None else min(stop, _MOST_FRAMES)
 
 
-def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
+def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, " f"]:
     """Indices of the frames to keep, among all that are made."""
     selection = Selection.parse(frames)
     if selection.needs_count:
         raise InputError(f"--frames {frames}: count from the first frame; there is no last one")
     if selection.stop is None:
         selection = replace(selection, stop=max(per_round, selection.start + per_round))
-    wanted = np.array(list(selection.resolve(None, "the generated clip")), dtype=np.int64)
+    wanted = selection.resolve(None, "the generated clip")
     if kind.overlap == 0 and wanted[-1] >= per_round:
         raise InputError(
             f"--frames {frames}: {kind.title} makes {per_round} frames and cannot go on from them; give "
@@ -119,10 +121,10 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> np.ndarray:
         )
     if len(wanted) < 2 or wanted[-1] >= _MOST_FRAMES:
         raise InputError(
-            f"--frames {frames} asks for {len(wanted)} frames up to number {wanted[-1]}; expected two or more "
-            f"below {_MOST_FRAMES}"
+            f"--frames {frames} asks for {len(wanted)} frames up to number {wanted[-1]}; expected two or "
+            f"more below {_MOST_FRAMES}"
         )
-    return wanted
+    return np.array(wanted, dtype=np.int64)
 
 
 def _actions(
@@ -153,7 +155,7 @@ def _sample(
     per_round: int,
     plan: Plan,
     seed: int,
-    tell: Any,
+    tell: Callable[[], None],
 ) -> Float[Tensor, "f c h w"]:
     """Latents of all frames; noise is drawn on the CPU, so that it is the same everywhere."""
     draw = torch.Generator().manual_seed(seed)
@@ -219,6 +221,6 @@ def _provenance(
     }
 
 
-def _named(action: Any) -> dict[str, Any]:
+def _named(action: Action) -> dict[str, Any]:
     values = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(action).items()}
     return {"kind": type(action).__name__.lower(), **values}
