@@ -16,7 +16,8 @@ def generate(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     prior: Annotated[
-        Literal["replay", "street-world"] | None, arg(metavar="NAME", help_behavior_hint="")
+        Literal["replay", "street-world", "magicdrive", "magicdrive-t"] | None,
+        arg(metavar="NAME", help_behavior_hint=""),
     ] = None,
     geometry: Annotated[
         Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"], arg(metavar="NAME")
@@ -47,8 +48,9 @@ def generate(
     Args:
         input: A video, a folder of images or a layout as JSON; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
-        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own. Without
-            it the input decides.
+        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own;
+            magicdrive and magicdrive-t are networks that make six cameras from a layout. Without it the input
+            decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a

@@ -5,11 +5,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dreamdrive.errors import InputError
+from dreamdrive.prior.magicdrive import MAGICDRIVE, MAGICDRIVE_T
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.replay import REPLAY, replay
 from dreamdrive.prior.street_world import STREET_WORLD, street_world
 
-PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in (REPLAY, STREET_WORLD)})
+PRIORS: Mapping[str, Prior] = MappingProxyType(
+    {prior.name: prior for prior in (REPLAY, STREET_WORLD, MAGICDRIVE, MAGICDRIVE_T)}
+)
 """Every prior by the name that ``--prior`` takes."""
 
 
