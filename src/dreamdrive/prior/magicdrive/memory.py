@@ -6,10 +6,13 @@ from torch import nn
 from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.config import Settings
 
-_UNET_TENSORS = 32
-"""Features of the UNet's first level that live at once, in tensors of its width, ControlNet included."""
-_DECODED_CHANNELS = 2000
-"""Channels of the VAE's decoder that live at once, per pixel of the picture."""
+_UNET_TENSORS = 33
+"""Tensors of the UNet's first level that live at once, residuals included: counted at the official sizes,
+without the weights of attention, which torch does not keep."""
+_DECODED_CHANNELS = 800
+"""Channels that live at once in the decoder, per pixel of the picture: counted likewise."""
+_PROGRAM_BYTES = 1_000_000_000
+"""Of Python, the libraries and what convolutions set aside; a guess."""
 DECODE_PICTURES = 2
 """Pictures that are decoded at a time."""
 
@@ -27,7 +30,7 @@ def needed_bytes(networks: list[nn.Module], settings: Settings, width: int, elem
     parameters = sum(each.numel() for network in networks for each in network.parameters())
     branch = _UNET_TENSORS * width * (pixels // 64) * settings.views * settings.frames
     decoding = _DECODED_CHANNELS * pixels * DECODE_PICTURES
-    return element_bytes * (parameters + max(branch, decoding))
+    return element_bytes * (parameters + max(branch, decoding)) + _PROGRAM_BYTES
 
 
 def check_memory(needed: int, device: torch.device) -> None:

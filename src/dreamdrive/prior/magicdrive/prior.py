@@ -79,8 +79,8 @@ def _make(
 
     parts = read_parts(weights, temporal=temporal)
     if wanted is None:
-        frames = parts.settings.frames
-        wanted = np.array(Selection.parse(control.frames).resolve(frames, "the clip of these weights"))
+        selection = Selection.parse(control.frames)
+        wanted = np.array(selection.resolve(parts.settings.frames, "the clip of these weights"))
     steps = STEPS if control.steps is None else control.steps
     run = Run(layout, parts, prompt_of(control.prompt), steps, control.seed, rate_hz)
     held_out = np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS)
@@ -165,7 +165,7 @@ MAGICDRIVE = Prior(
     gives=_GIVES,
     about="six cameras from a layout by MagicDrive, each time step by itself",
     licence=_LICENCE,
-    memory="6.5 GB on a CPU (float32) for 400x224, 3.5 GB on a GPU (half precision), estimated",
+    memory="for 400x224 about 7.5 GB on a CPU (float32), 4.5 GB on a GPU (half precision)",
     weights=EXPECTED,
     package="diffusers",
     install=_INSTALL,
@@ -177,7 +177,7 @@ MAGICDRIVE_T = Prior(
     gives=_GIVES,
     about="six cameras from a layout by MagicDrive-t, 16 time steps together",
     licence=_LICENCE,
-    memory="12 GB on a CPU (float32), 6 GB on a GPU (half precision), estimated",
+    memory="about 13 GB on a CPU (float32), 7 GB on a GPU (half precision)",
     weights=EXPECTED,
     package="diffusers",
     install=_INSTALL,

@@ -1,5 +1,6 @@
 """Sampling: UniPC with guidance, each branch by itself to save memory, and the decoder in chunks."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -70,7 +71,9 @@ def unipc(table: dict[str, Any], steps: int, device: torch.device | str = "cpu")
     scheduler = UniPCMultistepScheduler(
         **schedule, solver_order=2, solver_type="bh2", final_sigmas_type="sigma_min"
     )
-    scheduler.set_timesteps(steps, device=device)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of how diffusers hands a tensor to NumPy
+        scheduler.set_timesteps(steps, device=device)
     return scheduler
 
 
