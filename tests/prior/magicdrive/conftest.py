@@ -1,6 +1,8 @@
-"""Tiny weights, a street, and upstream's numbers."""
+"""Tiny weights and upstream's numbers."""
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +11,17 @@ from safetensors.torch import load_file
 from tests.prior.magicdrive.tiny import Written, write_folder
 from torch import Tensor
 
-from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import draw_street
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """To be read only."""
+    return write_folder(tmp_path_factory.mktemp("magicdrive") / "weights")
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Written:
-    return write_folder(tmp_path / "magicdrive")
-
-
-@pytest.fixture
-def street(tmp_path: Path) -> Path:
-    path = tmp_path / "street.json"
-    write_layout(draw_street(3), path)
-    return path
+def folder(written: Written, tmp_path: Path) -> Written:
+    """A copy."""
+    return replace(written, path=Path(shutil.copytree(written.path, tmp_path / "magicdrive")))
 
 
 @pytest.fixture(scope="session")

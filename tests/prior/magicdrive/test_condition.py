@@ -1,5 +1,6 @@
 """What the networks are told of a layout."""
 
+import itertools
 from typing import get_args
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 from torch import Tensor
 
 from dreamdrive.data.world import draw_street
+from dreamdrive.data.world.drive import ego_poses
 from dreamdrive.data.world.world import upright
 from dreamdrive.errors import InputError
-from dreamdrive.prior.magicdrive.boxes import CLASSES, KINDS, as_published, box_corners
+from dreamdrive.prior.magicdrive.boxes import CLASSES, KINDS, as_published, box_corners, layout_boxes
 from dreamdrive.prior.magicdrive.cameras import (
     NUSCENES,
     car_from_camera,
@@ -20,7 +22,18 @@ from dreamdrive.prior.magicdrive.cameras import (
 )
 from dreamdrive.prior.magicdrive.condition import prompt_of, see
 from dreamdrive.prior.magicdrive.raster import AREAS, CHANNELS, LINES, draw_map
-from dreamdrive.scene.layout import Area, AreaKind, Box, BoxKind, Ego, Layout, Line, LineKind, TrackPoint
+from dreamdrive.scene.layout import (
+    Area,
+    AreaKind,
+    Box,
+    BoxKind,
+    Ego,
+    Layout,
+    Line,
+    LineKind,
+    TrackPoint,
+    track_function,
+)
 
 EAST = Ego([TrackPoint(0.0, 0.0, 0.0, 0.0), TrackPoint(1.0, 10.0, 0.0, 0.0)])
 NOW = np.zeros(1)
@@ -103,6 +116,23 @@ def test_golden_corners(golden: dict[str, Tensor]) -> None:
     poses[:, 2, 3] = given[:, 2]
     corners = box_corners(poses, given[:, [4, 3, 5]])
     np.testing.assert_allclose(corners, golden["in.boxes_corners_all"].reshape(-1, 8, 3), atol=1e-5)
+
+
+def test_the_front_camera_sees_boxes_where_that_of_the_street_world_does() -> None:
+    layout = draw_street(4)
+    front = np.linalg.inv(ego_poses(Ego(layout.ego.track, NUSCENES[0].place_m[2]), np.array([0.7]))[0])
+    lidar_from_map = np.linalg.inv(map_from_car(layout.ego, np.array([0.7]))[0] @ car_from_lidar())
+    camera_from_lidar = np.linalg.inv(car_from_camera(NUSCENES[0])) @ car_from_lidar()
+    corners, _ = layout_boxes(layout, lidar_from_map, 0.7)
+    assert len(corners) == len(layout.boxes) > 3
+    for box, seen in zip(layout.boxes, corners, strict=True):
+        pose = front @ upright(track_function(box.track)(np.array([0.7]))[0])
+        length, width, height = box.size_m
+        ends = itertools.product((-length / 2, length / 2), (-width / 2, width / 2), (0, height))
+        wanted = np.array([pose @ [*end, 1] for end in ends])[:, :3]
+        got = seen @ camera_from_lidar[:3, :3].T + camera_from_lidar[:3, 3]
+        apart = np.linalg.norm(got[:, None] - wanted, axis=-1)
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-9
 
 
 def test_boxes_are_told_half_their_height_too_high() -> None:

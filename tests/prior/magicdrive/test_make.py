@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.prior.magicdrive.tiny import SIZE, write_folder
+from tests.prior.magicdrive.tiny import SIZE, Written, write_folder
 
 from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.world import draw_street
@@ -22,13 +22,11 @@ MAGICDRIVE_T = choose_prior("magicdrive-t")
 
 
 @pytest.fixture(scope="module")
-def inputs(tmp_path_factory: pytest.TempPathFactory) -> Control:
+def inputs(written: Written, tmp_path_factory: pytest.TempPathFactory) -> Control:
     """A layout, weights and the smallest run."""
-    path = tmp_path_factory.mktemp("magicdrive")
-    write_layout(draw_street(3), path / "street.json")
-    return Control(
-        path / "street.json", weights=write_folder(path / "weights").path, frames="0:1", steps=1, fps=2.0
-    )
+    layout = tmp_path_factory.mktemp("layout") / "street.json"
+    write_layout(draw_street(3), layout)
+    return Control(layout, weights=written.path, frames="0:1", steps=1, fps=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -157,3 +155,12 @@ def test_importing_the_priors_loads_no_network_library() -> None:
     code = "import sys, dreamdrive.prior; print({'diffusers', 'transformers'} & set(sys.modules))"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "set()"
+
+
+def test_a_missing_package_is_named(inputs: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("dreamdrive.prior.magicdrive.")]:
+        if name.rsplit(".", 1)[1] in ("folder", "run"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "transformers", None)
+    with pytest.raises(InputError, match=r"cannot start .*transformers.*video-prior"):
+        MAGICDRIVE(inputs)

@@ -93,5 +93,5 @@ def _rounded(values: np.ndarray) -> Float32[np.ndarray, "..."]:
 
 def prompt_of(description: str | None) -> str:
     """The sentence that the networks were taught with."""
-    words = (description or DESCRIPTION).strip().rstrip(".")
+    words = (DESCRIPTION if description is None else description).strip().rstrip(".")
     return f"A driving scene image at {LOCATION}. {words}."

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from dreamdrive.errors import InputError
+from dreamdrive.prior.magicdrive.boxes import CLASSES
+from dreamdrive.prior.magicdrive.cameras import NUSCENES, crop
+from dreamdrive.prior.magicdrive.raster import CHANNELS
 
 EXPECTED = (
     "a folder with unet/ and controlnet/ of MagicDrive (of MagicDrive-t for --prior magicdrive-t) and "
@@ -12,7 +15,7 @@ EXPECTED = (
 KEY_FRAMES = 6
 """Every so many frames of the temporal variant is a key frame."""
 
-PLAIN_SD = "this is plain Stable Diffusion; expected MagicDrive's own unet/ and controlnet/"
+_PLAIN_SD = "this is plain Stable Diffusion; expected MagicDrive's own unet/ and controlnet/"
 _UNET = {
     "neighboring_attn_type": ("add",),
     "crossview_attn_type": ("basic",),
@@ -87,31 +90,49 @@ def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
         InputError: Plain Stable Diffusion, or a variant that is not built here.
     """
     if "neighboring_view_pair" not in unet:
-        raise InputError(f"unet/config.json has no neighboring_view_pair: {PLAIN_SD}")
+        raise InputError(f"unet/config.json has no neighboring_view_pair: {_PLAIN_SD}")
     if "bbox_embedder_param" not in controlnet:
-        raise InputError(f"controlnet/config.json has no bbox_embedder_param: {PLAIN_SD}")
+        raise InputError(f"controlnet/config.json has no bbox_embedder_param: {_PLAIN_SD}")
+    try:
+        settings = _settings(unet, controlnet)
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        what = f"{type(error).__name__}: {error}"
+        raise InputError(f"config.json of unet/ or controlnet/ is not one of MagicDrive ({what})") from None
+    channels, *cells = settings.map_shape
+    if channels != len(CHANNELS) or len(set(cells)) != 1:
+        raise InputError(
+            f"controlnet/config.json: the map is {settings.map_shape}; only square maps of the "
+            f"{len(CHANNELS)} channels {', '.join(CHANNELS)} are drawn here"
+        )
+    if settings.box_classes != len(CLASSES):
+        raise InputError(
+            f"controlnet/config.json: n_classes is {settings.box_classes}; expected {len(CLASSES)}"
+        )
+    crop(settings.size)  # complains where pictures of that size are no part of the cameras'
+    return settings
+
+
+def _settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
     boxes = controlnet["bbox_embedder_param"]
     _refuse_others("unet/config.json", unet, _UNET)
     _refuse_others("controlnet/config.json", controlnet, _CONTROLNET)
     _refuse_others("controlnet/config.json, bbox_embedder_param", boxes, _BOXES)
     _refuse_others("controlnet/config.json, cam_embedder_param", controlnet["cam_embedder_param"], _CAMERA)
-    try:
-        height, width = (int(side) for side in unet["img_size"])
-        pooled, shape, widths = _map_encoder(controlnet)
-        return Settings(
-            size=(width, height),
-            map_shape=shape,
-            map_widths=widths,
-            map_pooled=pooled,
-            box_classes=boxes["n_classes"],
-            box_class_width=boxes["class_token_dim"],
-            box_widths=tuple(boxes["proj_dims"]),
-            views=_ring(unet["neighboring_view_pair"]),
-            temporal=_temporal(unet),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        what = f"{type(error).__name__}: {error}"
-        raise InputError(f"config.json of unet/ or controlnet/ is not one of MagicDrive ({what})") from None
+    height, width = (int(side) for side in unet["img_size"])
+    pooled, shape, widths = _map_encoder(controlnet)
+    return Settings(
+        size=(width, height),
+        map_shape=shape,
+        map_widths=widths,
+        map_pooled=pooled,
+        box_classes=boxes["n_classes"],
+        box_class_width=boxes["class_token_dim"],
+        box_widths=tuple(boxes["proj_dims"]),
+        views=_ring(unet["neighboring_view_pair"]),
+        temporal=_temporal(unet),
+    )
 
 
 def _map_encoder(
@@ -133,8 +154,11 @@ def _ring(neighbours: dict[str, list[int]]) -> int:
     """Number of cameras, each of which sees the one before and the one after it."""
     count = len(neighbours)
     ring = {str(i): [(i - 1) % count, (i + 1) % count] for i in range(count)}
-    if ring != neighbours:
-        raise InputError("unet/config.json: neighboring_view_pair is no ring of cameras")
+    if ring != neighbours or count != len(NUSCENES):
+        raise InputError(
+            f"unet/config.json: neighboring_view_pair is {neighbours}; "
+            f"expected a ring of {len(NUSCENES)} cameras"
+        )
     return count
 
 

@@ -114,7 +114,7 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
         vae = _built("vae", lambda: AutoencoderKL(**plain_settings(AutoencoderKL, configs["vae"])))
     # Not on the meta device: it has a buffer that no file holds.
     encoder = _built("text_encoder", lambda: CLIPTextModel(CLIPTextConfig.from_dict(configs["text_encoder"])))
-    _check_fit(settings, unet, controlnet, vae, encoder)
+    _check_fit(settings, controlnet, vae, encoder)
     width = configs["unet"]["block_out_channels"][0]
     check_memory(needed_bytes([unet, controlnet, vae, encoder], settings, width, dtype.itemsize), device)
 
@@ -168,11 +168,12 @@ def _check_variant(settings: Settings, temporal: bool) -> None:
 
 
 def _check_fit(
-    settings: Settings, unet: nn.Module, controlnet: BevControlNet, vae: AutoencoderKL, encoder: CLIPTextModel
+    settings: Settings, controlnet: BevControlNet, vae: AutoencoderKL, encoder: CLIPTextModel
 ) -> None:
     """The parts belong together, as far as shapes tell."""
     width, height = settings.size
     stride = vae_stride(vae)
+    latents = (height / stride, width / stride)
     wanted = controlnet.cam2token.out_features
     if encoder.config.hidden_size != wanted:
         raise InputError(
@@ -181,13 +182,10 @@ def _check_fit(
         )
     with torch.device("meta"):
         encoded = controlnet.controlnet_cond_embedding(torch.zeros(1, *settings.map_shape))
-    if (height % stride, width % stride) != (0, 0) or encoded.shape[2:] != (
-        height // stride,
-        width // stride,
-    ):
+    if tuple(encoded.shape[2:]) != latents:
         raise InputError(
-            f"unet/config.json says pictures of {width}x{height}, whose latents are {width / stride:g}x"
-            f"{height / stride:g}, but controlnet/ brings the map to {encoded.shape[3]}x{encoded.shape[2]}; "
+            f"unet/config.json says pictures of {width}x{height}, whose latents are {latents[1]:g}x"
+            f"{latents[0]:g}, but controlnet/ brings the map to {encoded.shape[3]}x{encoded.shape[2]}; "
             f"expected two folders of one model"
         )
 
@@ -241,5 +239,5 @@ def _read_table(file: Path) -> dict[str, Any]:
 def _tokenizer(folder: Path) -> CLIPTokenizer:
     try:
         return CLIPTokenizer.from_pretrained(str(folder), local_files_only=True)
-    except Exception as error:  # noqa: BLE001  its library raises nothing narrower
-        raise InputError(f"{folder} is no tokenizer of CLIP ({error}); expected {EXPECTED}") from None
+    except Exception as error:  # its library raises nothing narrower
+        raise InputError(f"{folder} is no tokenizer of CLIP ({error}); expected {EXPECTED}") from error

@@ -74,9 +74,11 @@ def _make(
     layout, weights = _inputs(control)
     if wanted is not None:
         held_out_mask(len(wanted), control.hold_out)  # complains before anything is loaded
-    from dreamdrive.prior.magicdrive.folder import read_parts
-    from dreamdrive.prior.magicdrive.run import Run, generate
-
+    try:
+        from dreamdrive.prior.magicdrive.folder import read_parts
+        from dreamdrive.prior.magicdrive.run import Run, generate
+    except ImportError as error:
+        raise InputError(f"the prior magicdrive cannot start ({error}): {_INSTALL}") from None
     parts = read_parts(weights, temporal=temporal)
     if wanted is None:
         selection = Selection.parse(control.frames)
