@@ -16,7 +16,17 @@ def generate(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     prior: Annotated[
-        Literal["replay", "street-world", "svd", "vista", "cosmos", "diffusers"] | None,
+        Literal[
+            "replay",
+            "street-world",
+            "svd",
+            "vista",
+            "magicdrive",
+            "magicdrive-t",
+            "cosmos",
+            "diffusers",
+        ]
+        | None,
         arg(metavar="NAME", help_behavior_hint=""),
     ] = None,
     geometry: Annotated[

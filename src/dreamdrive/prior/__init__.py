@@ -7,12 +7,13 @@ from types import MappingProxyType
 from dreamdrive.errors import InputError
 from dreamdrive.prior.cosmos import COSMOS
 from dreamdrive.prior.diffusers_i2v import DIFFUSERS
+from dreamdrive.prior.magicdrive import MAGICDRIVE, MAGICDRIVE_T
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.replay import REPLAY, replay
 from dreamdrive.prior.street_world import STREET_WORLD, street_world
 from dreamdrive.prior.vista import SVD, VISTA
 
-_ALL = (REPLAY, STREET_WORLD, SVD, VISTA, COSMOS, DIFFUSERS)
+_ALL = (REPLAY, STREET_WORLD, SVD, VISTA, MAGICDRIVE, MAGICDRIVE_T, COSMOS, DIFFUSERS)
 PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in _ALL})
 """Every prior by the name that ``--prior`` takes."""
 

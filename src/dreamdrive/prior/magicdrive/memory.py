@@ -1,0 +1,60 @@
+"""Whether a run fits into memory, before anything is loaded."""
+
+import torch
+from torch import nn
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.magicdrive.config import Settings
+
+_UNET_TENSORS = 33
+"""Tensors of the UNet's first level that live at once, residuals included: counted at the official sizes,
+without the weights of attention, which torch does not keep."""
+_DECODED_CHANNELS = 800
+"""Channels that live at once in the decoder, per pixel of the picture: counted likewise."""
+_PROGRAM_BYTES = 1_000_000_000
+"""Of Python, the libraries and what convolutions set aside; a guess."""
+DECODE_PICTURES = 2
+"""Pictures that are decoded at a time."""
+
+
+def needed_bytes(networks: list[nn.Module], settings: Settings, width: int, element_bytes: int) -> int:
+    """Estimate of the peak: all weights, and the larger of one denoising branch and one chunk of the decoder.
+
+    Args:
+        networks: All of them; their parameters may be on the meta device.
+        settings: Pictures' size, cameras, frames.
+        width: Channels of the UNet's first level.
+        element_bytes: Of one number, 2 or 4.
+    """
+    pixels = settings.size[0] * settings.size[1]
+    parameters = sum(each.numel() for network in networks for each in network.parameters())
+    branch = _UNET_TENSORS * width * (pixels // 64) * settings.views * settings.frames
+    decoding = _DECODED_CHANNELS * pixels * DECODE_PICTURES
+    return element_bytes * (parameters + max(branch, decoding)) + _PROGRAM_BYTES
+
+
+def check_memory(needed: int, device: torch.device) -> None:
+    """Refuse what cannot fit.
+
+    Raises:
+        InputError: More is needed than is free.
+    """
+    free = free_bytes(device)
+    if free is not None and needed > free:
+        where = "the GPU" if device.type == "cuda" else "this machine"
+        raise InputError(
+            f"MagicDrive needs about {needed / 1e9:.1f} GB with these weights, and {where} has "
+            f"{free / 1e9:.1f} GB free; close other programs or take a larger machine"
+        )
+
+
+def free_bytes(device: torch.device) -> int | None:
+    """Memory that is free for use on a device; None where the system does not tell."""
+    if device.type == "cuda":
+        return torch.cuda.mem_get_info(device)[0]
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        return int(lines["MemAvailable"].split()[0]) * 1024
+    except (OSError, KeyError, ValueError):
+        return None

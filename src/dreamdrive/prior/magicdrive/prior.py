@@ -1,0 +1,186 @@
+"""The priors ``magicdrive`` and ``magicdrive-t``: six cameras from a layout (Gao et al., ICLR 2024)."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.data.layout_file import read_layout
+from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.errors import InputError
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.magicdrive.cameras import NUSCENES, car_from_camera, map_from_car, rig
+from dreamdrive.prior.magicdrive.condition import prompt_of
+from dreamdrive.prior.magicdrive.config import EXPECTED
+from dreamdrive.prior.magicdrive.raster import check_map
+from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.layout import Layout
+from dreamdrive.scene.trajectory import Trajectory
+
+RATE_HZ = 12.0
+"""Rate that the temporal variant was trained at, and that of single time steps unless told."""
+TIME_STEPS = 16
+"""Time steps unless ``control.frames`` says where to stop."""
+STEPS = 20
+"""Steps of the sampler unless told."""
+MOST_STEPS = 1000
+"""Those of the training."""
+CAMERAS = len(NUSCENES)
+
+
+def magicdrive(control: Control, progress: Progress = silent) -> Clip:
+    """Six pictures of every time step, each time step sampled by itself.
+
+    Args:
+        control: Layout, weights, time steps and their rate, description, sampler steps, seed, withheld time
+            steps.
+        progress: Told of every sampler step and every decoded time step.
+
+    Raises:
+        InputError: The layout or the weights cannot be used, or they do not fit into memory.
+    """
+    selection = Selection.parse(control.frames)
+    if selection.stop is None:
+        selection = replace(selection, stop=max(TIME_STEPS, selection.start + TIME_STEPS))
+    wanted = selection.resolve(TIME_STEPS if selection.needs_count else None, "the drive")
+    rate = RATE_HZ if control.fps is None else control.fps
+    if not rate > 0:
+        raise InputError(f"--fps {rate:g}: expected more than 0")
+    return _make(control, progress, np.array(wanted), rate, temporal=False)
+
+
+def magicdrive_t(control: Control, progress: Progress = silent) -> Clip:
+    """Six pictures of every time step, all time steps sampled together.
+
+    Args:
+        control: Layout, weights, time steps, description, sampler steps, seed, withheld time steps. Always
+            sampled is the whole length of the weights, at 12 Hz from the layout's time 0.
+        progress: Told of every sampler step and every decoded time step.
+
+    Raises:
+        InputError: The layout or the weights cannot be used, or they do not fit into memory.
+    """
+    return _make(control, progress, None, RATE_HZ, temporal=True)
+
+
+def _make(
+    control: Control, progress: Progress, wanted: np.ndarray | None, rate_hz: float, *, temporal: bool
+) -> Clip:
+    """The clip; ``wanted`` are the time steps, None where the weights say how many there are."""
+    layout, weights = _inputs(control)
+    if wanted is not None:
+        held_out_mask(len(wanted), control.hold_out)  # complains before anything is loaded
+    try:
+        from dreamdrive.prior.magicdrive.folder import read_parts
+        from dreamdrive.prior.magicdrive.run import Run, generate
+    except ImportError as error:
+        raise InputError(f"the prior magicdrive cannot start ({error}): {_INSTALL}") from None
+    parts = read_parts(weights, temporal=temporal)
+    if wanted is None:
+        selection = Selection.parse(control.frames)
+        wanted = np.array(selection.resolve(parts.settings.frames, "the clip of these weights"))
+    steps = STEPS if control.steps is None else control.steps
+    run = Run(layout, parts, prompt_of(control.prompt), steps, control.seed, rate_hz)
+    held_out = np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS)
+    frames, latents = generate(run, wanted, progress)
+    clip = Clip(
+        frames=frames,
+        valid=np.ones(frames.shape[:3], dtype=bool),
+        held_out=held_out,
+        latents=latents,
+        source_index=(wanted[:, None] * CAMERAS + np.arange(CAMERAS)).reshape(-1),
+        provenance=_provenance(control, layout, temporal) | run.about(),
+        **_cameras(layout, wanted / rate_hz, parts.settings.size),
+    )
+    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+def _inputs(control: Control) -> tuple[Layout, Path]:
+    """The layout and the folder of weights."""
+    if control.weights is None:
+        raise InputError(f"the prior magicdrive needs --weights, {EXPECTED}")
+    if control.steps is not None and not 1 <= control.steps <= MOST_STEPS:
+        raise InputError(f"--steps {control.steps}: expected 1 to {MOST_STEPS}, such as {STEPS}")
+    if control.path is None:
+        raise InputError(
+            "the prior magicdrive needs a layout: a JSON, see docs/layout.md; dreamdrive world make draws one"
+        )
+    layout = read_layout(control.path)
+    check_map(layout, str(control.path))
+    return layout, control.weights
+
+
+def _cameras(layout: Layout, times_s: Float[np.ndarray, " t"], size: tuple[int, int]) -> dict[str, Any]:
+    """Times, rig and poses by time, then camera; the world is the front camera of the first time step."""
+    pinholes = rig(size)
+    map_from_front = map_from_car(layout.ego, times_s) @ car_from_camera(NUSCENES[0])
+    world_from_front = np.linalg.inv(map_from_front[0]) @ map_from_front
+    world_from_front[0] = np.eye(4)
+    mounted = np.stack([camera.world_from_camera for camera in pinholes])
+    since_s = times_s - times_s[0]
+    return {
+        "times_s": np.repeat(since_s, CAMERAS),
+        "camera": np.tile(np.arange(CAMERAS), len(times_s)),
+        "rig": pinholes,
+        "known": Known((world_from_front[:, None] @ mounted).reshape(-1, 4, 4), intrinsics=True),
+        "requested": Trajectory(world_from_front, since_s),
+    }
+
+
+def _provenance(control: Control, layout: Layout, temporal: bool) -> dict[str, Any]:
+    name = "magicdrive-t" if temporal else "magicdrive"
+    source = "a layout" if control.path is None else f"the layout {control.path.name}"
+    return {
+        "prior": name,
+        "cameras": [camera.name for camera in NUSCENES],
+        "notes": [
+            f"The frames are generated from {source} by {name}, six cameras at each time step. Poses and "
+            "intrinsics are those that were asked for; a generated picture follows them only roughly.",
+            _TOGETHER if temporal else _ALONE,
+            f"The cameras are typical ones of nuScenes, the front one {NUSCENES[0].place_m[2]:g} m high; the "
+            f"layout's camera height of {layout.ego.camera_height_m:g} m and its shaking are not followed.",
+        ],
+    }
+
+
+_TOGETHER = "All time steps were sampled together; frames agree in time as far as the network learned it."
+_ALONE = (
+    "Each time step was sampled by itself, from the same noise: beyond map, boxes and noise nothing ties one "
+    "to the next, and what the layout leaves open (houses, colours, sky) changes from step to step."
+)
+_INSTALL = "pip install 'dreamdrive[video-prior]'"
+_LICENCE = (
+    "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); Stable "
+    "Diffusion 1.5 CreativeML Open RAIL-M"
+)
+_TAKES = frozenset({"path", "frames", "prompt", "steps", "hold_out"})
+_GIVES = "six cameras at each time step, the intrinsics and poses asked for, latents"
+
+MAGICDRIVE = Prior(
+    name="magicdrive",
+    make=magicdrive,
+    takes=_TAKES | {"fps"},
+    gives=_GIVES,
+    about="six cameras from a layout by MagicDrive, each time step by itself",
+    licence=_LICENCE,
+    memory="for 400x224 about 7.5 GB on a CPU (float32), 4.5 GB on a GPU (half precision)",
+    weights=EXPECTED,
+    package="diffusers",
+    install=_INSTALL,
+)
+MAGICDRIVE_T = Prior(
+    name="magicdrive-t",
+    make=magicdrive_t,
+    takes=_TAKES,
+    gives=_GIVES,
+    about="six cameras from a layout by MagicDrive-t, 16 time steps together",
+    licence=_LICENCE,
+    memory="about 13 GB on a CPU (float32), 7 GB on a GPU (half precision)",
+    weights=EXPECTED,
+    package="diffusers",
+    install=_INSTALL,
+)

@@ -1,0 +1,119 @@
+"""From a layout and loaded networks to pictures and their latents."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from dreamdrive.prior.magicdrive.condition import Seen, see
+from dreamdrive.prior.magicdrive.folder import Parts
+from dreamdrive.prior.magicdrive.sample import GUIDANCE, Conditions, decode, sample, unipc
+from dreamdrive.prior.protocol import Progress
+from dreamdrive.scene.layout import Layout
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one run samples.
+
+    Attributes:
+        layout: Map, boxes and path.
+        parts: The networks.
+        prompt: The sentence.
+        steps: Steps of the sampler.
+        seed: Of the start noise.
+        rate_hz: Time steps in a second.
+    """
+
+    layout: Layout
+    parts: Parts
+    prompt: str
+    steps: int
+    seed: int
+    rate_hz: float
+
+    def about(self) -> dict[str, Any]:
+        """The settings, for the clip's provenance."""
+        return {
+            "seed": self.seed,
+            "steps": self.steps,
+            "guidance": GUIDANCE,
+            "prompt": self.prompt,
+            "rate_hz": self.rate_hz,
+            "weights": self.parts.digests,
+        }
+
+
+def generate(
+    run: Run, wanted: np.ndarray, progress: Progress
+) -> tuple[UInt8[np.ndarray, "f h w 3"], Float[np.ndarray, "f _ _ _"]]:
+    """Frames and latents of time steps, by time, then camera.
+
+    The temporal variant samples all time steps of its length, others each wanted one by itself.
+
+    Args:
+        run: What is sampled.
+        wanted: Indices of the time steps.
+        progress: Told of every sampler step and every decoded time step.
+    """
+    together = run.parts.settings.frames
+    sampled = wanted if together == 1 else np.arange(together)
+    total, done = len(sampled) // together * run.steps + len(wanted), 0
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    parts = run.parts
+    clips = [
+        _sampled(run, see(run.layout, steps / run.rate_hz, parts.settings.map_shape[1]), tell)
+        for steps in sampled.reshape(-1, together)
+    ]
+    by_time = torch.cat(clips).unflatten(0, (-1, parts.settings.views))
+    kept = by_time[np.searchsorted(sampled, wanted).tolist()]
+    pictures: list[np.ndarray] = []
+    for latents in kept:
+        pictures.append(decode(parts.vae, latents))
+        tell()
+    return np.concatenate(pictures), kept.flatten(0, 1).permute(0, 2, 3, 1).cpu().numpy()
+
+
+def _sampled(run: Run, seen: Seen, tell: Callable[[], None]) -> Float[Tensor, "bn c h w"]:
+    """Latents of time steps that are sampled together."""
+    parts = run.parts
+    conditions = _conditions(run, seen)
+    no_words = parts.words("").expand_as(conditions.text)
+    branches = conditions, conditions.without(parts.controlnet.null_camera, no_words)
+    scheduler = unipc(parts.scheduler, run.steps, parts.device)
+    noise = start_noise(run).to(parts.device)
+    return sample(parts.unet, parts.controlnet, branches, noise, scheduler, done=tell)
+
+
+def start_noise(run: Run) -> Float[Tensor, "bn c h w"]:
+    """Noise of the pictures that are sampled together.
+
+    One for all cameras, and, since it depends on the seed alone, for all time steps that are sampled by
+    themselves; the temporal variant learned from noise of its own for each picture.
+    """
+    random = torch.Generator().manual_seed(run.seed)
+    settings, shape = run.parts.settings, run.parts.latent_shape
+    count = settings.frames * settings.views
+    noise = torch.randn((1 if settings.temporal is None else count, *shape), generator=random)
+    return noise.expand(count, -1, -1, -1)
+
+
+def _conditions(run: Run, seen: Seen) -> Conditions:
+    device = run.parts.device
+    return Conditions(
+        raster=torch.from_numpy(seen.raster).to(device),
+        cameras=torch.from_numpy(seen.cameras).to(device),
+        corners_m=torch.from_numpy(seen.corners_m).to(device),
+        classes=torch.from_numpy(seen.classes).to(device),
+        present=torch.from_numpy(seen.present).to(device),
+        text=run.parts.words(run.prompt).expand(len(seen.raster), -1, -1),
+    )
