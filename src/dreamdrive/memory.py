@@ -1,8 +1,24 @@
-"""How much memory this machine has to offer."""
+"""Where networks run, and how much memory is free there."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import torch
 
 
-def available_bytes() -> int | None:
-    """Memory that programs may still take; None where the system does not tell."""
+def best_device() -> "torch.device":
+    """A GPU if torch has one, else the CPU."""
+    import torch
+
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def free_bytes(device: "torch.device | None" = None) -> int | None:
+    """Memory that programs may still take, here or on a GPU; None where the system does not tell."""
+    if device is not None and device.type == "cuda":
+        import torch
+
+        return torch.cuda.mem_get_info(device)[0]
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             lines = dict(line.split(":", 1) for line in file)

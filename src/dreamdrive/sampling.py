@@ -55,7 +55,7 @@ def sample(
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
     clip = chosen(control, progress)
-    if len(clip) < 2:
+    if clip.step[-1] < 1:
         raise InputError(f"--frames {control.frames}: a single frame is no recording; choose two or more")
     write_recording(clip, out, _about(name, control), replace=force)
     return clip

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.data.pictures import texture
 from tests.prior.paths import circle
+from tests.rigs import rig_clip
 
 from dreamdrive.data.recording import rate_hz, write_recording
 from dreamdrive.errors import InputError
@@ -100,3 +101,20 @@ def test_other_folders_are_left_alone(clip: Clip, tmp_path: Path) -> None:
     (tmp_path / "mine/work.txt").touch()
     with pytest.raises(InputError, match="holds other files"):
         write_recording(clip, tmp_path / "mine", {}, replace=True)
+
+
+def test_several_cameras_are_taken_up_as_a_rig(tmp_path: Path) -> None:
+    clip, made = rig_clip(poses=True), tmp_path / "made"
+    write_recording(clip, made, {})
+    assert {path.name for path in made.iterdir()} == {
+        *("camera0", "camera1", "rig.json", "poses.json", "video.mp4", "provenance.json"),
+    }
+    size = clip.size
+    again = REPLAY(Control(made, fps=rate_hz(clip), size=size, poses=made / "poses.json"))
+    np.testing.assert_array_equal(again.frames, clip.frames)
+    np.testing.assert_array_equal(again.camera, clip.camera)
+    assert again.known.world_from_camera is not None
+    assert clip.known.world_from_camera is not None
+    np.testing.assert_allclose(again.known.world_from_camera, clip.known.world_from_camera, atol=1e-6)
+    with pytest.raises(InputError, match="several cameras; features is not taken"):
+        REPLAY(Control(made, features=tmp_path))

@@ -3,7 +3,7 @@
 import os
 import signal
 
-from dreamdrive.memory import available_bytes
+from dreamdrive.memory import free_bytes
 
 
 def available_cores() -> int:
@@ -15,7 +15,7 @@ def available_cores() -> int:
 
 def available_memory_mb() -> int | None:
     """Memory that is free for use, in megabytes; None where the system does not tell."""
-    free = available_bytes()
+    free = free_bytes()
     return None if free is None else free // 1_000_000
 
 

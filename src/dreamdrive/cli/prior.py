@@ -112,7 +112,8 @@ def sample(
             progress=lambda done, total: bars("prior", done, total),
         )
     width, height = clip.size
-    console.print(f"{out}: {len(clip)} frames of {width}x{height}", soft_wrap=True, markup=False)
+    cameras = f" of {len(clip.rig)} cameras" if len(clip.rig) > 1 else ""
+    console.print(f"{out}: {len(clip)} frames{cameras}, {width}x{height}", soft_wrap=True, markup=False)
     for note in clip.provenance.get("notes", []):
         console.print(note, soft_wrap=True, markup=False)
     options = [f"--fps {rate_hz(clip):g}", f"--size {width}x{height}"]

@@ -6,6 +6,9 @@
 - ``poses.json``: the path, where it is known and in metres; ``requested.json``: the path that was asked for.
 - ``features.safetensors``: the features.
 - ``provenance.json``: where all this comes from.
+
+Of several cameras each has ``frames`` and ``intrinsics.json`` in a folder ``cameraK``; ``rig.json`` tells how they
+are mounted. Path and video are the first one's, features are left out.
 """
 
 import json
@@ -17,6 +20,7 @@ import numpy as np
 
 from dreamdrive.data.feature_file import FeatureFile, write_features
 from dreamdrive.data.poses import write_trajectory
+from dreamdrive.data.rig import write_rig
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.clip import Clip
@@ -24,15 +28,16 @@ from dreamdrive.scene.trajectory import Trajectory
 
 ABOUT = "provenance.json"
 """By this file a folder of this kind is known."""
+_INTRINSICS = "intrinsics.json"
 
 
 def rate_hz(clip: Clip) -> float:
     """Frames a second, the median where they are not even."""
-    return float(1 / np.median(np.diff(clip.times_s)))
+    return float(1 / np.median(np.diff(np.unique(clip.times_s))))
 
 
 def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace: bool = False) -> None:
-    """Write a clip of one camera; the folder appears whole or not at all.
+    """Write a clip; the folder appears whole or not at all.
 
     Args:
         clip: The clip, of at least two frames.
@@ -42,27 +47,49 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
 
     Raises:
         InputError: Something is in the way, or the place cannot be written.
-        ValueError: The clip has several cameras, or features with too many channels.
+        ValueError: Features have too many channels.
     """
-    if len(clip.rig) > 1:
-        raise ValueError(f"a recording is of one camera, not {len(clip.rig)}")
+    first = clip.only(int(clip.camera[0]))
     values = {
         **about,
-        "fps": rate_hz(clip),
-        "frames": len(clip),
+        "fps": rate_hz(first),
+        "frames": len(first),
+        "cameras": len(clip.rig),
         "size": list(clip.size),
-        "source_index": clip.source_index.tolist(),
+        "source_index": first.source_index.tolist(),
         "provenance": clip.provenance,
     }
     with new_folder(folder, replace=replace, mark=ABOUT) as made:
-        (made / "frames").mkdir()
-        for index in range(len(clip)):
-            _write_frame(clip, index, made / "frames" / f"{index:04d}.png")
-        write_video(made / "video.mp4", iter(clip.frames), rate_hz(clip))
-        _write_geometry(clip, made)
-        if clip.features:
+        if len(clip.rig) == 1:
+            _write_camera(clip, made)
+        else:
+            _write_cameras(clip, made)
+        write_video(made / "video.mp4", iter(first.frames), rate_hz(first))
+        _write_path(first, made)
+        if clip.features and len(clip.rig) == 1:
             write_features(made / "features.safetensors", FeatureFile(clip.features, values))
         _write_json(made / ABOUT, values)
+
+
+def _write_cameras(clip: Clip, folder: Path) -> None:
+    mounted = {f"camera{index}": camera.world_from_camera for index, camera in enumerate(clip.rig)}
+    for index, name in enumerate(mounted):
+        (folder / name).mkdir()
+        _write_camera(clip.only(index), folder / name)
+    write_rig(mounted, folder, _INTRINSICS if clip.known.intrinsics else None)
+
+
+def _write_camera(clip: Clip, folder: Path) -> None:
+    """Frames, and the pinhole where it is known."""
+    (folder / "frames").mkdir()
+    for index in range(len(clip)):
+        _write_frame(clip, index, folder / "frames" / f"{index:04d}.png")
+    if clip.known.intrinsics:
+        camera = clip.rig[0]
+        # The file counts pixels by integer index.
+        numbers = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
+        size = {"width": camera.width_px, "height": camera.height_px}
+        _write_json(folder / _INTRINSICS, {**size, "intrinsics": numbers})
 
 
 def _write_frame(clip: Clip, index: int, path: Path) -> None:
@@ -73,13 +100,7 @@ def _write_frame(clip: Clip, index: int, path: Path) -> None:
     path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 
-def _write_geometry(clip: Clip, folder: Path) -> None:
-    camera = clip.rig[0]
-    if clip.known.intrinsics:
-        # The file counts pixels by integer index.
-        numbers = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
-        size = {"width": camera.width_px, "height": camera.height_px}
-        _write_json(folder / "intrinsics.json", {**size, "intrinsics": numbers})
+def _write_path(clip: Clip, folder: Path) -> None:
     if clip.known.world_from_camera is not None and clip.known.metric:
         write_trajectory(Trajectory(clip.known.world_from_camera, clip.times_s), folder / "poses.json")
     if clip.requested is not None:

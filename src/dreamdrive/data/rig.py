@@ -54,15 +54,20 @@ def read_rig(path: Path) -> tuple[Mounted, ...]:
     return tuple(_mounted(path, index, entry) for index, entry in enumerate(listed))
 
 
-def write_rig(cameras: Mapping[str, Float[np.ndarray, "4 4"]], path: Path) -> None:
-    """Describe cameras whose frames lie in ``NAME/frames`` and whose calibration is ``NAME/meta.json``.
+def write_rig(cameras: Mapping[str, Float[np.ndarray, "4 4"]], path: Path, calibration: str | None) -> None:
+    """Describe cameras whose frames lie in ``NAME/frames``.
 
     Args:
         cameras: ``car_from_camera`` of each, by its name.
         path: The folder that holds them.
+        calibration: Name of the calibration file in the folder of each; None where there is none.
     """
     listed = [
-        {"frames": f"{name}/frames", "intrinsics": f"{name}/meta.json", "car_from_camera": pose.tolist()}
+        {
+            "frames": f"{name}/frames",
+            "intrinsics": None if calibration is None else f"{name}/{calibration}",
+            "car_from_camera": pose.tolist(),
+        }
         for name, pose in cameras.items()
     ]
     (path / RIG).write_text(json.dumps({"cameras": listed}, indent=1) + "\n", encoding="utf-8")
@@ -75,6 +80,7 @@ def read_rig_clip(
     fps: float | None = None,
     size: tuple[int, int] | None = None,
     poses: Path | None = None,
+    trajectory: Path | None = None,
     hold_out: int | None = None,
 ) -> Clip:
     """Read the frames of all cameras of a rig, as ``read_clip`` reads those of one.
@@ -85,6 +91,7 @@ def read_rig_clip(
         fps: Rate of each camera.
         size: Exact width and height of all frames.
         poses: Pose file of the first camera; the mountings give those of the others.
+        trajectory: File with the path that the first camera was asked to follow.
         hold_out: Withhold the selected times i with i mod N = N // 2.
 
     Raises:
@@ -100,6 +107,7 @@ def read_rig_clip(
             size=size,
             intrinsics=camera.intrinsics,
             poses=poses if index == 0 else None,
+            trajectory=trajectory if index == 0 else None,
             hold_out=hold_out,
         )
         for index, camera in enumerate(cameras)
@@ -152,6 +160,7 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
         held_out=parts[0].held_out[row],
         source_index=parts[0].source_index[row],
         known=known,
+        requested=parts[0].requested,
         provenance={
             **parts[0].provenance,
             "input": str(path),

@@ -31,37 +31,13 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
             f"the clip has {len(clip.rig)} cameras, and neither their poses nor how they are mounted is "
             "known; give the poses, or the frames of one camera"
         )
-    first = reconstruct(only(clip, lead))
+    first = reconstruct(clip.only(lead))
     poses = _poses(clip, lead, first)
     parts = {lead: first}
     for camera in np.unique(clip.camera).tolist():
         if camera != lead:
             parts[camera] = _other(clip, camera, poses, first, reconstruct)
     return _merged(clip, lead, parts, poses)
-
-
-def only(clip: Clip, camera: int) -> Clip:
-    """The frames of one camera of the rig, with what is known of them."""
-    rows = clip.of_camera(camera)
-    known = clip.known
-    return replace(
-        clip,
-        frames=clip.frames[rows],
-        times_s=clip.times_s[rows],
-        camera=np.zeros(len(rows), dtype=np.int64),
-        rig=(clip.rig[camera].at(np.eye(4)),),
-        valid=clip.valid[rows],
-        held_out=clip.held_out[rows],
-        source_index=clip.source_index[rows],
-        features={name: values[rows] for name, values in clip.features.items()},
-        latents=None if clip.latents is None else clip.latents[rows],
-        known=replace(
-            known,
-            world_from_camera=None if known.world_from_camera is None else known.world_from_camera[rows],
-            depth_m=None if known.depth_m is None else known.depth_m[rows],
-            sky=None if known.sky is None else known.sky[rows],
-        ),
-    )
 
 
 def _unmounted(clip: Clip) -> bool:
@@ -110,7 +86,7 @@ def _other(
     reconstruct: Callable[[Clip], Geometry],
 ) -> Geometry:
     """One of the other cameras, from known poses over the known road."""
-    part = only(clip, camera)
+    part = clip.only(camera)
     known: Known = replace(
         part.known,
         world_from_camera=poses[clip.of_camera(camera)],

@@ -42,15 +42,16 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
 
 def _of_rig(control: Control, path: Path) -> Clip:
     """The frames of several cameras."""
-    for name in ("intrinsics", "hfov_deg", "trajectory", "features"):
+    for name in ("intrinsics", "hfov_deg", "features"):
         if getattr(control, name) is not None:
-            raise InputError(f"{path} has several cameras and takes no {name}; its rig.json names calibration")
+            raise InputError(f"{path} has several cameras; {name} is not taken for them")
     clip = read_rig_clip(
         path,
         frames=control.frames,
         fps=control.fps,
         size=control.size,
         poses=control.poses,
+        trajectory=control.trajectory,
         hold_out=control.hold_out,
     )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))

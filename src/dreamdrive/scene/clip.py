@@ -101,6 +101,28 @@ class Clip:
         """Indices of those of them that a fit may see."""
         return np.flatnonzero((self.camera == camera) & ~self.held_out).tolist()
 
+    def only(self, camera: int) -> "Clip":
+        """The frames of one camera of the rig, with what is known of them; it is mounted at the identity."""
+        rows, known = self.of_camera(camera), self.known
+        return replace(
+            self,
+            frames=self.frames[rows],
+            times_s=self.times_s[rows],
+            camera=np.zeros(len(rows), dtype=np.int64),
+            rig=(self.rig[camera].at(np.eye(4)),),
+            valid=self.valid[rows],
+            held_out=self.held_out[rows],
+            source_index=self.source_index[rows],
+            features={name: values[rows] for name, values in self.features.items()},
+            latents=None if self.latents is None else self.latents[rows],
+            known=replace(
+                known,
+                world_from_camera=None if known.world_from_camera is None else known.world_from_camera[rows],
+                depth_m=None if known.depth_m is None else known.depth_m[rows],
+                sky=None if known.sky is None else known.sky[rows],
+            ),
+        )
+
     def with_features(self, **features: Float[np.ndarray, "f _ _ _"]) -> "Clip":
         """The clip with more named features."""
         return replace(self, features={**self.features, **features})

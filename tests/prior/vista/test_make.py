@@ -130,7 +130,7 @@ def test_what_it_cannot_use_is_refused(control: Control, changes: dict[str, obje
 def test_too_little_memory_is_told_before_anything_is_loaded(
     control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dreamdrive.prior.vista.load.available_bytes", lambda: 10_000_000)
+    monkeypatch.setattr("dreamdrive.prior.vista.load.free_bytes", lambda device: 10_000_000)
     monkeypatch.setattr("dreamdrive.prior.vista.networks.Networks._load", lambda *_: pytest.fail("loaded"))
     with pytest.raises(InputError, match=r"0\.0 GB are free: no smaller size fits"):
         PRIORS["vista"](control)

@@ -48,7 +48,7 @@ def write_world(drives: Mapping[Mount, Drive], path: Path, *, replace: bool = Fa
         _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
         _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
         if len(drives) > 1:
-            write_rig({name: front_from_mount(name) for name in drives}, folder)
+            write_rig({name: front_from_mount(name) for name in drives}, folder, "meta.json")
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)

@@ -4,6 +4,7 @@ import torch
 from torch import nn
 
 from dreamdrive.errors import InputError
+from dreamdrive.memory import free_bytes
 from dreamdrive.prior.magicdrive.config import Settings
 
 _UNET_TENSORS = 33
@@ -46,15 +47,3 @@ def check_memory(needed: int, device: torch.device) -> None:
             f"MagicDrive needs about {needed / 1e9:.1f} GB with these weights, and {where} has "
             f"{free / 1e9:.1f} GB free; close other programs or take a larger machine"
         )
-
-
-def free_bytes(device: torch.device) -> int | None:
-    """Memory that is free for use on a device; None where the system does not tell."""
-    if device.type == "cuda":
-        return torch.cuda.mem_get_info(device)[0]
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            lines = dict(line.split(":", 1) for line in file)
-        return int(lines["MemAvailable"].split()[0]) * 1024
-    except (OSError, KeyError, ValueError):
-        return None

@@ -92,7 +92,7 @@ def _make(
         valid=np.ones(frames.shape[:3], dtype=bool),
         held_out=held_out,
         latents=latents,
-        source_index=(wanted[:, None] * CAMERAS + np.arange(CAMERAS)).reshape(-1),
+        source_index=np.repeat(wanted, CAMERAS),
         provenance=_provenance(control, layout, temporal) | run.about(),
         **_cameras(layout, wanted / rate_hz, parts.settings.size),
     )
@@ -103,8 +103,8 @@ def _inputs(control: Control) -> tuple[Layout, Path]:
     """The layout and the folder of weights."""
     if control.weights is None:
         raise InputError(f"the prior magicdrive needs --weights, {EXPECTED}")
-    if control.steps is not None and not 1 <= control.steps <= MOST_STEPS:
-        raise InputError(f"--steps {control.steps}: expected 1 to {MOST_STEPS}, such as {STEPS}")
+    if control.steps is not None and control.steps > MOST_STEPS:
+        raise InputError(f"--steps {control.steps}: expected at most {MOST_STEPS}, such as {STEPS}")
     if control.path is None:
         raise InputError(
             "the prior magicdrive needs a layout: a JSON, see docs/layout.md; dreamdrive world make draws one"

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-import torch
-
-from dreamdrive.memory import available_bytes
+from dreamdrive.memory import best_device, free_bytes
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.memory import Plan, plan_memory
 from dreamdrive.prior.vista.networks import Networks
@@ -29,9 +27,9 @@ def start(
         InputError: The weights cannot be used, or memory does not suffice.
     """
     stored = open_weights(weights, kind)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    device = best_device()
     half = device.type == "cuda"
-    free = torch.cuda.mem_get_info()[0] if half else available_bytes()
+    free = free_bytes(device)
     count = int(stored.parts["unet"].config.get("num_frames", 25))
     plan = plan_memory(stored, size, max(frames or 0, count), count, free, half=half)
     return Networks(stored, device, half=half), plan, count

@@ -50,8 +50,6 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     size = control.size or NATIVE
     if path is None or weights is None:
         raise InputError(f"the prior {kind.name} needs an input, a photo, and --weights")
-    if control.steps is not None and control.steps < 1:
-        raise InputError(f"--steps {control.steps}: expected 1 or more; {kind.title} takes {kind.steps}")
     check_size(size)
     leading = read_leading(
         path, max(kind.overlap, 1), kind.rate_hz, size, control.intrinsics, control.hfov_deg
