@@ -7,8 +7,8 @@
 - ``features.safetensors``: the features.
 - ``provenance.json``: where all this comes from.
 
-Of several cameras each has ``frames`` and ``intrinsics.json`` in a folder ``cameraK``; ``rig.json`` tells how they
-are mounted. Path and video are the first one's, features are left out.
+Of several cameras each has ``frames`` and ``intrinsics.json`` in a folder ``cameraK``; ``rig.json`` tells how
+they are mounted. Path and video are the first one's, features are left out.
 """
 
 import json
