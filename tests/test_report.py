@@ -35,7 +35,7 @@ def geometry(clip: Clip, path: Trajectory) -> Geometry:
         confidence=empty,
         sky=empty > 0,
         moving=empty,
-        fixed_regions=np.zeros(empty.shape[1:], dtype=np.int64),
+        fixed_regions=np.zeros((1, *empty.shape[1:]), dtype=np.int64),
         region_names=(),
         ground=None,
         scale=Scale("poses", 0.0),

@@ -20,7 +20,7 @@ def test_a_sample_is_written_and_says_how_to_go_on(run: Run, tmp_path: Path) -> 
     out = tmp_path / "made"
     result = run("prior", "sample", "--prior", "street-world", *SMALL, "--seed", 3, "-o", out)
     assert result.code == 0, result
-    assert f"{out}: 2 frames of 64x48" in result.out
+    assert f"{out}: 2 frames, 64x48" in result.out
     assert f"to go on: dreamdrive generate {out} -o OUT --fps 10 --size 64x48 --intrinsics" in result.out
     assert f"--features {out / 'features.safetensors'}" in result.out
     about = json.loads((out / "provenance.json").read_text())

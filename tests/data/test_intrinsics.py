@@ -31,7 +31,7 @@ def test_half_a_pixel_is_added_to_the_principal_point(write):
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.floats(0.1, 4))
+@given(st.floats(0.2, 4))
 def test_the_calibration_of_another_size_is_scaled(write, scale):
     size = (round(1280 * scale), round(720 * scale))
     found = read_intrinsics(write(GOOD), size)
