@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
@@ -83,12 +85,17 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
 
 
 def read_state(path: Path, expected: str) -> dict[str, Tensor]:
-    """The tensors of a state dict on disk.
+    """The tensors of a state dict on disk, ``.safetensors`` or what ``torch.save`` wrote.
 
     Raises:
         InputError: The file is missing, unreadable or holds something else.
     """
-    return as_state(read_torch(path, expected), str(path), expected)
+    if path.suffix != ".safetensors":
+        return as_state(read_torch(path, expected), str(path), expected)
+    try:
+        return load_file(path)
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"{path} is missing or damaged ({error}); expected {expected}") from None
 
 
 def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:

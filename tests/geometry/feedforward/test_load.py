@@ -72,7 +72,7 @@ def test_the_config_is_needed_where_it_says_what_to_build(kind: str, weights: Pa
 @pytest.mark.parametrize("text", ["{", "[1]"])
 def test_a_damaged_config_is_named(kind: str, weights: Path, text: str) -> None:
     (weights / "config.json").write_text(text)
-    with pytest.raises(InputError, match=r"config.json (is damaged|holds no table)"):
+    with pytest.raises(InputError, match=r"config.json( is not JSON|: expected a JSON object)"):
         load(kind, weights)
 
 

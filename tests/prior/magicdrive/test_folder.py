@@ -94,10 +94,10 @@ def test_damaged_files_are_refused(folder: Written) -> None:
     file = folder.weights("unet")
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2])
-    refused(folder, r"unet/diffusion_pytorch_model\.safetensors is damaged")
+    refused(folder, r"unet/diffusion_pytorch_model\.safetensors is missing or damaged")
     file.write_bytes(whole)
     (folder.path / "vae" / "config.json").write_text("{")
-    refused(folder, r"vae/config\.json cannot be read as JSON")
+    refused(folder, r"vae/config\.json is not JSON")
 
 
 def test_missing_tensors_are_named(folder: Written) -> None:

@@ -93,8 +93,8 @@ def test_wrong_and_damaged_files_are_refused(tmp_path: Path, vista_file: Path, v
     shutil.copytree(vista_dir, folder)
     config = folder / "vae" / "config.json"
     for text, said in (
-        ("{", "is damaged"),
-        ("[]", "holds no table"),
+        ("{", "is not JSON"),
+        ("[]", "expected a JSON object"),
         ('{"size": 3}', "does not tell block_out_channels"),
         ('{"block_out_channels": [32], "down_block_types": ["None"]}', "is of no use"),
     ):

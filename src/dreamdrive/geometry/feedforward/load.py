@@ -1,7 +1,6 @@
 """Other people's networks, built from their installed package and filled from files on this machine."""
 
 import importlib
-import json
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,12 +8,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file
 from torch import Tensor, nn
 
+from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
-from dreamdrive.weights import as_state, fill, read_torch
+from dreamdrive.weights import as_state, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)
 _NAMES = ("model.safetensors", "model.pt", "model.pth")
@@ -66,26 +64,15 @@ def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Sto
 
 
 def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
-    if file.suffix != ".safetensors":
-        content = read_torch(file, expected)
-        wrapped = isinstance(content, dict) and isinstance(content.get("model"), dict)
-        return as_state(content["model"] if wrapped else content, str(file), expected)
-    try:
-        return load_file(file)
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"{file} is missing or damaged ({error}); expected {expected}") from None
+    if file.suffix == ".safetensors":
+        return read_state(file, expected)
+    content = read_torch(file, expected)
+    wrapped = isinstance(content, dict) and isinstance(content.get("model"), dict)
+    return as_state(content["model"] if wrapped else content, str(file), expected)
 
 
 def _read_config(file: Path) -> dict[str, Any]:
-    if not file.is_file():
-        return {}
-    try:
-        config = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} is damaged: {error}") from None
-    if not isinstance(config, dict):
-        raise InputError(f"{file} holds no table of settings")
-    return config
+    return read_json(file, "--weights") if file.is_file() else {}
 
 
 def upstream(module: str, install: str) -> Any:

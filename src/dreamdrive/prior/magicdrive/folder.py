@@ -1,6 +1,5 @@
 """MagicDrive's weights: its own ``unet`` and ``controlnet`` beside the parts of Stable Diffusion 1.5."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +9,10 @@ import torch
 from diffusers.models.autoencoders.autoencoder_kl import AutoencoderKL
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from jaxtyping import Float
-from safetensors import SafetensorError
-from safetensors.torch import load_file
 from torch import Tensor, nn
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
+from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.memory import best_device
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
@@ -104,7 +102,11 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
         InputError: Parts are missing or damaged, are of another model, or do not fit into memory.
     """
     files = _find_parts(folder)
-    configs = {part: _read_table(folder / part / _PARTS[part][0]) for part in _PARTS if part != "tokenizer"}
+    configs = {
+        part: read_json(folder / part / _PARTS[part][0], "--weights")
+        for part in _PARTS
+        if part != "tokenizer"
+    }
     settings = read_settings(configs["unet"], configs["controlnet"])
     _check_variant(settings, temporal)
     device = device or best_device()
@@ -205,13 +207,7 @@ def _core(network: nn.Module) -> nn.Module:
 
 
 def _state(file: Path, part: str) -> dict[str, Tensor]:
-    if file.suffix == ".safetensors":
-        try:
-            state = load_file(file)
-        except (OSError, SafetensorError) as error:
-            raise InputError(f"{file} is damaged ({error}); expected {EXPECTED}") from None
-    else:
-        state = read_state(file, EXPECTED)
+    state = read_state(file, EXPECTED)
     if part == "vae":
         return {_renamed(key): value for key, value in state.items()}
     if part == "text_encoder":
@@ -225,16 +221,6 @@ def _renamed(key: str) -> str:
         if "attentions" in key:
             key = key.replace(old, new)
     return key
-
-
-def _read_table(file: Path) -> dict[str, Any]:
-    try:
-        table = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} cannot be read as JSON: {error}") from None
-    if not isinstance(table, dict):
-        raise InputError(f"{file} holds no table of settings; expected {EXPECTED}")
-    return table
 
 
 def _tokenizer(folder: Path) -> CLIPTokenizer:

@@ -1,6 +1,5 @@
 """Weights on disk, an official single file or a folder in diffusers' layout; read where they are used."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
+from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
@@ -176,7 +176,7 @@ def _open_folder(path: Path) -> Stored:
     second = any(name.startswith(_SECOND_TIME) for name in parts["unet"].shapes)
     kind = VISTA if second else SVD
     if (path / NOTE).is_file():
-        kind = KINDS.get(str(_read_json(path / NOTE).get("kind")), kind)
+        kind = KINDS.get(str(read_json(path / NOTE, "--weights").get("kind")), kind)
     return Stored(path, kind, parts)
 
 
@@ -188,17 +188,7 @@ def _folder_part(path: Path, part: Part) -> StoredPart:
     shapes, read = _open(there[0])
     # Older versions of transformers stored these counting numbers.
     shapes = {name: shape for name, shape in shapes.items() if not name.endswith(".position_ids")}
-    return StoredPart(_read_json(config), shapes, read)
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} is damaged: {error}") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path} holds no table of settings")
-    return content
+    return StoredPart(read_json(config, "--weights"), shapes, read)
 
 
 def _check(stored: Stored, part: Part) -> None:

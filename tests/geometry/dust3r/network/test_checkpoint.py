@@ -196,10 +196,10 @@ def test_damaged_files(tmp_path: Path) -> None:
     save_hub(tmp_path, tiny())
     tensors = tmp_path / "model.safetensors"
     tensors.write_bytes(tensors.read_bytes()[:-50])
-    with pytest.raises(InputError, match=r"model\.safetensors .*is damaged"):
+    with pytest.raises(InputError, match=r"model\.safetensors is missing or damaged"):
         load_dust3r(tmp_path)
     (tmp_path / "config.json").write_bytes(b"\xff\xfe{")
-    with pytest.raises(InputError, match=r"config\.json .*is damaged"):
+    with pytest.raises(InputError, match=r"config\.json is damaged"):
         load_dust3r(tmp_path)
 
 

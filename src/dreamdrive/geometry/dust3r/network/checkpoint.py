@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file
 from torch import Tensor
 
 from dreamdrive.errors import InputError
@@ -21,7 +19,7 @@ from dreamdrive.geometry.dust3r.network.config import (
     config_from_shapes,
 )
 from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
-from dreamdrive.weights import as_state, fill_network, read_torch
+from dreamdrive.weights import as_state, fill_network, read_state, read_torch
 
 EXPECTED = (
     "a DUSt3R model: DUSt3R_ViTLarge_BaseDecoder_512_dpt.pth or the like, or the folder of its hub form "
@@ -105,6 +103,6 @@ def _read_hub(path: Path) -> tuple[dict[str, Tensor], NetworkConfig]:
             raise InputError(f"{needed} does not exist or is no file; expected {EXPECTED}")
     try:
         config = config_from_json(beside.read_text(encoding="utf-8"), str(beside))
-        return load_file(path), config
-    except (OSError, UnicodeDecodeError, SafetensorError) as error:
-        raise InputError(f"{path} or its config.json is damaged ({error}); expected {EXPECTED}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{beside} is damaged ({error}); expected {EXPECTED}") from None
+    return read_state(path, EXPECTED), config
