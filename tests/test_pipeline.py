@@ -231,3 +231,15 @@ def test_all_that_decides_over_the_geometry_decides_over_the_result(tmp_path: Pa
     before = pipeline._digests(Control(), path, None)
     (tmp_path / "geometry.json").write_text("{}")
     assert pipeline._digests(Control(), path, None) != before
+
+
+@pytest.mark.parametrize("folder", ["frames", "rig"])
+def test_pictures_in_folders_below_the_input_count(tmp_path: Path, folder: str) -> None:
+    picture = tmp_path / ("frames" if folder == "frames" else "left") / "0000.png"
+    picture.parent.mkdir()
+    if folder == "rig":
+        (tmp_path / "rig.json").write_text("{}")
+    picture.write_bytes(b"one")
+    before = pipeline._digests(Control(tmp_path), None, None)
+    picture.write_bytes(b"two")
+    assert pipeline._digests(Control(tmp_path), None, None) != before

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import UInt8
 
 from dreamdrive.data import read_clip
+from dreamdrive.data.rig import is_rig
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
@@ -342,11 +343,18 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         if not path.exists():
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
-        digests[name] = file_digest(path, deep=name in ("geometry-files", "prior-weights"))
+        deep = name in ("geometry-files", "prior-weights") or is_rig(path)
+        digests[name] = file_digest(_pictures(path) if name == "input" else path, deep=deep)
         beside = companions(path) if name == "geometry-files" else []
         if beside:
             digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
     return digests
+
+
+def _pictures(path: Path) -> Path:
+    """What counts of an input: of a folder with ``frames`` in it, as of ``data.source``, these alone."""
+    frames = path / "frames"
+    return frames if frames.is_dir() and not is_rig(path) else path
 
 
 def _recorded(control: Control, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:

@@ -61,7 +61,8 @@ def generate(
     """Make a 4D scene and its videos from a recording or a layout.
 
     Args:
-        input: A video, a folder of images or a layout as JSON; --prior street-world needs none.
+        input: A video, a folder of images or of several cameras (docs/surround.md), a layout as JSON, or a
+            photo for a video model; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
             others are video models, see docs/priors.md. Without it the input decides.
