@@ -28,7 +28,7 @@ class ScoreOptions:
         target: What the splatted scores are compared with: ``"error"`` is the paper's error map (eq. 8);
             ``"error_and_evidence"`` also asks the recorded clip's moving evidence.
         error: Which error, see ``errors.error_maps``. On four drawn streets with corrupted references the IoU
-            of what moves is 0.479 with ``"l1"``; ``"features"``, at the same scale, takes too much for moving:
+            of what moves is 0.479 with ``"l1"``; ``"features"``, at the same scale, calls too much moving,
             0.277.
         error_scale: Error that counts as 1: absolute, so that a street where nothing moves scores nothing.
         error_sigma_px: Blur of the error maps.
