@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation, Slerp
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.trajectory import Trajectory
 
 
 def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
@@ -55,27 +55,13 @@ def _poses(clip: Clip, lead: int, first: Geometry) -> Float[np.ndarray, "f 4 4"]
         return poses
     led = np.stack([camera.world_from_camera for camera in first.cameras])
     from_lead = np.linalg.inv(clip.rig[lead].world_from_camera)
-    lead_poses = _at(led, clip.times_s[clip.of_camera(lead)], clip.times_s)
+    lead_poses = Trajectory(led, clip.times_s[clip.of_camera(lead)]).at(clip.times_s)
     return np.stack(
         [
             pose @ from_lead @ clip.rig[int(camera)].world_from_camera
             for pose, camera in zip(lead_poses, clip.camera, strict=True)
         ]
     )
-
-
-def _at(
-    poses: Float[np.ndarray, "k 4 4"], known_s: Float[np.ndarray, " k"], times_s: Float[np.ndarray, " f"]
-) -> Float[np.ndarray, "f 4 4"]:
-    """Poses at other times: between the known ones, and the nearest beyond their ends."""
-    if len(poses) == 1:
-        return np.repeat(poses, len(times_s), axis=0)
-    times = np.clip(times_s, known_s[0], known_s[-1])
-    between = np.tile(np.eye(4), (len(times), 1, 1))
-    between[:, :3, :3] = Slerp(known_s, Rotation.from_matrix(poses[:, :3, :3]))(times).as_matrix()
-    for axis in range(3):
-        between[:, axis, 3] = np.interp(times, known_s, poses[:, axis, 3])
-    return between
 
 
 def _other(
