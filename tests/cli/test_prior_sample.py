@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from tests.data.pictures import texture
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import read_features
+from dreamdrive.prior.vista import features
 from dreamdrive.scene.action import Command
 
 SMALL = ("--frames", "0:2", "--size", "64x48")
@@ -66,10 +68,9 @@ def test_what_cannot_be_sampled_is_said(run: Run, tmp_path: Path, arguments: lis
 def test_features_of_a_recording_are_written(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    features = pytest.importorskip("dreamdrive.prior.vista.features")
-    seen: dict[str, object] = {}
+    seen: dict[str, Any] = {}
 
-    def look(frames, weights, options, **more):
+    def look(frames: np.ndarray, weights: Path, options: object, **more: Any) -> features.VideoFeatures:
         seen.update(more, options=options, frames=frames)
         return features.VideoFeatures("vista:one", np.ones((len(frames), 2, 4, 3), np.float16), ("so",))
 

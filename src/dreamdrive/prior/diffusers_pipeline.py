@@ -11,6 +11,7 @@ from dreamdrive.data.json_file import read_json
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
+from dreamdrive.memory import best_device
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.protocol import Progress
 from dreamdrive.scene.clip import Clip, Known
@@ -50,7 +51,7 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
     Raises:
         InputError: A part is missing or of another kind.
     """
-    gpu = torch.cuda.is_available()
+    gpu = best_device().type == "cuda"
     try:
         pipeline = kind.from_pretrained(
             folder,

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import torch
 from torch import Tensor, nn
 
 from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
+from dreamdrive.memory import best_device
 from dreamdrive.weights import as_state, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)
@@ -110,9 +110,4 @@ def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]
             f"{stored.source}: the installed package does not build this network "
             f"({type(error).__name__}: {error}); expected {stored.expected}"
         ) from error
-    return fill(network, state, stored.source, stored.expected).to(device())
-
-
-def device() -> torch.device:
-    """Where networks run."""
-    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    return fill(network, state, stored.source, stored.expected).to(best_device())

@@ -13,11 +13,12 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from dreamdrive.geometry.dust3r.align.focal import robust_px
-from dreamdrive.geometry.feedforward.load import build, device, read_stored, upstream
+from dreamdrive.geometry.feedforward.load import build, read_stored, upstream
 from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
+from dreamdrive.memory import best_device
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
 INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; pip install huggingface_hub"
@@ -42,7 +43,7 @@ def load_pi3(path: Path) -> Network:
 
 def _look(network: nn.Module, *, conditioned: bool) -> Callable[[Views], Seen]:
     def look(views: Views) -> Seen:
-        pictures = views.pictures.to(device())[None]
+        pictures = views.pictures.to(best_device())[None]
         out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
         points = out["local_points"][0].cpu().numpy()
         # The logit itself would do for ranks; the focal length asks for odds above one.
@@ -63,9 +64,9 @@ def _conditions(views: Views) -> dict[str, Tensor]:
         return {}
     count = len(views.pictures)
     matrices = torch.from_numpy(views.camera.matrix).float().expand(count, 3, 3)
-    known = {"intrinsics": matrices[None].to(device())}
+    known = {"intrinsics": matrices[None].to(best_device())}
     if views.world_from_camera is not None:
-        known["poses"] = torch.from_numpy(views.world_from_camera).float()[None].to(device())
+        known["poses"] = torch.from_numpy(views.world_from_camera).float()[None].to(best_device())
     return known
 
 
