@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.geometry.classical import contest
 from dreamdrive.geometry.classical.floating import Floating, floating
 from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.classical.oncoming import oncoming
 from dreamdrive.geometry.classical.outline import outline
 from dreamdrive.geometry.classical.sweep import sample
 from dreamdrive.geometry.classical.view import View, parallel
@@ -40,7 +41,8 @@ def moving_evidence(
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
     enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
-    static ones; they are found where they visibly do not stand on the road, which takes depth that was found.
+    static ones; they are found where they visibly do not stand on the road, by the motion of whole stretches
+    (``oncoming``) and by the surest pixels of depth that was found (``floating``).
 
     Args:
         view: The posed frames.
@@ -61,8 +63,11 @@ def moving_evidence(
         return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
 
     found = dict(zip(view.frames, parallel(decided, view.frames), strict=True))
-    oncoming = {} if known_depth else _oncoming(view, flows, inverse_depth, confidence, sky)
-    found |= {frame: np.maximum(found[frame], evidence) for frame, evidence in oncoming.items()}
+    coming: dict[int, np.ndarray] = {}
+    if not known_depth:
+        floats = _floating(view, flows, inverse_depth, confidence, sky)
+        coming = {frame: (mask & ~sky[frame]) | floats[frame] for frame, mask in oncoming(view).items()}
+    found |= {frame: np.where(mask, 1, found[frame]) for frame, mask in coming.items()}
     flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
     for around in range(_ROUNDS):
         if around > 0:
@@ -73,7 +78,7 @@ def moving_evidence(
 
         flagged = dict(zip(view.frames, parallel(whole, view.frames), strict=True))
     # The flow of what is taken for standing is poor: an outline may lose it.
-    flagged |= {frame: flagged[frame] | (evidence >= FLAGGED) for frame, evidence in oncoming.items()}
+    flagged |= {frame: flagged[frame] | mask for frame, mask in coming.items()}
     evidence = np.zeros(inverse_depth.shape, np.float32)
     for frame in view.frames:
         inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
@@ -81,14 +86,14 @@ def moving_evidence(
     return evidence
 
 
-def _oncoming(
+def _floating(
     view: View,
     flows: Mapping[int, list[PairFlow]],
     inverse_depth: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
-) -> dict[int, Float[np.ndarray, "h w"]]:
-    """Evidence that something floats, after the vote of the neighbours."""
+) -> dict[int, Bool[np.ndarray, "h w"]]:
+    """What seems to float, after the vote of the neighbours."""
 
     def seen(frame: int) -> Floating:
         return floating(view, frame, flows[frame], inverse_depth[frame], confidence[frame], sky[frame])
@@ -96,7 +101,7 @@ def _oncoming(
     things = dict(zip(view.frames, parallel(seen, view.frames), strict=True))
     likely = {frame: thing.likely.astype(np.float32) for frame, thing in things.items()}
     return {
-        frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame])
+        frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame]) >= FLAGGED
         for frame in view.frames
     }
 

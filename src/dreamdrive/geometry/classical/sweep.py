@@ -182,23 +182,25 @@ def matching_cost(
     correlation: Correlation, sources: Sequence[Source], cost: Float[np.ndarray, "h labels w"]
 ) -> None:
     """One minus ``similarity`` for every plane of ``inverse_depths()``, into ``cost`` (H, labels, W)."""
-    height, width = correlation.grey.shape
-    for label, inverse in enumerate(inverse_depths()):
-        found = BestTwo((height, width))
-        for warp, grey, usable in sources:
-            # A plane parallel to the image maps by a homography, which OpenCV walks faster than a map.
-            homography = warp.homography(float(inverse))
-            warped = cv2.warpPerspective(
-                grey, homography, (width, height), flags=_LINEAR, borderMode=cv2.BORDER_REPLICATE
-            )
-            seen = cv2.warpPerspective(
-                usable.view(np.uint8), homography, (width, height), flags=_NEAREST
-            ).view(np.bool_)
-            z = warp.rotated[2] + np.float32(warp.translation[2] * inverse)
-            if z.min() <= _MIN_Z:
-                seen &= z > _MIN_Z
+    for label, inverse in enumerate(inverse_depths().tolist()):
+        found = BestTwo(correlation.grey.shape)
+        for source in sources:
+            warped, seen = on_plane(source, inverse)
             found.add(correlation(warped), seen)
         np.subtract(1, found.mean(), out=cost[:, label])
+
+
+def on_plane(source: Source, inverse: float) -> tuple[Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """A source on the reference's grid if all were on the plane z = 1 / inverse, and where it sees that."""
+    warp, grey, usable = source
+    # A plane parallel to the image maps by a homography, which OpenCV walks faster than a map.
+    homography, size = warp.homography(inverse), grey.shape[::-1]
+    warped = cv2.warpPerspective(grey, homography, size, flags=_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    seen = cv2.warpPerspective(usable.view(np.uint8), homography, size, flags=_NEAREST).view(np.bool_)
+    z = warp.rotated[2] + np.float32(warp.translation[2] * inverse)
+    if z.min() <= _MIN_Z:
+        seen &= z > _MIN_Z
+    return warped, seen
 
 
 def nearest_label(inverse_depth: Float[np.ndarray, "h w"]) -> Int[np.ndarray, "h w"]:
