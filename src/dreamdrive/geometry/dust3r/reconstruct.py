@@ -21,6 +21,7 @@ from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
+from dreamdrive.geometry.standing import stands, without_poses
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -51,11 +52,13 @@ def reconstruct(
     network = load_dust3r(weights)
     evidence = look(clip)
     contradiction.check(clip, evidence)
+    # Of a standing camera the path is noise, in which no unit can be read.
+    shown = without_poses(clip) if stands(clip, evidence) else clip
     how = fitting(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]
     maps = infer(network, pictures, planned_pairs(len(clip), how.size))
-    aligned = align(masked(maps, _usable(clip, evidence, how)), _options(clip, seed), _known(clip, how))
-    return finish(clip, measured(clip, aligned, how), evidence, camera_height_m=camera_height_m, seed=seed)
+    aligned = align(masked(maps, _usable(clip, evidence, how)), _options(clip, seed), _known(shown, how))
+    return finish(clip, measured(shown, aligned, how), evidence, camera_height_m=camera_height_m, seed=seed)
 
 
 def planned_pairs(frames: int, size: tuple[int, int]) -> Int[np.ndarray, "e 2"]:

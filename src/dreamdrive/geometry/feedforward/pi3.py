@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from dreamdrive.geometry.dust3r.align.focal import robust_px
 from dreamdrive.geometry.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
@@ -34,7 +34,8 @@ def load_pi3(path: Path) -> Network:
     if "metric_token" in stored.state:
         model = upstream("pi3.models.pi3x", INSTALL)
         network = build(lambda: model.Pi3X(use_multimodal=True), stored, stored.state)
-        return Network(_look(network, conditioned=True), "the network Pi3X, metric approximately")
+        look = _look(network, conditioned=True)
+        return Network(look, "the network Pi3X, metric approximately", 2 * METRE_SPREAD)
     model = upstream("pi3.models.pi3", INSTALL)
     sizes = {name: stored.config[name] for name in ("pos_type", "decoder_size") if name in stored.config}
     network = build(lambda: model.Pi3(**sizes), stored, stored.state)

@@ -154,6 +154,11 @@ def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: Pair
     assert abs(found.focals_px[0] / drive.focal_px - 1) < 0.05
 
 
+def test_known_poses_that_stand_still_are_refused(noisy: PairMaps) -> None:
+    with pytest.raises(InputError, match="the given poses stand still, but the clip does not"):
+        align(noisy, replace(ROBUST, steps=2), Known(world_from_camera=np.tile(np.eye(4), (6, 1, 1))))
+
+
 def test_images_of_different_sizes(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "B")
     assert [depth.shape for depth in align(maps, EACH).depth] == [
