@@ -57,7 +57,7 @@ def reconstruct(
     how = fitting(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]
     maps = infer(network, pictures, planned_pairs(len(clip), how.size))
-    aligned = align(masked(maps, _usable(clip, evidence, how)), _options(clip, seed), _known(shown, how))
+    aligned = align(masked(maps, _usable(clip, evidence, how)), AlignOptions(seed=seed), _known(shown, how))
     return finish(clip, measured(shown, aligned, how), evidence, camera_height_m=camera_height_m, seed=seed)
 
 
@@ -125,12 +125,10 @@ def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n
     return np.stack([prepare_mask(one, how) for one in free_pixels(clip, evidence)])
 
 
-def _options(clip: Clip, seed: int) -> AlignOptions:
-    return AlignOptions(focal="fixed" if clip.known.intrinsics else "shared", seed=seed)
-
-
 def _known(clip: Clip, how: Fitting) -> Known:
-    focals = None
+    intrinsics = None
     if clip.known.intrinsics:
-        focals = np.full(len(clip), how.picture_camera(clip.rig[0]).fx_px)
-    return Known(focals, clip.known.world_from_camera)
+        matrix = how.picture_camera(clip.rig[0]).matrix.copy()
+        matrix[:2, 2] -= 0.5  # the alignment counts pixels from 0
+        intrinsics = np.tile(matrix, (len(clip), 1, 1))
+    return Known(intrinsics, clip.known.world_from_camera)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.dust3r.align.goldens import config, scene
-from tests.geometry.dust3r.align.pairs import path_error, street, window
+from tests.geometry.dust3r.align.pairs import path_error, pinholes, street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.adam import descend
@@ -137,10 +137,43 @@ def test_a_pair_in_another_unit_is_the_same_pair(noisy: PairMaps, paper: Aligned
 
 
 def test_known_focal_lengths_stay(drive: Truth, noisy: PairMaps) -> None:
-    given = np.full(6, drive.focal_px)
-    found = align(noisy, ROBUST, Known(focals_px=given))
-    np.testing.assert_array_equal(found.focals_px, given)
+    found = align(noisy, ROBUST, Known(intrinsics=pinholes(drive)))
+    np.testing.assert_array_equal(found.focals_px, np.full(6, drive.focal_px))
     assert path_error(found.world_from_camera, drive.world_from_camera) < 0.01
+
+
+def test_a_known_pinhole_in_the_middle_is_the_default(
+    drive: Truth, noisy: PairMaps, aligned: Aligned
+) -> None:
+    given = pinholes(drive)
+    given[:, [0, 1], [0, 1]] = aligned.focals_px[0]
+    graph = graph_of(noisy)
+    through = graph.through(given)
+    np.testing.assert_array_equal(through.principal_px, graph.principal_px)
+    np.testing.assert_array_equal(through.stretch, graph.stretch)
+
+
+@pytest.mark.parametrize("stretch", [1, 2])
+def test_a_principal_point_beside_the_middle_is_kept(stretch: int) -> None:
+    """Of pixels twice as high there are half as many rows: every second one is the same picture."""
+    truth = street(6, 56, 40 * stretch, principal_px=(23.0, 24.0 * stretch))
+    maps = pair_maps(truth, window(6), EXACT)
+    points, confidence = (
+        tuple(tuple(side[::stretch] for side in pair) for pair in part)
+        for part in (maps.points, maps.confidence)
+    )
+    maps, depth = PairMaps(maps.edges, points, confidence), truth.depth[:, ::stretch]
+    intrinsics = pinholes(truth)
+    intrinsics[:, 1] /= stretch
+    knowing, guessing = (align(maps, ROBUST, Known(intrinsics=each)) for each in (intrinsics, None))
+    errors = [path_error(each.world_from_camera, truth.world_from_camera) for each in (knowing, guessing)]
+    assert errors[0] < 1e-4
+    assert errors[1] > 20 * errors[0]
+    seen = depth > 0
+    scale = np.median(np.stack(knowing.depth)[seen] / depth[seen])
+    np.testing.assert_allclose(np.stack(knowing.depth)[seen], scale * depth[seen], rtol=2e-3)
+    assert knowing.residual.max() < 1e-3
+    assert knowing.focal_spread < 1e-4 < guessing.focal_spread
 
 
 def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: PairMaps) -> None:
@@ -202,8 +235,8 @@ def test_what_is_too_large_is_refused_before_it_starts(noisy: PairMaps) -> None:
 @pytest.mark.parametrize(
     ("known", "message"),
     [
-        (Known(focals_px=np.array([1.0, 2.0])), "6 images take 6 positive focal lengths"),
-        (Known(focals_px=np.full(6, -1.0)), "6 images take 6 positive focal lengths"),
+        (Known(intrinsics=np.eye(3)[None]), "6 images take 6 pinholes"),
+        (Known(intrinsics=-np.tile(np.eye(3), (6, 1, 1))), "6 images take 6 pinholes with positive"),
         (Known(world_from_camera=np.eye(4)[None]), "6 images take 6 poses; got 1"),
         (Known(world_from_camera=np.full((6, 4, 4), 2.0)), "known poses cannot be used"),
     ],

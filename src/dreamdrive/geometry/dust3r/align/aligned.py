@@ -152,10 +152,7 @@ def _pair_spread(maps: PairMaps, state: State) -> float:
 def _residuals(found: Found, edges: int) -> Float[np.ndarray, " e"]:
     parts: list[list[np.ndarray]] = [[] for _ in range(edges)]
     for samples in found.samples:
-        depth = found.dense.depth[samples.image]
-        height, width = depth.shape
-        columns, rows = np.rint(samples.pixels.numpy() + np.array([width / 2, height / 2])).astype(np.intp).T
-        here = depth[rows, columns].astype(np.float64)
+        here = found.dense.depth[samples.image].ravel()[samples.index].astype(np.float64)
         misses = samples.misses(found.state)
         along = misses.length.numpy() * (here - misses.foot.numpy())
         relative = np.sqrt(along**2 + misses.across2.numpy()) / here

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
-from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_votes
+from dreamdrive.geometry.dust3r.align.focal import FocalRule, FocalVotes, focal_votes
 from dreamdrive.geometry.dust3r.align.freedom import FocalFreedom, Freedom
 from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.known import onto_known
@@ -36,8 +36,9 @@ class AlignOptions:
             with relative misses under a cost that forgives outliers, and counts those across the ray more
             than those along it.
         normalisation: How the paper's loss divides, see ``objective.half_areas``.
-        focal: One focal length for all images, which one camera took; one for ``each``; or ``fixed`` where it
-            starts.
+        focal: One focal length for all images, which one camera took, or one for ``each``.
+        focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
+            paper's.
         samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
         outlier: Relative miss from which on the robust cost grows slowly.
         sharper: How much more a miss across the ray counts than one along it, in the robust cost.
@@ -49,6 +50,7 @@ class AlignOptions:
     objective: Literal["distance", "robust"] = "robust"
     normalisation: Normalisation = "pooled"
     focal: FocalFreedom = "shared"
+    focal_rule: FocalRule = "robust"
     samples_per_image: int = 2000
     outlier: float = 0.05
     sharper: float = 3.0
@@ -62,11 +64,12 @@ class Known:
     """What need not be found.
 
     Attributes:
-        focals_px: Focal length of each image (N,), or None.
+        intrinsics: Pinhole of each image (N, 3, 3), pixels counted from 0; None leaves the focal lengths to
+            be found and has the principal points in the middle, (W/2, H/2).
         world_from_camera: Poses (N, 4, 4), or None. The scene then is given in their world and unit.
     """
 
-    focals_px: Float[np.ndarray, " n"] | None = None
+    intrinsics: Float[np.ndarray, "n 3 3"] | None = None
     world_from_camera: Float[np.ndarray, "n 4 4"] | None = None
 
 
@@ -79,7 +82,7 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
     Args:
         maps: Pairs that link all images, directed.
         options: None are the defaults.
-        known: Focal lengths or poses to keep.
+        known: Pinholes or poses to keep.
 
     Raises:
         InputError: The pairs or what is known cannot be used, or memory would not do.
@@ -87,6 +90,8 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
     options, known = options or AlignOptions(), known or Known()
     graph = graph_of(maps)
     _check_known(known, len(graph))
+    if known.intrinsics is not None:
+        graph = graph.through(known.intrinsics)
     storage = max(side.dtype.itemsize for pair in maps.points for side in pair)
     predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
     check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
@@ -95,15 +100,15 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
 
 
 def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
-    votes = focal_votes(maps)
-    start = spanning_tree(maps, votes)
+    votes = focal_votes(maps, options.focal_rule, graph)
+    start = spanning_tree(maps, votes, graph)
     start = replace(start, focals_px=_first_focals(start, votes, options, known))
     poses = start.world_from_camera
     if known.world_from_camera is not None:
         start, poses = onto_known(start, known.world_from_camera)
     state = State.of(poses, start.focals_px, start.pairs)
     freedom = Freedom(
-        "fixed" if known.focals_px is not None else options.focal, poses=known.world_from_camera is None
+        None if known.intrinsics is not None else options.focal, poses=known.world_from_camera is None
     )
     samples = draw_samples(maps, graph, options.samples_per_image, options.normalisation, options.seed)
     penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
@@ -119,7 +124,7 @@ def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -
         graph,
         Found(found.state, dense, samples, found.losses),
         votes,
-        focal_known=known.focals_px is not None,
+        focal_known=known.intrinsics is not None,
         known_poses=known.world_from_camera,
     )
 
@@ -127,19 +132,22 @@ def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -
 def _first_focals(
     start: Start, votes: FocalVotes, options: AlignOptions, known: Known
 ) -> Float[np.ndarray, " n"]:
-    if known.focals_px is not None:
-        return known.focals_px.astype(np.float64)
+    if known.intrinsics is not None:
+        return known.intrinsics[:, 0, 0].astype(np.float64)
     if options.focal == "shared":
         return np.full(len(start.focals_px), votes.shared_px)
     return start.focals_px
 
 
 def _check_known(known: Known, images: int) -> None:
-    focals, poses = known.focals_px, known.world_from_camera
-    if focals is not None and (len(focals) != images or not (np.isfinite(focals) & (focals > 0)).all()):
-        raise InputError(
-            f"{images} images take {images} positive focal lengths in pixels; got {focals.tolist()}."
-        )
+    pinholes, poses = known.intrinsics, known.world_from_camera
+    if pinholes is not None:
+        focals = pinholes[:, [0, 1], [0, 1]]
+        if len(pinholes) != images or not (np.isfinite(pinholes).all() and (focals > 0).all()):
+            raise InputError(
+                f"{images} images take {images} pinholes with positive focal lengths in pixels; got "
+                f"{focals.tolist()}."
+            )
     if poses is None:
         return
     if len(poses) != images:
