@@ -11,7 +11,7 @@ from jaxtyping import Bool
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical import contradiction
 from dreamdrive.geometry.classical.evidence import free_pixels, look
-from dreamdrive.geometry.feedforward.camera import SharedCamera, share
+from dreamdrive.geometry.feedforward.camera import SharedCamera, seen_through, share
 from dreamdrive.geometry.feedforward.chunks import Joined, chunks, join
 from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import fit_patches, show
@@ -169,7 +169,8 @@ def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
     with torch.inference_mode():
         seen = network.look(views)
     depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
-    return replace(seen, depth=depth)
+    seen = replace(seen, depth=depth)
+    return seen if views.camera is None else seen_through(seen, views.camera)
 
 
 def _notes(clip: Clip, joined: Joined, shared: SharedCamera) -> list[str]:
