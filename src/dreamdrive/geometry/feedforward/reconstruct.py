@@ -19,6 +19,7 @@ from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
+from dreamdrive.geometry.protocol import Progress, silent
 from dreamdrive.geometry.standing import stands, unit_in, without_poses
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -48,7 +49,13 @@ class FeedForward:
     overlap: int = 8
 
     def __call__(
-        self, clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+        self,
+        clip: Clip,
+        *,
+        camera_height_m: float | None = None,
+        seed: int = 0,
+        weights: Path | None = None,
+        progress: Progress = silent,
     ) -> Geometry:
         """Cameras and depth of the network, brought to metres.
 
@@ -59,6 +66,7 @@ class FeedForward:
             camera_height_m: Height of the camera above the road; None assumes 1.5 m.
             seed: Seed of everything random.
             weights: The network's file or folder.
+            progress: Told after each chunk of frames, and at the end.
 
         Raises:
             InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
@@ -71,10 +79,17 @@ class FeedForward:
         contradiction.check(clip, evidence)
         # Of a standing camera the path is noise, in which no unit can be read.
         shown = without_poses(clip) if stands(clip, evidence) else clip
-        found = self.measure(shown, free_pixels(clip, evidence), weights, seed)
+        found = self.measure(shown, free_pixels(clip, evidence), weights, seed, progress)
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
 
-    def measure(self, clip: Clip, free: Bool[np.ndarray, "f h w"], weights: Path, seed: int = 0) -> Measured:
+    def measure(
+        self,
+        clip: Clip,
+        free: Bool[np.ndarray, "f h w"],
+        weights: Path,
+        seed: int = 0,
+        progress: Progress = silent,
+    ) -> Measured:
         """Cameras and depth of the network, in its unit or that of known poses.
 
         Args:
@@ -82,6 +97,7 @@ class FeedForward:
             free: Pixels (F, H, W) that show the street.
             weights: The network's file or folder.
             seed: Seed of everything random.
+            progress: Told after each chunk of frames; a last step is left for what follows.
 
         Raises:
             InputError: The weights or results cannot be used.
@@ -90,10 +106,11 @@ class FeedForward:
         with torch.random.fork_rng():
             torch.manual_seed(seed)
             network = self.load(weights)
-            parts = [
-                (frames, _see(network, clip, frames, how))
-                for frames in chunks(len(clip), self.chunk, self.overlap)
-            ]
+            parts: list[tuple[range, Seen]] = []
+            cut = chunks(len(clip), self.chunk, self.overlap)
+            for frames in cut:
+                parts.append((frames, _see(network, clip, frames, how)))
+                progress(len(parts), len(cut) + 1)
         shared = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
         usable = np.stack([prepare_mask(one, how) for one in free])
         joined = join(parts, how.picture_camera(_camera(clip, shared)), usable)

@@ -1,10 +1,11 @@
 """Global alignment: from pairwise pointmaps to one world (Wang et al. 2024, section 3.4)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
@@ -73,7 +74,12 @@ class Known:
     world_from_camera: Float[np.ndarray, "n 4 4"] | None = None
 
 
-def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | None = None) -> Aligned:
+def align(
+    maps: PairMaps,
+    options: AlignOptions | None = None,
+    known: Known | None = None,
+    still: Sequence[Bool[np.ndarray, "_ _"]] | None = None,
+) -> Aligned:
     """Bring pairwise pointmaps into one world.
 
     Without known poses the world is the camera of image 0, in a unit in which the scales of the pairs have a
@@ -83,6 +89,8 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
         maps: Pairs that link all images, directed.
         options: None are the defaults.
         known: Pinholes or poses to keep.
+        still: Pixels (H, W) of each image that cameras and pairs are solved with; the depth is that of all.
+            None solves with all.
 
     Raises:
         InputError: The pairs or what is known cannot be used, or memory would not do.
@@ -96,12 +104,13 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
     predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
     check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
     with one_torch_thread():
-        return _solved(maps, graph, options, known)
+        return _solved(maps, maps if still is None else maps.masked(still), graph, options, known)
 
 
-def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
-    votes = focal_votes(maps, options.focal_rule, graph)
-    start = spanning_tree(maps, votes, graph)
+def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
+    """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
+    votes = focal_votes(sure, options.focal_rule, graph)
+    start = spanning_tree(sure, votes, graph)
     start = replace(start, focals_px=_first_focals(start, votes, options, known))
     poses = start.world_from_camera
     if known.world_from_camera is not None:
@@ -110,7 +119,7 @@ def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -
     freedom = Freedom(
         None if known.intrinsics is not None else options.focal, poses=known.world_from_camera is None
     )
-    samples = draw_samples(maps, graph, options.samples_per_image, options.normalisation, options.seed)
+    samples = draw_samples(sure, graph, options.samples_per_image, options.normalisation, options.seed)
     penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
     if options.objective == "distance":
         found = solve(samples, state, penalty, freedom, steps=options.steps)
