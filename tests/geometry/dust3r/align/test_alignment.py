@@ -62,7 +62,7 @@ def test_exact_pairs_give_the_truth(drive: Truth, options: AlignOptions) -> None
 
 
 @pytest.mark.parametrize(("name", "run"), [("A", "cosine"), ("B", "fixed")])
-def test_the_loss_is_no_higher_than_after_300_steps_of_adam(golden_dir: Path, name: str, run: str) -> None:
+def test_the_loss_is_no_higher_than_golden_after_300_steps(golden_dir: Path, name: str, run: str) -> None:
     maps, inputs, _ = scene(golden_dir, name)
     theirs = config(golden_dir)[f"{name}.{run}"]
     found = align(maps, EACH)
@@ -75,7 +75,7 @@ def test_the_loss_is_no_higher_than_after_300_steps_of_adam(golden_dir: Path, na
     assert error < 1.2 * metrics["ate_rmse"]
 
 
-def test_the_loss_is_that_of_the_authors(golden_dir: Path) -> None:
+def test_the_loss_on_a_golden_scene_is_that_of_the_authors(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "A")
     found = align(maps, EACH)
     objective = Objective(maps, graph_of(maps))
@@ -192,7 +192,7 @@ def test_known_poses_that_stand_still_are_refused(noisy: PairMaps) -> None:
         align(noisy, replace(ROBUST, steps=2), Known(world_from_camera=np.tile(np.eye(4), (6, 1, 1))))
 
 
-def test_images_of_different_sizes(golden_dir: Path) -> None:
+def test_golden_images_of_different_sizes(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "B")
     assert [depth.shape for depth in align(maps, EACH).depth] == [
         (24, 40),

@@ -23,7 +23,7 @@ CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "p
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_papers_rules_are_upstreams(golden_dir: Path, case: str) -> None:
+def test_the_papers_rules_are_golden(golden_dir: Path, case: str) -> None:
     wanted = json.loads((golden_dir / "dust3r/weiszfeld.json").read_text())[case]
     points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")[case]
     principal = tuple(wanted["pp"])
@@ -33,7 +33,7 @@ def test_the_papers_rules_are_upstreams(golden_dir: Path, case: str) -> None:
     assert clipped == pytest.approx(wanted["weiszfeld_clipped"], rel=1e-6)
 
 
-def test_a_fifth_of_gross_outliers_moves_the_robust_rule_by_little(golden_dir: Path) -> None:
+def test_a_fifth_of_gross_golden_outliers_moves_the_robust_rule_by_little(golden_dir: Path) -> None:
     points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")["noise_outliers"]
     assert abs(weiszfeld_px(points) / 36 - 1) > 0.5
     assert abs(robust_px(points) / 36 - 1) < 0.015
