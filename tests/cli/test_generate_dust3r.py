@@ -98,7 +98,7 @@ def moved(count: int) -> np.ndarray:
         ("missing", "enc_norm.bias"),
         ("extra", "surplus.weight"),
         ("head", "head is stated as 'linear'"),
-        ("few", "takes two frames or more; got 1"),
+        ("few", "gives a single frame"),
         ("alike", "all 4 frames are alike"),
         ("contradict", "the given poses contradict the frames"),
     ],

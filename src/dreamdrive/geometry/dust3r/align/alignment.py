@@ -9,12 +9,12 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
+from dreamdrive.geometry.dust3r.align.areas import Normalisation
 from dreamdrive.geometry.dust3r.align.focal import FocalRule, FocalVotes, focal_votes
 from dreamdrive.geometry.dust3r.align.freedom import FocalFreedom, Freedom
 from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.known import onto_known
 from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.dust3r.align.objective import Normalisation
 from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
 from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.dust3r.align.solver import solve
@@ -36,7 +36,7 @@ class AlignOptions:
         objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
             with relative misses under a cost that forgives outliers, and counts those across the ray more
             than those along it.
-        normalisation: How the paper's loss divides, see ``objective.half_areas``.
+        normalisation: How the paper's loss divides, see ``areas.half_areas``.
         focal: One focal length for all images, which one camera took, or one for ``each``.
         focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
             paper's.

@@ -6,9 +6,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from dreamdrive.geometry.dust3r.align.areas import Normalisation, half_areas
 from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.normal import ImageSamples
-from dreamdrive.geometry.dust3r.align.objective import Normalisation, half_areas
 from dreamdrive.geometry.dust3r.align.penalty import Penalty
 from dreamdrive.geometry.dust3r.align.rays import RayMisses, pixel_rays
 from dreamdrive.geometry.dust3r.align.state import State
