@@ -54,7 +54,8 @@ def finish(
         poses = _known_in_metres(clip, poses)
     others = {name: metres_in_one / metres for name, metres_in_one in measured.others.items()}
     metric = replace(metric, scale=replace(metric.scale, others={**metric.scale.others, **others}))
-    details = {**measured.details, "metres_per_unit": metres}
+    # Of a standing clip it is not that of the poses, as which others read it.
+    details = measured.details if still else {**measured.details, "metres_per_unit": metres}
     posed = as_posed(clip, evidence, poses, measured.camera, metric, measured.focal_observed, notes, details)
     posed = replace(posed, standing=still)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
@@ -110,12 +111,21 @@ def _metric(
     ratios = _ratios(clip, measured, factor)
     if len(ratios) >= MIN_RATIOS:
         return scales.from_depth(ratios, street, height_m, seed)
-    found = scales.from_road_points(street, height_m, measured.focal_observed, seed)
+    slow = scales.median_speed(street) < scales.SPEEDS_M_S[0]
+    seen = _in_place(street) if slow else street
+    found = scales.from_road_points(seen, height_m, measured.focal_observed, seed)
     if found is not None:
         return found
-    if scales.median_speed(street) < scales.SPEEDS_M_S[0]:
+    if slow:
         return _by_median_depth()
     return scales.from_ground(street, height_m, measured.focal_observed, seed)
+
+
+def _in_place(street: Street) -> Street:
+    """As if the camera only turned: steps that are noise would say that up is anywhere."""
+    poses = street.world_from_camera.copy()
+    poses[:, :3, 3] = 0
+    return replace(street, world_from_camera=poses)
 
 
 def _over(ground: Ground, street: Street, measured: Measured, seed: int) -> Metric:
