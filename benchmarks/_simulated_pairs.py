@@ -52,6 +52,8 @@ class Truth:
         focal_px: Of all frames.
         offset_px: Where in a pixel its depth is true: 0 where pixels are counted as the network does, 0.5 at
             centres of pixels whose corner is at 0.
+        principal_px: Column and row of the principal point, pixels counted from 0; None is the middle,
+            (W/2, H/2).
         instance: Labels (N, H, W) of the moving things, from 1; 0 elsewhere.
         centres: Their places (B, N, 3) in the world at each frame, in the order of the labels.
     """
@@ -60,8 +62,15 @@ class Truth:
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focal_px: float
     offset_px: float = 0.0
+    principal_px: tuple[float, float] | None = None
     instance: Int[np.ndarray, "n h w"] | None = None
     centres: Float[np.ndarray, "b n 3"] | None = None
+
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        """Column and row of the principal point."""
+        height, width = self.depth.shape[1:]
+        return (width / 2, height / 2) if self.principal_px is None else self.principal_px
 
     def mistaken(self, i: int, j: int, image: int) -> Float[np.ndarray, "h w"]:
         """Factor on the depth of what moves, for who takes it to stand still between frames i and j.
@@ -176,8 +185,9 @@ def smooth_noise(
 
 def _lifted(depth: Float[np.ndarray, "h w"], truth: Truth) -> Float[np.ndarray, "h w 3"]:
     height, width = depth.shape
-    columns = (np.arange(width) + truth.offset_px - width / 2) / truth.focal_px
-    rows = (np.arange(height) + truth.offset_px - height / 2) / truth.focal_px
+    cx, cy = truth.middle_px
+    columns = (np.arange(width) + truth.offset_px - cx) / truth.focal_px
+    rows = (np.arange(height) + truth.offset_px - cy) / truth.focal_px
     return np.stack([columns * depth, rows[:, None] * depth, depth], axis=-1)
 
 
@@ -190,5 +200,7 @@ def _looked_at(points: Float[np.ndarray, "h w 3"], truth: Truth) -> Bool[np.ndar
     height, width = points.shape[:2]
     x, y, z = np.moveaxis(points, -1, 0)
     pixel = np.maximum(z, 1e-9) / truth.focal_px
+    cx, cy = truth.middle_px
     # A pixel more on all sides: at the very edge rounding would decide.
-    return (z > 0) & (np.abs(x) <= pixel * (width / 2 + 1)) & (np.abs(y) <= pixel * (height / 2 + 1))
+    inside = (x >= -pixel * (cx + 1)) & (x <= pixel * (width - cx + 1))
+    return (z > 0) & inside & (y >= -pixel * (cy + 1)) & (y <= pixel * (height - cy + 1))

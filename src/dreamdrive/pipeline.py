@@ -154,7 +154,7 @@ def _make(
         "geometry",
         ("prior",),
         [method, height_m, chosen["refine_poses"], *of_geometry, seed["geometry"]],
-        lambda _: _reconstructed(
+        lambda tell: _reconstructed(
             clip if geometry_files is None else attach(clip, geometry_files, control.path),
             clip,
             camera_height_m=height_m,
@@ -162,6 +162,7 @@ def _make(
             method=method,
             weights=weights,
             refine_poses=chosen["refine_poses"],
+            progress=tell,
         ),
     )
     seeds = stages.run(

@@ -63,7 +63,7 @@ def describe(
             }
             for actor in scene.actors
         ],
-        "scale": asdict(geometry.scale),
+        "scale": {**asdict(geometry.scale), "disagreement": geometry.scale.disagreement},
         "focal": asdict(geometry.focal),
         "requested": against_request(clip, geometry),
         "detected": list(geometry.detected),

@@ -3,7 +3,10 @@
 import json
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+import torch
 from tests.cli.conftest import Run
 from tests.geometry.dust3r.network.golden import tiny
 from tests.geometry.dust3r.network.test_checkpoint import save_hub, save_pth
@@ -39,6 +42,87 @@ def test_a_clip_becomes_a_scene_and_other_weights_another(run: Run, tmp_path: Pa
     assert same.code == 0
     assert other.code == 2
     assert "--force" in other.err
+
+
+def changed(path: Path, changes: dict[str, torch.Tensor | None], **stated: object) -> Path:
+    """A checkpoint with tensors replaced, added or (None) left out."""
+    network = tiny()
+    state = {**network.state_dict(), **changes}
+    return save_pth(
+        path,
+        network,
+        {key: value for key, value in state.items() if value is not None},
+        **{"img_size": (160, 160), **stated},
+    )
+
+
+def damaged(name: str, folder: Path) -> Path:
+    """A checkpoint with something wrong."""
+    path = folder / f"{name}.pth"
+    if name == "other":
+        torch.save({"model": {"layer.weight": torch.zeros(2, 2)}}, path)
+    elif name == "truncated":
+        whole = save_pth(folder / "whole.pth", tiny(), img_size=(160, 160)).read_bytes()
+        path.write_bytes(whole[: len(whole) // 2])
+    elif name == "missing":
+        changed(path, {"enc_norm.bias": None})
+    elif name == "extra":
+        changed(path, {"surplus.weight": torch.zeros(3)})
+    elif name == "head":
+        changed(path, {}, head_type="linear")
+    else:
+        save_pth(path, tiny(), img_size=(160, 160))
+    return path
+
+
+def pictures(folder: Path, frames: np.ndarray) -> Path:
+    folder.mkdir()
+    for index, frame in enumerate(frames):
+        cv2.imwrite(str(folder / f"{index:04d}.png"), frame)
+    return folder
+
+
+def moved(count: int) -> np.ndarray:
+    """Frames of a wall that goes by to the left."""
+    random = np.random.default_rng(0)
+    wall = cv2.GaussianBlur(random.uniform(0, 255, (160, 400)).astype(np.float32), (0, 0), 2)
+    wall = np.clip((wall - wall.mean()) * 4 + 120, 0, 255).astype(np.uint8)
+    return np.stack([np.repeat(wall[:, 8 * k : 8 * k + 256, None], 3, 2) for k in range(count)])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("other", "no DUSt3R model"),
+        ("truncated", "truncated.pth"),
+        ("missing", "enc_norm.bias"),
+        ("extra", "surplus.weight"),
+        ("head", "head is stated as 'linear'"),
+        ("few", "gives a single frame"),
+        ("alike", "all 4 frames are alike"),
+        ("contradict", "the given poses contradict the frames"),
+    ],
+)
+def test_bad_input_is_refused_in_words(run: Run, tmp_path: Path, wrong: str, message: str) -> None:
+    frames = moved(1 if wrong == "few" else 8)
+    if wrong == "alike":
+        frames = frames[[0] * 4]
+    more: list[object] = []
+    if wrong == "contradict":
+        poses = np.tile(np.eye(4), (8, 1, 1))
+        poses[:, 1, 3] = np.arange(8)  # upwards
+        text = "\n".join(" ".join(map(str, pose[:3].ravel())) for pose in poses)
+        (tmp_path / "poses.txt").write_text(text)
+        more = ["--geometry-files", tmp_path / "poses.txt"]
+    refused = run(
+        "generate",
+        pictures(tmp_path / "frames", frames),
+        *("--size", "256x160", "--quality", "draft", "--geometry", "dust3r"),
+        *("--weights", damaged(wrong, tmp_path), *more, "-o", tmp_path / "out"),
+    )
+    assert refused.code == 2, refused.err
+    assert message in " ".join(refused.err.split())
+    assert "Traceback" not in refused.err
 
 
 @pytest.mark.parametrize(

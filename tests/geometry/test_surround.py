@@ -75,6 +75,13 @@ def test_cameras_that_are_nowhere_are_refused() -> None:
         reconstruct_cameras(replace(clip, rig=rig), Method())
 
 
+def test_two_of_the_others_at_one_place_are_refused() -> None:
+    clip = rig_clip()
+    two = (*clip.rig, clip.rig[1])
+    with pytest.raises(InputError, match="3 cameras, and neither their poses nor how they are mounted"):
+        reconstruct_cameras(replace(clip, rig=two), Method())
+
+
 def test_a_refusal_names_the_camera() -> None:
     method = Method()
 

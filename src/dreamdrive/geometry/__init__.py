@@ -1,13 +1,16 @@
 """F_MVS (eq. 4): from a clip to cameras, depth, confidence, sky and evidence of motion."""
 
 from functools import partial
+from itertools import count
 from pathlib import Path
+
+import numpy as np
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical import CLASSICAL
 from dreamdrive.geometry.dust3r import DUST3R
 from dreamdrive.geometry.feedforward import FEED_FORWARD
-from dreamdrive.geometry.protocol import GeometryBackend
+from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
 from dreamdrive.geometry.refine import refined
 from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.scene.clip import Clip
@@ -39,6 +42,7 @@ def reconstruct(
     method: str = "classical",
     weights: Path | None = None,
     refine_poses: bool = False,
+    progress: Progress = silent,
 ) -> Geometry:
     """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
 
@@ -49,6 +53,7 @@ def reconstruct(
         method: Name of the method.
         weights: The network's file or folder, for methods that have one.
         refine_poses: Whether known poses give the length of the path only, see ``refine``.
+        progress: Told of each step, where the method can count them.
 
     Raises:
         InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.
@@ -56,5 +61,14 @@ def reconstruct(
     backend = backend_of(method, weights)
     how = partial(backend.reconstruct, camera_height_m=camera_height_m, seed=seed, weights=weights)
     if refine_poses:
-        return refined(clip, how)
-    return how(clip) if len(clip.rig) == 1 else reconstruct_cameras(clip, how)
+        return refined(clip, partial(how, progress=progress))
+    if len(clip.rig) == 1:
+        return how(clip, progress=progress)
+    cameras = len(np.unique(clip.camera))
+    turn = count()
+
+    def one(part: Clip) -> Geometry:
+        before = next(turn)
+        return how(part, progress=lambda done, total: progress(before * total + done, cameras * total))
+
+    return reconstruct_cameras(clip, one)

@@ -9,15 +9,17 @@ from dreamdrive.geometry.classical import assemble
 from dreamdrive.geometry.classical import scale as scales
 from dreamdrive.geometry.classical.dense import StaticDepth, densify
 from dreamdrive.geometry.classical.evidence import Evidence
-from dreamdrive.geometry.classical.known import depth_points
+from dreamdrive.geometry.classical.known import MIN_RATIOS, depth_points, in_metres
 from dreamdrive.geometry.classical.paths import rebase
 from dreamdrive.geometry.classical.poses import as_posed
 from dreamdrive.geometry.classical.scale import Metric, Street
 from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.standing import stands
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.geometry import Geometry, Ground, Scale
 
 _MEDIAN_DEPTH_M = 12.0  # of a street seen from a car; makes "near" a word before the metre is known
+_STANDING = "the camera stands still: its path is noise and not used"
 
 
 def finish(
@@ -25,7 +27,9 @@ def finish(
 ) -> Geometry:
     """Bring what was measured to metres and find road, sky and what moves, as for any clip.
 
-    The metre comes from the unit where that is one, else from the height of the camera above the road.
+    The metre comes from the unit where that is one, else from known depth in metres, else from the height of
+    the camera above the road. Of a clip that stands still the measured path is noise: all frames get one
+    pose, or the known ones where these are in metres.
 
     Args:
         clip: The frames.
@@ -34,23 +38,54 @@ def finish(
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
     """
+    still = stands(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)
-    poses = measured.world_from_camera.astype(np.float64)
+    poses = np.tile(np.eye(4), (len(clip), 1, 1)) if still else measured.world_from_camera.astype(np.float64)
     poses[:, :3, 3] *= factor
     metric = _metric(clip, measured, evidence, poses, factor, camera_height_m, seed)
+    metres = factor * metric.factor
     poses, _ = rebase(poses, np.zeros((0, 3)))
     poses[:, :3, 3] *= metric.factor
-    details = {**measured.details, "metres_per_unit": factor * metric.factor}
     notes = [*measured.notes, *metric.notes]
+    if still:
+        notes.append(_STANDING)
+        if not clip.known.metric and clip.known.world_from_camera is not None:
+            notes.append("the given poses and depth, in an unknown unit, are not used")
+        poses = _known_in_metres(clip, poses)
+    others = {name: metres_in_one / metres for name, metres_in_one in measured.others.items()}
+    metric = replace(metric, scale=replace(metric.scale, others={**metric.scale.others, **others}))
+    # Of a standing clip it is not that of the poses, as which others read it.
+    details = measured.details if still else {**measured.details, "metres_per_unit": metres}
     posed = as_posed(clip, evidence, poses, measured.camera, metric, measured.focal_observed, notes, details)
-    depth_m = (measured.depth * np.float32(factor * metric.factor)).astype(np.float32)
-    dense = densify(clip, posed, StaticDepth(depth_m, measured.confidence))
+    posed = replace(posed, standing=still)
+    depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
+    known = in_metres(clip, _of_known(clip, metres, still))
+    dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
     return assemble(clip, posed, dense)
 
 
 def _rough_factor(measured: Measured) -> float:
     depth = measured.depth[measured.depth > 0]
     return _MEDIAN_DEPTH_M / float(np.median(depth)) if len(depth) else 1.0
+
+
+def _known_in_metres(clip: Clip, poses: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "f 4 4"]:
+    """The known poses in the frame of the first, if they are in metres, else the given ones."""
+    known = clip.known.world_from_camera
+    if known is None or not clip.known.metric:
+        return poses
+    return rebase(known.astype(np.float64), np.zeros((0, 3)))[0]
+
+
+def _of_known(clip: Clip, metres: float, still: bool) -> float | None:
+    """What makes metres of known depth; None where nothing does.
+
+    Of an unknown unit it shares that of the known poses, which is that of what was measured unless the camera
+    stands.
+    """
+    if clip.known.metric:
+        return 1.0
+    return None if still or clip.known.world_from_camera is None else metres
 
 
 def _metric(
@@ -69,6 +104,51 @@ def _metric(
     small = measured.camera.resized(evidence.small.width_px, evidence.small.height_px)
     asked_m_s = scales.asked_m_s(clip)
     street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
-    if measured.unit is None:
-        return scales.from_ground(street, height_m, measured.focal_observed, seed)
-    return scales.as_given(street, measured.unit, measured.unit_spread, measured.unit, height_m, seed)
+    if clip.known.ground is not None and clip.known.world_from_camera is not None and clip.known.metric:
+        return _over(clip.known.ground.seen_from(clip.known.world_from_camera[0]), street, measured, seed)
+    if measured.unit is not None:
+        return scales.as_given(street, measured.unit, measured.unit_spread, measured.unit, height_m, seed)
+    ratios = _ratios(clip, measured, factor)
+    if len(ratios) >= MIN_RATIOS:
+        return scales.from_depth(ratios, street, height_m, seed)
+    slow = scales.median_speed(street) < scales.SPEEDS_M_S[0]
+    seen = _in_place(street) if slow else street
+    found = scales.from_road_points(seen, height_m, measured.focal_observed, seed)
+    if found is not None:
+        return found
+    if slow:
+        return _by_median_depth()
+    return scales.from_ground(street, height_m, measured.focal_observed, seed)
+
+
+def _in_place(street: Street) -> Street:
+    """As if the camera only turned: steps that are noise would say that up is anywhere."""
+    poses = street.world_from_camera.copy()
+    poses[:, :3, 3] = 0
+    return replace(street, world_from_camera=poses)
+
+
+def _over(ground: Ground, street: Street, measured: Measured, seed: int) -> Metric:
+    """Over a known road: the height of the camera above it tells metres where the unit does not."""
+    if measured.unit is not None:
+        return Metric(1.0, ground, Scale(measured.unit, measured.unit_spread), ())
+    found = scales.from_road_points(street, ground.offset_m, measured.focal_observed, seed)
+    return replace(found or _by_median_depth(), ground=ground)
+
+
+def _ratios(clip: Clip, measured: Measured, factor: float) -> Float[np.ndarray, " n"]:
+    """Known depth in metres over measured depth times ``factor``, where both are."""
+    known = clip.known.depth_m
+    if known is None or not clip.known.metric:
+        return np.zeros(0)
+    both = (known > 0) & (measured.depth > 0) & ~clip.held_out[:, None, None]
+    return known[both].astype(np.float64) / (factor * measured.depth[both])
+
+
+def _by_median_depth() -> Metric:
+    """The rough factor, where the path is none and no road was seen."""
+    problem = "no road plane was found, and the path shows no speed"
+    words = f"a median depth of {_MEDIAN_DEPTH_M:.0f} m is assumed"
+    return Metric(
+        1.0, None, Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD), (f"{problem}: {words}",)
+    )

@@ -43,6 +43,7 @@ class Measured:
         confidence: Trust in it (F, H, W) in [0, 1].
         unit: What says that the unit is the metre, in words; None where nothing does.
         unit_spread: How far that metre may be off, as a fraction.
+        others: What else tells metres, by its source: its metres in the unit of the poses.
         notes: What was noticed, a sentence each.
         details: Figures for the report, as JSON values.
     """
@@ -54,6 +55,7 @@ class Measured:
     confidence: Float[np.ndarray, "f h w"]
     unit: str | None = None
     unit_spread: float = 0.0
+    others: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 

@@ -1,5 +1,6 @@
 """What every way of getting geometry has in common."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -8,13 +9,26 @@ from dreamdrive.backend import Backend
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
+Progress = Callable[[int, int], None]
+"""Called with steps done and steps in all."""
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
 
 @runtime_checkable
 class Reconstruct(Protocol):
     """The stage F_MVS (eq. 4): from a clip to posed cameras and dense depth."""
 
     def __call__(
-        self, clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+        self,
+        clip: Clip,
+        *,
+        camera_height_m: float | None = None,
+        seed: int = 0,
+        weights: Path | None = None,
+        progress: Progress = silent,
     ) -> Geometry:
         """Reconstruct a clip.
 
@@ -25,6 +39,7 @@ class Reconstruct(Protocol):
                 gives it; None assumes 1.5 m.
             seed: Seed of everything random; same clip and seed, same geometry.
             weights: The network's file or folder, for backends that have one.
+            progress: Told of each step, by backends that can count them.
         """
         ...
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
@@ -43,7 +44,7 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
 def _unmounted(clip: Clip) -> bool:
     """Whether two cameras of the rig are at the same place, looking the same way: no mounting was given."""
     mountings = [camera.world_from_camera for camera in clip.rig]
-    return any(np.allclose(mountings[0], other) for other in mountings[1:])
+    return any(np.allclose(one, other) for one, other in combinations(mountings, 2))
 
 
 def _poses(clip: Clip, lead: int, first: Geometry) -> Float[np.ndarray, "f 4 4"]:

@@ -1,8 +1,10 @@
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from tests.geometry.dust3r.network.golden import tiny
 from tests.geometry.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
@@ -11,6 +13,8 @@ from dreamdrive.data.world import make_street
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.dust3r.reconstruct import planned_pairs
 from dreamdrive.geometry.finish import finish
@@ -18,6 +22,7 @@ from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip
 
 FRAMES, SIZE = 6, (160, 96)
+MODULE = import_module("dreamdrive.geometry.dust3r.reconstruct")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +69,17 @@ def test_a_unit_that_is_the_metre_is_kept(drive, clip: Clip):
 
 
 def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip, weights: Path):
-    found = reconstruct(clip, method="dust3r", weights=weights, camera_height_m=1.5)
+    told: list[tuple[int, int]] = []
+    found = reconstruct(
+        clip,
+        method="dust3r",
+        weights=weights,
+        camera_height_m=1.5,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert {total for _, total in told} == {FRAMES + len(make_pairs(FRAMES)) + 1}
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert told[-1][0] == told[-1][1] - 1  # the alignment is left
     assert len(found.cameras) == FRAMES
     assert found.depth_m.shape == clip.frames.shape[:3]
     assert np.isfinite(found.depth_m).all()
@@ -95,7 +110,19 @@ def test_one_frame_is_too_few(clip: Clip, weights: Path):
 
 
 def test_pairs_get_fewer_before_a_clip_is_refused():
-    assert len(planned_pairs(24, (512, 288))) == len(make_pairs(24, video_graph(24)))
-    assert len(planned_pairs(128, (512, 288))) < len(make_pairs(128, video_graph(128)))
-    with pytest.raises(InputError, match=r"Aligning 1000 images .* allowed"):
-        planned_pairs(1000, (512, 288))
+    network = tiny()
+    assert len(planned_pairs(network, 24, (512, 288))) == len(make_pairs(24, video_graph(24)))
+    assert len(planned_pairs(network, 128, (512, 288))) < len(make_pairs(128, video_graph(128)))
+    with pytest.raises(InputError, match=r"Aligning 250 images .* allowed: take fewer frames"):
+        planned_pairs(network, 250, (512, 288))
+
+
+def test_the_weights_count_when_pairs_are_planned(monkeypatch: pytest.MonkeyPatch):
+    """Where the alignment alone would fit, the network and what it works with may not."""
+    with torch.device("meta"):
+        network = Dust3r(NetworkConfig())
+    assert len(planned_pairs(network, 48, (512, 288))) == len(make_pairs(48, video_graph(48)))
+    monkeypatch.setattr(MODULE, "BUDGET_BYTES", 4 * 10**9)
+    assert len(planned_pairs(network, 48, (512, 288))) == len(make_pairs(48, "swin-2-noncyclic"))
+    with pytest.raises(InputError, match=r"DUSt3R on 378 pairs of 96 frames needs .* take fewer frames"):
+        planned_pairs(network, 96, (512, 288))

@@ -109,6 +109,7 @@ def test_known_poses_are_kept_and_give_the_depth_their_unit(
     found = measure(way_of(kind), known, weights)
     assert np.array_equal(found.world_from_camera, poses)
     assert found.unit == ("poses" if metric else None)
+    assert list(found.others.values()) == ([pytest.approx(1 / 0.3, rel=1e-3)] if kind in METRIC else [])
     street = (drive.depth_m > 0) & ~clip.held_out[:, None, None]
     np.testing.assert_allclose(found.depth[street], 0.3 * drive.depth_m[street], rtol=1e-3)
     told = {"mapanything": "camera_poses", "pi3x": "poses"}.get(kind)

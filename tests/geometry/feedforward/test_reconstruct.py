@@ -18,6 +18,7 @@ from dreamdrive.scene.clip import Clip, Known
 def test_a_metric_network_keeps_its_metre(kind: str, clip: Clip, drive: Drive, weights: Path) -> None:
     found = reconstruct(clip, method=kind, weights=weights, camera_height_m=3.0)
     assert found.scale.source == "the metric network MapAnything"
+    assert found.scale.spread == 0.15
     assert found.cameras[-1].world_from_camera == pytest.approx(drive.cameras[-1].world_from_camera, abs=1e-3)
     assert found.details["chunk_scales"] == [1.0]
 
@@ -54,7 +55,9 @@ def test_known_poses_that_stand_still_give_no_unit(kind: str, clip: Clip, weight
     still = replace(clip, known=Known(np.tile(np.eye(4), (len(clip), 1, 1))))
     way = BACKENDS["pi3"].reconstruct
     if kind == "pi3x":
-        way.measure(still, clip.valid, weights)  # type: ignore[attr-defined]
+        assert way.measure(still, clip.valid, weights).others == {  # type: ignore[attr-defined]
+            "the network Pi3X, metric approximately": 1.0
+        }
         return
-    with pytest.raises(InputError, match="stands still"):
+    with pytest.raises(InputError, match="the given poses stand still, but the clip does not"):
         way.measure(still, clip.valid, weights)  # type: ignore[attr-defined]

@@ -23,6 +23,10 @@ def test_every_kind_has_a_unit_and_says_when_it_took_one(tmp_path):
     np.save(tmp_path / "c.npy", DEPTH[..., None])
     cv2.imwrite(str(tmp_path / "d.png"), np.round(DEPTH * 1000).astype(np.uint16))
     expected = {"a.npz": None, "b.npz": "metres", "c.npy": "metres", "d.png": "millimetres"}
+    cv2.imwrite(str(tmp_path / "k.png"), np.round(DEPTH * 256).astype(np.uint16))
+    theirs, unit = read_depth(tmp_path / "k.png", None, kitti=True)
+    np.testing.assert_allclose(theirs, DEPTH, atol=3e-3)
+    assert unit == "1/256 m, as KITTI has it"
     for name, said in expected.items():
         depth, unit = read_depth(tmp_path / name, None)
         np.testing.assert_allclose(depth, DEPTH, atol=1e-3)

@@ -7,15 +7,20 @@ from dreamdrive.geometry.classical.dense import Dense, densify
 from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
 from dreamdrive.geometry.classical.traffic import compared_with_traffic
-from dreamdrive.geometry.protocol import GeometryBackend
+from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 
 def reconstruct(
-    clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+    clip: Clip,
+    *,
+    camera_height_m: float | None = None,
+    seed: int = 0,
+    weights: Path | None = None,
+    progress: Progress = silent,
 ) -> Geometry:
-    """Pose a clip and find its depth, see ``geometry.protocol``; there is no network."""
+    """Pose a clip and find its depth, see ``geometry.protocol``; no network, and no steps to count."""
     posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
     return assemble(clip, posed, densify(in_metres(clip, posed.metres_per_unit), posed))
 

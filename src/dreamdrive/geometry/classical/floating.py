@@ -175,7 +175,9 @@ def _floats(
     if below.mean() < _MIN_BELOW_HORIZON or np.ptp(rows) > _MAX_HEIGHT_M * np.median(inverse) * road.fy_px:
         return False
     stands_at = float(np.median(contact[below]))
-    if stands_at <= 0 or np.median(inverse[below] / contact[below]) < _RATIO:
+    with np.errstate(divide="ignore"):  # nothing touches the road there: infinitely nearer than it
+        nearer = inverse[below] / contact[below]
+    if stands_at <= 0 or np.median(nearer) < _RATIO:
         return False
     height, px_per_m = len(road.plane), stands_at * road.fy_px
     at = int(np.searchsorted(road.plane[:, int(np.median(columns))], stands_at))

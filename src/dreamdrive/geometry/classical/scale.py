@@ -90,11 +90,15 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
         return _from_speed(street, "no road plane was found")
     wanted = USUAL_HEIGHT_M if height_m is None else height_m
     factor = wanted / plane.height
-    speed = _speed(street, factor)
+    speed = median_speed(street) * factor
     if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
         return _from_speed(
             street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
         )
+    return _by_plane(plane, how, factor, height_m, focal_observed)
+
+
+def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_observed: bool) -> Metric:
     terms = (
         plane.spread,
         USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
@@ -104,6 +108,31 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
     return Metric(
         factor, Ground(plane.normal, plane.offset * factor), Scale(source, float(np.linalg.norm(terms))), ()
     )
+
+
+def from_road_points(
+    street: Street, height_m: float | None, focal_observed: bool, seed: int
+) -> Metric | None:
+    """Scale from the height of the camera above the road that measured depth shows, however slow the path.
+
+    Unlike a plane that is found by warping, it does not rest on the motion of the camera.
+
+    Args:
+        street: Posed clip in arbitrary units, its points those of dense depth.
+        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
+        focal_observed: See ``from_ground``.
+        seed: Seed of RANSAC.
+
+    Returns:
+        None where the points show no road, or one by which no car drives so fast.
+    """
+    plane = fit_points(street.points, street.world_from_camera, seed)
+    if plane is None or plane.support < MIN_INLIERS or plane.share < MIN_SHARE:
+        return None
+    factor = (USUAL_HEIGHT_M if height_m is None else height_m) / plane.height
+    if median_speed(street) * factor > SPEEDS_M_S[1]:
+        return None
+    return _by_plane(plane, "points", factor, height_m, focal_observed)
 
 
 def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:
@@ -157,7 +186,7 @@ def as_given(
 
 def _from_speed(street: Street, problem: str) -> Metric:
     speed = ASSUMED_SPEED_M_S if street.asked_m_s is None else street.asked_m_s
-    factor = speed / max(_speed(street, 1.0), 1e-9)
+    factor = speed / max(median_speed(street), 1e-9)
     word, rest = (
         ("assumed", "an assumed speed")
         if street.asked_m_s is None
@@ -175,9 +204,9 @@ def asked_m_s(clip: Clip) -> float | None:
     return speed if speed >= SPEEDS_M_S[0] else None
 
 
-def _speed(street: Street, factor: float) -> float:
-    """Median speed (m/s) where ``factor`` makes metres of the poses."""
-    return _median_speed(street.world_from_camera, street.times_s) * factor
+def median_speed(street: Street) -> float:
+    """Median speed of the steps that move, in units of the poses a second."""
+    return _median_speed(street.world_from_camera, street.times_s)
 
 
 def _median_speed(poses: Float[np.ndarray, "f 4 4"], times_s: Float[np.ndarray, " f"]) -> float:

@@ -12,6 +12,9 @@ DUST3R = GeometryBackend(
     reconstruct=reconstruct,
     about="pointmaps of pairs of frames (DUSt3R), aligned",
     licence="weights CC BY-NC-SA 4.0 and the terms of the data they were trained with: research only",
-    memory="2.3 GB of weights (512 models); at 512x288 about 1 GB for 24 frames, 4.4 GB for 64",
+    memory=(
+        "2.3 GB of weights (512 models); with them, at 512x288, 7 GB for 24 frames and never more than 8 GB, "
+        "for which long clips get fewer pairs"
+    ),
     weights="a model of DUSt3R, such as naver/DUSt3R_ViTLarge_BaseDecoder_512_dpt or its .pth",
 )

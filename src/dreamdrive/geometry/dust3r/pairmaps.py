@@ -1,9 +1,10 @@
 """What the network says of pairs of frames."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -35,3 +36,15 @@ class PairMaps:
 
     def __len__(self) -> int:
         return len(self.edges)
+
+    def masked(self, usable: Sequence[Bool[np.ndarray, "_ _"]]) -> "PairMaps":
+        """With a confidence of 1, which weighs nothing, where an image (H, W) is not usable."""
+
+        def kept(image: int, trust: Float[np.ndarray, "_ _"]) -> Float[np.ndarray, "_ _"]:
+            return np.where(usable[image], trust, trust.dtype.type(1))
+
+        confidence = tuple(
+            (kept(i, first), kept(j, second))
+            for (i, j), (first, second) in zip(self.edges.tolist(), self.confidence, strict=True)
+        )
+        return replace(self, confidence=confidence)

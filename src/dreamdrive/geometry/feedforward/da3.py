@@ -13,7 +13,7 @@ from torch import nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.feedforward.load import Stored, build, read_stored, upstream
-from dreamdrive.geometry.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import standardise
 from dreamdrive.geometry.feedforward.poses import world_from_camera
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
@@ -45,7 +45,9 @@ def load_da3(path: Path) -> Network:
     config = upstream("depth_anything_3.cfg", INSTALL)
     state = stored.keep("model.", tuple(f"{part}{each}." for part in ("", "da3.") for each in _GAUSSIANS))
     network = build(lambda: _make(config, name), stored, state)
-    return Network(_look(network), f"the metric network {name}" if name in _METRIC else None)
+    if name not in _METRIC:
+        return Network(_look(network))
+    return Network(_look(network), f"the metric network {name}", METRE_SPREAD)
 
 
 def _model_name(stored: Stored) -> str:

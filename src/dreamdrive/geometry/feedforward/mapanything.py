@@ -15,7 +15,7 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.feedforward.load import Stored, build, read_stored, upstream
-from dreamdrive.geometry.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import standardise
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
@@ -47,7 +47,7 @@ def load_mapanything(path: Path) -> Network:
     network = build(lambda: model.MapAnything(**settings), stored, stored.state)
     if network.encoder.data_norm_type != _NORMALISED:
         raise InputError(f"{stored.source} takes pictures standardised for {network.encoder.data_norm_type}")
-    return Network(_look(network), "the metric network MapAnything")
+    return Network(_look(network), "the metric network MapAnything", METRE_SPREAD)
 
 
 def _settings(stored: Stored) -> dict[str, Any]:

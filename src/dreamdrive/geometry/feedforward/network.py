@@ -9,6 +9,10 @@ from torch import Tensor
 
 from dreamdrive.scene.camera import Camera
 
+METRE_SPREAD = 0.15
+"""How far the metre of a network that claims it may be off. Assumed: the authors give errors on data sets of
+their own, none for drives; it is as much as an assumed height of the camera."""
+
 
 @dataclass(frozen=True)
 class Views:
@@ -52,7 +56,9 @@ class Network:
     Attributes:
         look: From views to what is seen in them.
         unit: What says that its unit is the metre, in words; None where it has none.
+        unit_spread: How far that metre may be off, as a fraction.
     """
 
     look: Callable[[Views], Seen]
     unit: str | None = None
+    unit_spread: float = 0.0

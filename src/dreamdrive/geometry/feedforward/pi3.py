@@ -14,11 +14,12 @@ from torch import Tensor, nn
 
 from dreamdrive.geometry.dust3r.align.focal import robust_px
 from dreamdrive.geometry.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.memory import best_device
+from dreamdrive.scene.camera import Camera
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
 INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; pip install huggingface_hub"
@@ -34,7 +35,8 @@ def load_pi3(path: Path) -> Network:
     if "metric_token" in stored.state:
         model = upstream("pi3.models.pi3x", INSTALL)
         network = build(lambda: model.Pi3X(use_multimodal=True), stored, stored.state)
-        return Network(_look(network, conditioned=True), "the network Pi3X, metric approximately")
+        look = _look(network, conditioned=True)
+        return Network(look, "the network Pi3X, metric approximately", 2 * METRE_SPREAD)
     model = upstream("pi3.models.pi3", INSTALL)
     sizes = {name: stored.config[name] for name in ("pos_type", "decoder_size") if name in stored.config}
     network = build(lambda: model.Pi3(**sizes), stored, stored.state)
@@ -45,12 +47,13 @@ def _look(network: nn.Module, *, conditioned: bool) -> Callable[[Views], Seen]:
     def look(views: Views) -> Seen:
         pictures = views.pictures.to(best_device())[None]
         out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
+        known = views.camera if conditioned else None
         points = out["local_points"][0].cpu().numpy()
         # The logit itself would do for ranks; the focal length asks for odds above one.
         odds = (1 + out["conf"][0, ..., 0].double().exp()).cpu().numpy()
         return Seen(
             world_from_camera=nearest_rigid(out["camera_poses"][0]),
-            intrinsics=np.stack([_pinhole(*each) for each in zip(points, odds, strict=True)]),
+            intrinsics=np.stack([_pinhole(*each, known) for each in zip(points, odds, strict=True)]),
             depth=points[..., 2],
             confidence=odds,
         )
@@ -70,14 +73,19 @@ def _conditions(views: Views) -> dict[str, Tensor]:
     return known
 
 
-def _pinhole(points: Float[np.ndarray, "h w 3"], odds: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "3 3"]:
-    """The pinhole with square pixels and the middle as its principal point that the points fit best.
+def _pinhole(
+    points: Float[np.ndarray, "h w 3"], odds: Float[np.ndarray, "h w"], told: Camera | None
+) -> Float[np.ndarray, "3 3"]:
+    """The pinhole that the points fit best.
 
-    The fit counts pixels from 0, where the middle is half a pixel less.
+    It has square pixels and the middle as its principal point, or those of the camera that the network was
+    told of. The fit counts pixels from 0, where principal points are half a pixel less.
     """
     height, width = odds.shape
-    focal_px = robust_px(points, odds, ((width - 1) / 2, (height - 1) / 2))
-    return np.array([[focal_px, 0, width / 2], [0, focal_px, height / 2], [0, 0, 1]])
+    cx, cy = (width / 2, height / 2) if told is None else (told.cx_px, told.cy_px)
+    stretch = 1.0 if told is None else told.fx_px / told.fy_px
+    focal_px = robust_px(points, odds, (cx - 0.5, cy - 0.5), stretch)
+    return np.array([[focal_px, 0, cx], [0, focal_px / stretch, cy], [0, 0, 1]])
 
 
 PI3 = GeometryBackend(

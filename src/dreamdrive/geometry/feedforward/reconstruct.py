@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.classical import contradiction
 from dreamdrive.geometry.classical.evidence import free_pixels, look
-from dreamdrive.geometry.feedforward.camera import SharedCamera, share
+from dreamdrive.geometry.feedforward.camera import SharedCamera, seen_through, share
 from dreamdrive.geometry.feedforward.chunks import Joined, chunks, join
 from dreamdrive.geometry.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.feedforward.pictures import fit_patches, show
@@ -19,6 +19,8 @@ from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
+from dreamdrive.geometry.protocol import Progress, silent
+from dreamdrive.geometry.standing import stands, unit_in, without_poses
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -26,7 +28,6 @@ from dreamdrive.scene.geometry import Geometry
 _FOCAL_SPREAD = 0.2  # of the logarithm; beyond it the frames speak of different cameras
 _FOCAL_APART = 0.1  # relative
 _CHUNK_MISS = 0.1  # relative to depth
-_STANDING = 1e-3  # relative to the median depth
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,13 @@ class FeedForward:
     overlap: int = 8
 
     def __call__(
-        self, clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, weights: Path | None = None
+        self,
+        clip: Clip,
+        *,
+        camera_height_m: float | None = None,
+        seed: int = 0,
+        weights: Path | None = None,
+        progress: Progress = silent,
     ) -> Geometry:
         """Cameras and depth of the network, brought to metres.
 
@@ -59,6 +66,7 @@ class FeedForward:
             camera_height_m: Height of the camera above the road; None assumes 1.5 m.
             seed: Seed of everything random.
             weights: The network's file or folder.
+            progress: Told after each chunk of frames, and at the end.
 
         Raises:
             InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
@@ -69,10 +77,19 @@ class FeedForward:
         check_frames(clip, self.name)
         evidence = look(clip)
         contradiction.check(clip, evidence)
-        found = self.measure(clip, free_pixels(clip, evidence), weights, seed)
+        # Of a standing camera the path is noise, in which no unit can be read.
+        shown = without_poses(clip) if stands(clip, evidence) else clip
+        found = self.measure(shown, free_pixels(clip, evidence), weights, seed, progress)
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
 
-    def measure(self, clip: Clip, free: Bool[np.ndarray, "f h w"], weights: Path, seed: int = 0) -> Measured:
+    def measure(
+        self,
+        clip: Clip,
+        free: Bool[np.ndarray, "f h w"],
+        weights: Path,
+        seed: int = 0,
+        progress: Progress = silent,
+    ) -> Measured:
         """Cameras and depth of the network, in its unit or that of known poses.
 
         Args:
@@ -80,6 +97,7 @@ class FeedForward:
             free: Pixels (F, H, W) that show the street.
             weights: The network's file or folder.
             seed: Seed of everything random.
+            progress: Told after each chunk of frames; a last step is left for what follows.
 
         Raises:
             InputError: The weights or results cannot be used.
@@ -88,14 +106,15 @@ class FeedForward:
         with torch.random.fork_rng():
             torch.manual_seed(seed)
             network = self.load(weights)
-            parts = [
-                (frames, _see(network, clip, frames, how))
-                for frames in chunks(len(clip), self.chunk, self.overlap)
-            ]
+            parts: list[tuple[range, Seen]] = []
+            cut = chunks(len(clip), self.chunk, self.overlap)
+            for frames in cut:
+                parts.append((frames, _see(network, clip, frames, how)))
+                progress(len(parts), len(cut) + 1)
         shared = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
         usable = np.stack([prepare_mask(one, how) for one in free])
         joined = join(parts, how.picture_camera(_camera(clip, shared)), usable)
-        return _measured(clip, joined, shared, free, how, network.unit)
+        return _measured(clip, joined, shared, free, how, network)
 
 
 def _measured(
@@ -104,7 +123,7 @@ def _measured(
     shared: SharedCamera,
     free: Bool[np.ndarray, "f h w"],
     how: Fitting,
-    unit: str | None,
+    network: Network,
 ) -> Measured:
     """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
 
@@ -116,13 +135,18 @@ def _measured(
         shared: Their camera as the network has it.
         free: Pixels (F, H, W) of the frames that show the street.
         how: How the pictures were made of the frames.
-        unit: What says that the network's unit is the metre.
+        network: The network, for its unit.
     """
-    poses, factor = joined.world_from_camera, 1.0
+    poses, factor, others = joined.world_from_camera, 1.0, dict[str, float]()
+    unit, spread = network.unit, network.unit_spread
     if clip.known.world_from_camera is not None:
         poses = clip.known.world_from_camera.astype(np.float64)
-        factor = _unit_of(poses, joined, metric=clip.known.metric and unit is not None)
-        unit = "poses" if clip.known.metric else None
+        there = joined.depth[joined.depth > 0]
+        middle = float(np.median(there)) if len(there) else 0.0
+        both = clip.known.metric and network.unit is not None
+        factor = unit_in(poses, joined.world_from_camera, middle, metric=both)
+        others = {} if network.unit is None else {network.unit: 1 / factor}
+        unit, spread = ("poses" if clip.known.metric else None), 0.0
     depth, trust = (in_frames(tuple(part), how) for part in (joined.depth, joined.confidence))
     there = np.isfinite(depth) & (depth > 0) & free & ~clip.held_out[:, None, None]
     depth, confidence = trusted(depth * np.float32(factor), trust, there)
@@ -133,6 +157,8 @@ def _measured(
         depth=depth,
         confidence=confidence,
         unit=unit,
+        unit_spread=spread,
+        others=others,
         notes=tuple(_notes(clip, joined, shared)),
         details={
             "focal_by_network_px": shared.camera.fx_px,
@@ -160,22 +186,8 @@ def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
     with torch.inference_mode():
         seen = network.look(views)
     depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
-    return replace(seen, depth=depth)
-
-
-def _unit_of(poses: Float[np.ndarray, "f 4 4"], joined: Joined, *, metric: bool) -> float:
-    """The network's unit in that of known poses: by how far the camera goes from the middle of its path."""
-    known, own = (
-        float(np.linalg.norm(path - path.mean(axis=0)))
-        for path in (poses[:, :3, 3], joined.world_from_camera[:, :3, 3])
-    )
-    there = joined.depth[joined.depth > 0]
-    moves = own > _STANDING * (float(np.median(there)) if len(there) else 0.0)
-    if moves and known > 0:
-        return known / own
-    if metric:
-        return 1.0
-    raise InputError("the camera stands still: known poses cannot give the network's depth their unit")
+    seen = replace(seen, depth=depth)
+    return seen if views.camera is None else seen_through(seen, views.camera)
 
 
 def _notes(clip: Clip, joined: Joined, shared: SharedCamera) -> list[str]:

@@ -113,7 +113,7 @@ def _depth(
     depth = np.zeros((count, height, width), np.float32)
     taken: set[str] = set()
     for row, path in files.of.items():
-        picture, unit = read_depth(path, files.unit)
+        picture, unit = read_depth(path, files.unit, kitti=files.kitti)
         depth[row] = onto.depth(picture, bent, str(path))
         taken |= set() if unit is None else {f"{path.suffix.lower()[1:]} as {unit}"}
     notes: list[str] = []

@@ -18,7 +18,7 @@ from dreamdrive.geometry.files.given import DepthFiles
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
 _EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R", "RGB", "RGBA")
-_MILLIMETRE = 0.001
+_MILLIMETRE, _KITTI_M = 0.001, 1 / 256
 
 
 def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> DepthFiles:
@@ -31,12 +31,15 @@ def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> Depth
     return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit)
 
 
-def read_depth(path: Path, unit: float | None) -> tuple[Float[np.ndarray, "h w"], str | None]:
+def read_depth(
+    path: Path, unit: float | None, *, kitti: bool = False
+) -> tuple[Float[np.ndarray, "h w"], str | None]:
     """Depth in metres, or in the unit of the poses, and the unit that was taken without being declared.
 
     Args:
         path: The file.
         unit: What the stored number 1 means; ``None`` is millimetres for a PNG, metres for floats.
+        kitti: Whether ``None`` is 1/256 m for a PNG.
 
     Raises:
         InputError: The file is damaged, or no depth: negative, NaN, infinite, whole numbers without a unit.
@@ -48,16 +51,16 @@ def read_depth(path: Path, unit: float | None) -> tuple[Float[np.ndarray, "h w"]
     if sure:
         unit = 1.0
     elif unit is None:
-        unit, said = _usual_unit(path, stored)
+        unit, said = _usual_unit(path, stored, kitti)
     depth = stored.astype(np.float32)
     if not np.isfinite(depth).all() or (depth < 0).any():
         raise InputError(f"{path}: holds negative, NaN or infinite depth; write 0 where there is none")
     return depth * np.float32(unit), said
 
 
-def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"]) -> tuple[float, str]:
+def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"], kitti: bool) -> tuple[float, str]:
     if path.suffix.lower() == ".png":
-        return _MILLIMETRE, "millimetres"
+        return (_KITTI_M, "1/256 m, as KITTI has it") if kitti else (_MILLIMETRE, "millimetres")
     if np.issubdtype(stored.dtype, np.floating):
         return 1.0, "metres"
     raise InputError(

@@ -19,11 +19,13 @@ class DepthFiles:
         unit: What the stored number 1 means, in metres or in the poses' unit; ``None`` where that is not
             declared and the kind of file decides.
         metric: Whether that is metres; otherwise it is the unit of the poses.
+        kitti: Whether they lie beside KITTI's calibration, in whose PNG the number 1 is 1/256 m.
     """
 
     of: Mapping[int, Path] = field(default_factory=dict[int, Path])
     unit: float | None = None
     metric: bool = True
+    kitti: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ so 0.5 is added to the principal point. KITTI's poses are those of camera 0: tho
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,9 @@ def read_pose_list(path: Path, wanted: Wanted) -> Given:
         metric=declared.metric is not False,
         cameras=cameras,
         camera=np.zeros(len(wanted.index), np.intp),
-        depth=find_depth(path.parent / "depth", wanted.labels, declared),
+        depth=replace(
+            find_depth(path.parent / "depth", wanted.labels, declared), kitti=calibration.is_file()
+        ),
         notes=notes,
     )
 

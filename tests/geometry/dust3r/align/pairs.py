@@ -12,14 +12,20 @@ def window(count: int, reach: int = 3) -> np.ndarray:
 
 
 def street(
-    frames: int, width: int, height: int, *, step: float = 0.8, turn: float = 0.03, seed: int = 0
+    frames: int,
+    width: int,
+    height: int,
+    *,
+    step: float = 0.8,
+    turn: float = 0.03,
+    seed: int = 0,
+    principal_px: tuple[float, float] | None = None,
 ) -> Truth:
     """A drive between two walls over a level road under the sky, with bumps on all of it."""
+    cx, cy = principal_px or (width / 2, height / 2)
     random = np.random.default_rng(seed)
     focal = 0.9 * width
-    columns, rows = np.meshgrid(
-        (np.arange(width) - width / 2) / focal, (np.arange(height) - height / 2) / focal
-    )
+    columns, rows = np.meshgrid((np.arange(width) - cx) / focal, (np.arange(height) - cy) / focal)
     rays = np.stack([columns, rows, np.ones_like(columns)], axis=-1)
     poses, yaw, place = [], 0.0, np.zeros(3)
     for frame in range(frames):
@@ -31,7 +37,13 @@ def street(
         place = place + step * np.array([np.sin(yaw), 0.02 * np.sin(frame), np.cos(yaw)])
     bumps = random.uniform(0, 2 * np.pi, 3)
     depths = [_ray_depth(rays, pose, bumps) for pose in poses]
-    return Truth(np.stack(depths), np.stack(poses), focal)
+    return Truth(np.stack(depths), np.stack(poses), focal, principal_px=principal_px)
+
+
+def pinholes(truth: Truth) -> np.ndarray:
+    """The true pinholes (N, 3, 3), pixels counted from 0."""
+    (cx, cy), focal = truth.middle_px, truth.focal_px
+    return np.tile(np.array([[focal, 0, cx], [0, focal, cy], [0, 0, 1]]), (len(truth.depth), 1, 1))
 
 
 def _ray_depth(rays: np.ndarray, pose: np.ndarray, bumps: np.ndarray) -> np.ndarray:

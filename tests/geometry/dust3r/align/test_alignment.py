@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.dust3r.align.goldens import config, scene
-from tests.geometry.dust3r.align.pairs import path_error, street, window
+from tests.geometry.dust3r.align.pairs import path_error, pinholes, street, window
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.align.adam import descend
 from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
 from dreamdrive.geometry.dust3r.align.graph import graph_of
 from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
-from dreamdrive.geometry.dust3r.align.objective import Objective, raw_parameters
 from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.reference.adam import descend
+from dreamdrive.geometry.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)
@@ -62,7 +62,7 @@ def test_exact_pairs_give_the_truth(drive: Truth, options: AlignOptions) -> None
 
 
 @pytest.mark.parametrize(("name", "run"), [("A", "cosine"), ("B", "fixed")])
-def test_the_loss_is_no_higher_than_after_300_steps_of_adam(golden_dir: Path, name: str, run: str) -> None:
+def test_the_loss_is_no_higher_than_golden_after_300_steps(golden_dir: Path, name: str, run: str) -> None:
     maps, inputs, _ = scene(golden_dir, name)
     theirs = config(golden_dir)[f"{name}.{run}"]
     found = align(maps, EACH)
@@ -75,7 +75,7 @@ def test_the_loss_is_no_higher_than_after_300_steps_of_adam(golden_dir: Path, na
     assert error < 1.2 * metrics["ate_rmse"]
 
 
-def test_the_loss_is_that_of_the_authors(golden_dir: Path) -> None:
+def test_the_loss_on_a_golden_scene_is_that_of_the_authors(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "A")
     found = align(maps, EACH)
     objective = Objective(maps, graph_of(maps))
@@ -137,10 +137,43 @@ def test_a_pair_in_another_unit_is_the_same_pair(noisy: PairMaps, paper: Aligned
 
 
 def test_known_focal_lengths_stay(drive: Truth, noisy: PairMaps) -> None:
-    given = np.full(6, drive.focal_px)
-    found = align(noisy, ROBUST, Known(focals_px=given))
-    np.testing.assert_array_equal(found.focals_px, given)
+    found = align(noisy, ROBUST, Known(intrinsics=pinholes(drive)))
+    np.testing.assert_array_equal(found.focals_px, np.full(6, drive.focal_px))
     assert path_error(found.world_from_camera, drive.world_from_camera) < 0.01
+
+
+def test_a_known_pinhole_in_the_middle_is_the_default(
+    drive: Truth, noisy: PairMaps, aligned: Aligned
+) -> None:
+    given = pinholes(drive)
+    given[:, [0, 1], [0, 1]] = aligned.focals_px[0]
+    graph = graph_of(noisy)
+    through = graph.through(given)
+    np.testing.assert_array_equal(through.principal_px, graph.principal_px)
+    np.testing.assert_array_equal(through.stretch, graph.stretch)
+
+
+@pytest.mark.parametrize("stretch", [1, 2])
+def test_a_principal_point_beside_the_middle_is_kept(stretch: int) -> None:
+    """Of pixels twice as high there are half as many rows: every second one is the same picture."""
+    truth = street(6, 56, 40 * stretch, principal_px=(23.0, 24.0 * stretch))
+    maps = pair_maps(truth, window(6), EXACT)
+    points, confidence = (
+        tuple(tuple(side[::stretch] for side in pair) for pair in part)
+        for part in (maps.points, maps.confidence)
+    )
+    maps, depth = PairMaps(maps.edges, points, confidence), truth.depth[:, ::stretch]
+    intrinsics = pinholes(truth)
+    intrinsics[:, 1] /= stretch
+    knowing, guessing = (align(maps, ROBUST, Known(intrinsics=each)) for each in (intrinsics, None))
+    errors = [path_error(each.world_from_camera, truth.world_from_camera) for each in (knowing, guessing)]
+    assert errors[0] < 1e-4
+    assert errors[1] > 20 * errors[0]
+    seen = depth > 0
+    scale = np.median(np.stack(knowing.depth)[seen] / depth[seen])
+    np.testing.assert_allclose(np.stack(knowing.depth)[seen], scale * depth[seen], rtol=2e-3)
+    assert knowing.residual.max() < 1e-3
+    assert knowing.focal_spread < 1e-4 < guessing.focal_spread
 
 
 def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: PairMaps) -> None:
@@ -154,7 +187,12 @@ def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: Pair
     assert abs(found.focals_px[0] / drive.focal_px - 1) < 0.05
 
 
-def test_images_of_different_sizes(golden_dir: Path) -> None:
+def test_known_poses_that_stand_still_are_refused(noisy: PairMaps) -> None:
+    with pytest.raises(InputError, match="the given poses stand still, but the clip does not"):
+        align(noisy, replace(ROBUST, steps=2), Known(world_from_camera=np.tile(np.eye(4), (6, 1, 1))))
+
+
+def test_golden_images_of_different_sizes(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "B")
     assert [depth.shape for depth in align(maps, EACH).depth] == [
         (24, 40),
@@ -197,8 +235,8 @@ def test_what_is_too_large_is_refused_before_it_starts(noisy: PairMaps) -> None:
 @pytest.mark.parametrize(
     ("known", "message"),
     [
-        (Known(focals_px=np.array([1.0, 2.0])), "6 images take 6 positive focal lengths"),
-        (Known(focals_px=np.full(6, -1.0)), "6 images take 6 positive focal lengths"),
+        (Known(intrinsics=np.eye(3)[None]), "6 images take 6 pinholes"),
+        (Known(intrinsics=-np.tile(np.eye(3), (6, 1, 1))), "6 images take 6 pinholes with positive"),
         (Known(world_from_camera=np.eye(4)[None]), "6 images take 6 poses; got 1"),
         (Known(world_from_camera=np.full((6, 4, 4), 2.0)), "known poses cannot be used"),
     ],

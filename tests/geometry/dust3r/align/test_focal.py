@@ -9,14 +9,21 @@ from benchmarks._simulated_pairs import Noise, pair_maps
 from safetensors.numpy import load_file
 from tests.geometry.dust3r.align.pairs import street, window
 
-from dreamdrive.geometry.dust3r.align.focal import focal_px, focal_votes, median_px, robust_px, weiszfeld_px
+from dreamdrive.geometry.dust3r.align.focal import (
+    FocalRule,
+    focal_px,
+    focal_votes,
+    median_px,
+    robust_px,
+    weiszfeld_px,
+)
 from dreamdrive.geometry.weighted import weighted_median
 
 CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "pp", "wide", "tele"]
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_papers_rules_are_upstreams(golden_dir: Path, case: str) -> None:
+def test_the_papers_rules_are_golden(golden_dir: Path, case: str) -> None:
     wanted = json.loads((golden_dir / "dust3r/weiszfeld.json").read_text())[case]
     points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")[case]
     principal = tuple(wanted["pp"])
@@ -26,7 +33,7 @@ def test_the_papers_rules_are_upstreams(golden_dir: Path, case: str) -> None:
     assert clipped == pytest.approx(wanted["weiszfeld_clipped"], rel=1e-6)
 
 
-def test_a_fifth_of_gross_outliers_moves_the_robust_rule_by_little(golden_dir: Path) -> None:
+def test_a_fifth_of_gross_golden_outliers_moves_the_robust_rule_by_little(golden_dir: Path) -> None:
     points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")["noise_outliers"]
     assert abs(weiszfeld_px(points) / 36 - 1) > 0.5
     assert abs(robust_px(points) / 36 - 1) < 0.015
@@ -39,6 +46,15 @@ def test_masked_pixels_do_not_count() -> None:
     confidence[:8] = 1
     assert focal_px(points, confidence) == pytest.approx(36, rel=1e-5)
     assert abs(focal_px(points, confidence, "weiszfeld") / 36 - 1) > 0.02
+
+
+@pytest.mark.parametrize("rule", ["robust", "weiszfeld", "median"])
+def test_a_pinhole_beside_the_middle_with_oblong_pixels(rule: FocalRule) -> None:
+    columns, rows = np.meshgrid((np.arange(40) - 17) / 36, (np.arange(24) - 14) / 18)
+    depth = 4 + 0.05 * np.arange(24)[:, None] + 0 * columns
+    points = np.stack([columns * depth, rows * depth, depth], axis=-1).astype(np.float32)
+    assert focal_px(points, None, rule, (17, 14), 2.0) == pytest.approx(36, rel=1e-5)
+    assert abs(focal_px(points, None, rule) / 36 - 1) > 0.05
 
 
 def test_nothing_to_go_by_is_not_a_focal_length() -> None:

@@ -16,7 +16,7 @@ EXACT = Noise(0, 1 / 8, 0, 0, 0)
 
 
 @pytest.mark.parametrize(("name", "run"), [("A", "cosine"), ("B", "cosine"), ("B", "fixed")])
-def test_the_switch_gives_upstreams_start(golden_dir: Path, name: str, run: str) -> None:
+def test_the_switch_gives_the_golden_start(golden_dir: Path, name: str, run: str) -> None:
     maps, _, wanted = scene(golden_dir, name)
     start = spanning_tree(maps, upstream=True, stale_focals=run != "fixed")
     np.testing.assert_allclose(start.focals_px, wanted[f"{run}.init.focals"], rtol=1e-5)
@@ -26,14 +26,14 @@ def test_the_switch_gives_upstreams_start(golden_dir: Path, name: str, run: str)
         np.testing.assert_allclose(depth, wanted[f"{run}.init.depth.{image}"], rtol=1e-5)
 
 
-def test_an_image_has_its_own_focal_length(golden_dir: Path) -> None:
+def test_an_image_of_a_golden_scene_has_its_own_focal_length(golden_dir: Path) -> None:
     maps, inputs, _ = scene(golden_dir, "B")
     ours, theirs = spanning_tree(maps), spanning_tree(maps, upstream=True)
     assert np.abs(theirs.focals_px / inputs["gt.focals"] - 1).max() > 0.4
     assert np.abs(ours.focals_px / inputs["gt.focals"] - 1).max() < 0.02
 
 
-def test_ours_starts_nearer_to_the_truth(golden_dir: Path) -> None:
+def test_ours_starts_nearer_to_the_golden_truth(golden_dir: Path) -> None:
     maps, inputs, _ = scene(golden_dir, "A")
     errors = [
         path_error(spanning_tree(maps, upstream=upstream).world_from_camera, inputs["gt.cam2world"])

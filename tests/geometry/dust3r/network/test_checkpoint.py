@@ -4,13 +4,14 @@ import argparse
 import json
 import os
 from collections import OrderedDict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.geometry.dust3r.network.golden import tiny
+from tests.geometry.dust3r.network.golden import TINY, tiny
 from torch import Tensor
 
 from dreamdrive.errors import InputError
@@ -229,3 +230,9 @@ def test_nothing_in_a_file_is_executed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is another one"):
         load_dust3r(tmp_path / "m.pth")
     assert not (tmp_path / "made").exists()
+
+
+def test_stated_heads_need_not_be_those_that_are_guessed(tmp_path: Path) -> None:
+    """200 channels do not split into heads of 64, but well into ten of 20."""
+    network = Dust3r(replace(TINY, enc_dim=200, enc_heads=10))
+    assert load_dust3r(save_pth(tmp_path / "odd.pth", network, img_size=(512, 512))).config.enc_heads == 10

@@ -84,7 +84,7 @@ def test_progress_counts_frames_and_pairs(network, pictures, edges) -> None:
 
 
 def test_what_it_takes_is_told_first(network, pictures, edges, caplog) -> None:
-    with caplog.at_level(logging.INFO, "dreamdrive"):
+    with caplog.at_level(logging.WARNING, "dreamdrive"):
         infer(network, pictures, edges)
     plan = plan_memory(network, SHAPES, edges, 10**9)
     assert f"DUSt3R on 14 pairs of 5 frames takes {plan}" in caplog.text

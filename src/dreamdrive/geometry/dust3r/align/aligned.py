@@ -12,6 +12,7 @@ from dreamdrive.geometry.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.dust3r.align.samples import Dense
 from dreamdrive.geometry.dust3r.align.state import State
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.standing import unit_in
 from dreamdrive.scene.similarity import Similarity
 
 _SURE_FOCAL = 0.03  # standard error of the shared focal length up to which it counts as observed
@@ -85,8 +86,12 @@ def report(
     focal_known: bool,
     known_poses: Float[np.ndarray, "n 4 4"] | None,
 ) -> Aligned:
-    """Bring the solution to the frame of image 0, or to that of the known poses, and measure it."""
-    frame = _frame(found.state, known_poses)
+    """Bring the solution to the frame of image 0, or to that of the known poses, and measure it.
+
+    Raises:
+        InputError: Known poses stand still, which gives depth no unit.
+    """
+    frame = _frame(found, known_poses)
     poses = _poses(found.state, frame)
     if known_poses is None:
         poses[0] = np.eye(4)
@@ -112,14 +117,14 @@ def report(
     )
 
 
-def _frame(state: State, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity:
+def _frame(found: Found, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity:
     """From the solver's world to that of the result."""
+    state = found.state
     if known is None:
         turn = state.rotation[0].T
         return Similarity(1.0, turn, -turn @ state.centre[0])
-    moved = float(np.linalg.norm(state.centre))
-    unit = float(np.linalg.norm(known[:, :3, 3])) / moved if moved > 0 else 1.0
-    return Similarity(unit, np.eye(3), np.zeros(3))
+    middle = float(np.median([np.median(depth) for depth in found.dense.depth]))
+    return Similarity(unit_in(known, state.world_from_camera, middle), np.eye(3), np.zeros(3))
 
 
 def _poses(state: State, frame: Similarity) -> Float[np.ndarray, "n 4 4"]:
@@ -147,10 +152,7 @@ def _pair_spread(maps: PairMaps, state: State) -> float:
 def _residuals(found: Found, edges: int) -> Float[np.ndarray, " e"]:
     parts: list[list[np.ndarray]] = [[] for _ in range(edges)]
     for samples in found.samples:
-        depth = found.dense.depth[samples.image]
-        height, width = depth.shape
-        columns, rows = np.rint(samples.pixels.numpy() + np.array([width / 2, height / 2])).astype(np.intp).T
-        here = depth[rows, columns].astype(np.float64)
+        here = found.dense.depth[samples.image].ravel()[samples.index].astype(np.float64)
         misses = samples.misses(found.state)
         along = misses.length.numpy() * (here - misses.foot.numpy())
         relative = np.sqrt(along**2 + misses.across2.numpy()) / here

@@ -1,19 +1,20 @@
 """Global alignment: from pairwise pointmaps to one world (Wang et al. 2024, section 3.4)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.align.aligned import Aligned, Found, report
-from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_votes
+from dreamdrive.geometry.dust3r.align.areas import Normalisation
+from dreamdrive.geometry.dust3r.align.focal import FocalRule, FocalVotes, focal_votes
 from dreamdrive.geometry.dust3r.align.freedom import FocalFreedom, Freedom
 from dreamdrive.geometry.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.dust3r.align.known import onto_known
 from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.dust3r.align.objective import Normalisation
 from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
 from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.dust3r.align.solver import solve
@@ -35,9 +36,10 @@ class AlignOptions:
         objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
             with relative misses under a cost that forgives outliers, and counts those across the ray more
             than those along it.
-        normalisation: How the paper's loss divides, see ``objective.half_areas``.
-        focal: One focal length for all images, which one camera took; one for ``each``; or ``fixed`` where it
-            starts.
+        normalisation: How the paper's loss divides, see ``areas.half_areas``.
+        focal: One focal length for all images, which one camera took, or one for ``each``.
+        focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
+            paper's.
         samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
         outlier: Relative miss from which on the robust cost grows slowly.
         sharper: How much more a miss across the ray counts than one along it, in the robust cost.
@@ -49,6 +51,7 @@ class AlignOptions:
     objective: Literal["distance", "robust"] = "robust"
     normalisation: Normalisation = "pooled"
     focal: FocalFreedom = "shared"
+    focal_rule: FocalRule = "robust"
     samples_per_image: int = 2000
     outlier: float = 0.05
     sharper: float = 3.0
@@ -62,15 +65,21 @@ class Known:
     """What need not be found.
 
     Attributes:
-        focals_px: Focal length of each image (N,), or None.
+        intrinsics: Pinhole of each image (N, 3, 3), pixels counted from 0; None leaves the focal lengths to
+            be found and has the principal points in the middle, (W/2, H/2).
         world_from_camera: Poses (N, 4, 4), or None. The scene then is given in their world and unit.
     """
 
-    focals_px: Float[np.ndarray, " n"] | None = None
+    intrinsics: Float[np.ndarray, "n 3 3"] | None = None
     world_from_camera: Float[np.ndarray, "n 4 4"] | None = None
 
 
-def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | None = None) -> Aligned:
+def align(
+    maps: PairMaps,
+    options: AlignOptions | None = None,
+    known: Known | None = None,
+    still: Sequence[Bool[np.ndarray, "_ _"]] | None = None,
+) -> Aligned:
     """Bring pairwise pointmaps into one world.
 
     Without known poses the world is the camera of image 0, in a unit in which the scales of the pairs have a
@@ -79,7 +88,9 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
     Args:
         maps: Pairs that link all images, directed.
         options: None are the defaults.
-        known: Focal lengths or poses to keep.
+        known: Pinholes or poses to keep.
+        still: Pixels (H, W) of each image that cameras and pairs are solved with; the depth is that of all.
+            None solves with all.
 
     Raises:
         InputError: The pairs or what is known cannot be used, or memory would not do.
@@ -87,25 +98,28 @@ def align(maps: PairMaps, options: AlignOptions | None = None, known: Known | No
     options, known = options or AlignOptions(), known or Known()
     graph = graph_of(maps)
     _check_known(known, len(graph))
+    if known.intrinsics is not None:
+        graph = graph.through(known.intrinsics)
     storage = max(side.dtype.itemsize for pair in maps.points for side in pair)
     predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
     check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
     with one_torch_thread():
-        return _solved(maps, graph, options, known)
+        return _solved(maps, maps if still is None else maps.masked(still), graph, options, known)
 
 
-def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
-    votes = focal_votes(maps)
-    start = spanning_tree(maps, votes)
+def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
+    """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
+    votes = focal_votes(sure, options.focal_rule, graph)
+    start = spanning_tree(sure, votes, graph)
     start = replace(start, focals_px=_first_focals(start, votes, options, known))
     poses = start.world_from_camera
     if known.world_from_camera is not None:
         start, poses = onto_known(start, known.world_from_camera)
     state = State.of(poses, start.focals_px, start.pairs)
     freedom = Freedom(
-        "fixed" if known.focals_px is not None else options.focal, poses=known.world_from_camera is None
+        None if known.intrinsics is not None else options.focal, poses=known.world_from_camera is None
     )
-    samples = draw_samples(maps, graph, options.samples_per_image, options.normalisation, options.seed)
+    samples = draw_samples(sure, graph, options.samples_per_image, options.normalisation, options.seed)
     penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
     if options.objective == "distance":
         found = solve(samples, state, penalty, freedom, steps=options.steps)
@@ -119,7 +133,7 @@ def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -
         graph,
         Found(found.state, dense, samples, found.losses),
         votes,
-        focal_known=known.focals_px is not None,
+        focal_known=known.intrinsics is not None,
         known_poses=known.world_from_camera,
     )
 
@@ -127,19 +141,22 @@ def _solved(maps: PairMaps, graph: Graph, options: AlignOptions, known: Known) -
 def _first_focals(
     start: Start, votes: FocalVotes, options: AlignOptions, known: Known
 ) -> Float[np.ndarray, " n"]:
-    if known.focals_px is not None:
-        return known.focals_px.astype(np.float64)
+    if known.intrinsics is not None:
+        return known.intrinsics[:, 0, 0].astype(np.float64)
     if options.focal == "shared":
         return np.full(len(start.focals_px), votes.shared_px)
     return start.focals_px
 
 
 def _check_known(known: Known, images: int) -> None:
-    focals, poses = known.focals_px, known.world_from_camera
-    if focals is not None and (len(focals) != images or not (np.isfinite(focals) & (focals > 0)).all()):
-        raise InputError(
-            f"{images} images take {images} positive focal lengths in pixels; got {focals.tolist()}."
-        )
+    pinholes, poses = known.intrinsics, known.world_from_camera
+    if pinholes is not None:
+        focals = pinholes[:, [0, 1], [0, 1]]
+        if len(pinholes) != images or not (np.isfinite(pinholes).all() and (focals > 0).all()):
+            raise InputError(
+                f"{images} images take {images} pinholes with positive focal lengths in pixels; got "
+                f"{focals.tolist()}."
+            )
     if poses is None:
         return
     if len(poses) != images:

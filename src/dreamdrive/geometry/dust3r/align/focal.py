@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.weighted import weighted_median
 
@@ -54,12 +55,21 @@ class FocalVotes:
         return focals
 
 
-def focal_votes(maps: PairMaps, rule: FocalRule = "robust") -> FocalVotes:
-    """The focal length of every edge's first image by its own pointmap."""
-    focals = [
-        focal_px(points[0], confidence[0], rule)
-        for points, confidence in zip(maps.points, maps.confidence, strict=True)
-    ]
+def focal_votes(maps: PairMaps, rule: FocalRule = "robust", graph: Graph | None = None) -> FocalVotes:
+    """The focal length of every edge's first image by its own pointmap.
+
+    Args:
+        maps: The pairs.
+        rule: See ``focal_px``.
+        graph: Where the principal points are; None has them in the middle.
+    """
+    focals: list[float] = []
+    for image, points, confidence in zip(maps.edges[:, 0], maps.points, maps.confidence, strict=True):
+        if graph is None:
+            focals.append(focal_px(points[0], confidence[0], rule))
+        else:
+            cx, cy = graph.principal_px[image].tolist()
+            focals.append(focal_px(points[0], confidence[0], rule, (cx, cy), float(graph.stretch[image])))
     weights = [float(np.log(confidence[0]).sum(dtype=np.float64)) for confidence in maps.confidence]
     return FocalVotes(maps.edges[:, 0], np.array(focals), np.array(weights))
 
@@ -68,25 +78,30 @@ def focal_px(
     points: Float[np.ndarray, "h w 3"],
     confidence: Float[np.ndarray, "h w"] | None = None,
     rule: FocalRule = "robust",
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
 ) -> float:
-    """Focal length in pixels by a named rule; only the robust one looks at the confidence.
+    """Focal length fx in pixels by a named rule; only the robust one looks at the confidence.
 
     Args:
         points: Pointmap (H, W, 3) in the frame of its own camera.
         confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
         rule: ``weiszfeld`` is the paper's; ``median`` is its program's other choice.
+        principal_px: Column and row; None is the middle (W/2, H/2).
+        stretch: fx / fy.
     """
     if rule == "weiszfeld":
-        return weiszfeld_px(points)
+        return weiszfeld_px(points, principal_px, stretch=stretch)
     if rule == "median":
-        return median_px(points)
-    return robust_px(points, confidence)
+        return median_px(points, principal_px, stretch)
+    return robust_px(points, confidence, principal_px, stretch)
 
 
 def weiszfeld_px(
     points: Float[np.ndarray, "h w 3"],
     principal_px: tuple[float, float] | None = None,
     bounds: tuple[float, float] = (0.0, np.inf),
+    stretch: float = 1.0,
 ) -> float:
     """Minimise sum |p - f q| over all pixels alike: ten reweighted steps (Wang et al. 2024, section 3.3).
 
@@ -94,8 +109,9 @@ def weiszfeld_px(
         points: Pointmap (H, W, 3) in the frame of its own camera.
         principal_px: Column and row; None is the middle (W/2, H/2).
         bounds: Least and greatest result in units of max(H, W) / (2 tan 30 degrees).
+        stretch: fx / fy.
     """
-    p, q = _pixels_and_slopes(points, principal_px)
+    p, q = _pixels_and_slopes(points, principal_px, stretch)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
     focal = pq.mean() / qq.mean()
     for _ in range(_STEPS):
@@ -105,9 +121,13 @@ def weiszfeld_px(
     return float(np.clip(focal, bounds[0] * unit, bounds[1] * unit))
 
 
-def median_px(points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None = None) -> float:
+def median_px(
+    points: Float[np.ndarray, "h w 3"],
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
+) -> float:
     """Median of the votes u z/x and v z/y of all pixels; of an even number the lower middle one."""
-    grid = _grid(points.shape[0], points.shape[1], principal_px)
+    grid = _grid(points.shape[0], points.shape[1], principal_px, stretch)
     flat = points.reshape(-1, 3).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         votes = (grid * flat[:, 2:] / flat[:, :2]).ravel()
@@ -119,6 +139,7 @@ def robust_px(
     points: Float[np.ndarray, "h w 3"],
     confidence: Float[np.ndarray, "h w"] | None = None,
     principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
 ) -> float:
     """Log confidences weigh, masked pixels and points behind the camera do not count, outliers drop out.
 
@@ -130,11 +151,12 @@ def robust_px(
         points: Pointmap (H, W, 3) in the frame of its own camera.
         confidence: At least 1 (H, W); None weighs all alike.
         principal_px: Column and row; None is the middle (W/2, H/2).
+        stretch: fx / fy.
 
     Returns:
         The focal length, or NaN where no pixel speaks for a positive one.
     """
-    p, q = _pixels_and_slopes(points, principal_px)
+    p, q = _pixels_and_slopes(points, principal_px, stretch)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
     trust = np.ones(len(p)) if confidence is None else np.log(confidence.astype(np.float64)).ravel()
     counts = (trust > 0) & (points[..., 2].ravel() > 0) & (pq > 0)
@@ -153,15 +175,17 @@ def robust_px(
 
 
 def _pixels_and_slopes(
-    points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None
+    points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None, stretch: float
 ) -> tuple[Float[np.ndarray, "p 2"], Float[np.ndarray, "p 2"]]:
     flat = points.reshape(-1, 3).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.nan_to_num(flat[:, :2] / flat[:, 2:], nan=0.0, posinf=0.0, neginf=0.0)
-    return _grid(points.shape[0], points.shape[1], principal_px), slopes
+    return _grid(points.shape[0], points.shape[1], principal_px, stretch), slopes
 
 
-def _grid(height: int, width: int, principal_px: tuple[float, float] | None) -> Float[np.ndarray, "p 2"]:
+def _grid(
+    height: int, width: int, principal_px: tuple[float, float] | None, stretch: float
+) -> Float[np.ndarray, "p 2"]:
     cx, cy = (width / 2, height / 2) if principal_px is None else principal_px
-    columns, rows = np.meshgrid(np.arange(width) - cx, np.arange(height) - cy)
+    columns, rows = np.meshgrid(np.arange(width) - cx, stretch * (np.arange(height) - cy))
     return np.stack([columns.ravel(), rows.ravel()], axis=1)

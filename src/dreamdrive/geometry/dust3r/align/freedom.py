@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array
 
 from dreamdrive.geometry.dust3r.align.state import PER_EDGE, PER_IMAGE, State
 
-FocalFreedom = Literal["shared", "each", "fixed"]
+FocalFreedom = Literal["shared", "each"]
 _FOCAL = 6
 
 
@@ -16,11 +16,11 @@ class Freedom:
     """What is unknown.
 
     Attributes:
-        focal: One focal length for all images, one for each, or none.
+        focal: One focal length for all images, or one for each; None keeps those there are.
         poses: False keeps the shape of the path and solves its scale.
     """
 
-    focal: FocalFreedom = "shared"
+    focal: FocalFreedom | None = "shared"
     poses: bool = True
 
     def basis(self, state: State) -> csr_array:
@@ -50,7 +50,7 @@ class Freedom:
                 for axis in range(3):
                     add(PER_IMAGE * image + 3 + axis, count, float(state.centre[image, axis]))
             count += 1
-        if self.focal != "fixed":
+        if self.focal is not None:
             for image in range(images):
                 add(PER_IMAGE * image + _FOCAL, count + (image if self.focal == "each" else 0))
             count += images if self.focal == "each" else 1

@@ -1,8 +1,9 @@
 """The graph of image pairs: what it must be so that its images can be brought together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -32,17 +33,31 @@ class Graph:
     Attributes:
         sizes: Height and width of each image.
         halves: For each image the halves of edges that hold a pointmap of it.
+        principal_px: Column and row (N, 2) of the principal points, pixels counted from 0.
+        stretch: fx / fy (N,); rows times it have the focal length of columns.
     """
 
     sizes: tuple[tuple[int, int], ...]
     halves: tuple[tuple[Half, ...], ...]
+    principal_px: Float[np.ndarray, "n 2"]
+    stretch: Float[np.ndarray, " n"]
 
     def __len__(self) -> int:
         return len(self.sizes)
 
+    def through(self, intrinsics: Float[np.ndarray, "n 3 3"]) -> "Graph":
+        """The same with these pinholes, whose pixels count from 0."""
+        stretch = intrinsics[:, 0, 0] / intrinsics[:, 1, 1]
+        return replace(self, principal_px=intrinsics[:, :2, 2], stretch=stretch)
+
+    def pixels(self, image: int, some: Int[np.ndarray, " p"]) -> Float[np.ndarray, "p 2"]:
+        """Columns and stretched rows (P, 2) relative to the principal point, of pixels by row-major index."""
+        width, (cx, cy) = self.sizes[image][1], self.principal_px[image]
+        return np.stack([some % width - cx, (some // width - cy) * self.stretch[image]], axis=1)
+
 
 def graph_of(maps: PairMaps) -> Graph:
-    """Check pairs for what would spoil an alignment.
+    """Check pairs for what would spoil an alignment; principal points are in the middle, (W/2, H/2).
 
     Raises:
         InputError: Sizes contradict each other, an image is in no pair or has hardly a pixel that weighs, a
@@ -60,7 +75,8 @@ def graph_of(maps: PairMaps) -> Graph:
     sizes = tuple(maps.confidence[mine[0].edge][mine[0].side].shape for mine in halves)
     _check_values(maps, sizes)
     _check_connected(maps, len(halves))
-    return Graph(sizes, tuple(tuple(mine) for mine in halves))
+    middles = np.array([(width / 2, height / 2) for height, width in sizes])
+    return Graph(sizes, tuple(tuple(mine) for mine in halves), middles, np.ones(len(sizes)))
 
 
 def _check_values(maps: PairMaps, sizes: tuple[tuple[int, ...], ...]) -> None:

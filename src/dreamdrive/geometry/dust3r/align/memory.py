@@ -51,6 +51,5 @@ def check_budget(predicted: int, budget: int, images: int, edges: int) -> None:
     if predicted > budget:
         raise InputError(
             f"Aligning {images} images in {edges} pairs takes about {predicted / 1e9:.1f} GB, and "
-            f"{budget / 1e9:.1f} GB are allowed. Use fewer images, a smaller window of pairs, smaller images "
-            "or float16 pointmaps, or allow more."
+            f"{budget / 1e9:.1f} GB are allowed: take fewer frames (--frames)."
         )

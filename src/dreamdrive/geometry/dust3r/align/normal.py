@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from dreamdrive.geometry.dust3r.align.penalty import Distance, Penalty
@@ -21,13 +21,15 @@ class ImageSamples:
     Attributes:
         image: Number of the image.
         edges: Numbers (K,) of the edges that speak of it.
-        pixels: Column and row (P, 2) of each pixel, relative to the principal point.
+        index: Row-major index (P,) of each pixel.
+        pixels: Column and stretched row (P, 2) of each pixel, relative to the principal point.
         points: Point (K, P, 3) of each pixel by each edge, in the frame of the edge's first camera.
         weight: Log confidence over the divisor of the loss, times the pixels that each one stands for (K, P).
     """
 
     image: int
     edges: tuple[int, ...]
+    index: Int[np.ndarray, " p"]
     pixels: Float[Tensor, "p 2"]
     points: Float[Tensor, "k p 3"]
     weight: Float[Tensor, "k p"]

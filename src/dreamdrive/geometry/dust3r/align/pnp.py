@@ -13,6 +13,8 @@ def pose_by_pnp(
     usable: Bool[np.ndarray, "h w"],
     focal_px: float | None,
     iterations: int,
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
 ) -> tuple[float, Float[np.ndarray, "4 4"]] | None:
     """Pose of the camera whose pixel grid sees the points: SQPNP in RANSAC, 5 px.
 
@@ -22,9 +24,12 @@ def pose_by_pnp(
         focal_px: None tries 21 focal lengths from S/2 to 3 S, S the longer side, and keeps that of most
             inliers.
         iterations: Of RANSAC.
+        principal_px: Column and row; None is the middle (W/2, H/2).
+        stretch: fx / fy.
 
     Returns:
-        Focal length and world_from_camera, or None where fewer than four pixels are usable or nothing fits.
+        Focal length fx and world_from_camera, or None where fewer than four pixels are usable or nothing
+        fits.
     """
     height, width = usable.shape
     if np.count_nonzero(usable) < 4:
@@ -32,10 +37,11 @@ def pose_by_pnp(
     rows, columns = np.nonzero(usable)
     pixels = np.stack([columns, rows], axis=1).astype(np.float32)
     longer = max(height, width)
+    cx, cy = (width / 2, height / 2) if principal_px is None else principal_px
     focals = [focal_px] if focal_px is not None else np.geomspace(longer / 2, longer * 3, _FOCALS).tolist()
     best: tuple[int, float, np.ndarray] | None = None
     for focal in focals:
-        matrix = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]], np.float32)
+        matrix = np.array([[focal, 0, cx], [0, focal / stretch, cy], [0, 0, 1]], np.float32)
         success, turn, shift, inliers = cv2.solvePnPRansac(
             points[usable].astype(np.float32),
             pixels,

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
+from dreamdrive.geometry.dust3r.align.areas import Normalisation, half_areas
 from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.normal import ImageSamples
-from dreamdrive.geometry.dust3r.align.objective import Normalisation, half_areas
 from dreamdrive.geometry.dust3r.align.penalty import Penalty
 from dreamdrive.geometry.dust3r.align.rays import RayMisses, pixel_rays
 from dreamdrive.geometry.dust3r.align.state import State
@@ -36,10 +35,9 @@ def draw_samples(
             weight[k] = stands_for * trust / areas[half.edge, half.side]
             xyz = maps.points[half.edge][half.side].reshape(-1, 3)[some]
             points[k] = np.where(trust[:, None] > 0, xyz, 0)
-        height, width = graph.sizes[image]
-        pixels = np.stack([some % width - width / 2, some // width - height / 2], axis=1)
-        tensors = (torch.from_numpy(array) for array in (pixels, points, weight))
-        drawn.append(ImageSamples(image, tuple(half.edge for half in halves), *tensors))
+        edges = tuple(half.edge for half in halves)
+        tensors = (torch.from_numpy(array) for array in (graph.pixels(image, some), points, weight))
+        drawn.append(ImageSamples(image, edges, some, *tensors))
     return drawn
 
 
@@ -88,7 +86,8 @@ def solve_depth(
         known = torch.zeros(size[0] * size[1], dtype=torch.bool)
         for first in range(0, len(depth), _CHUNK):
             some = slice(first, min(first + _CHUNK, len(depth)))
-            rays = pixel_rays(_pixels(some, size), float(state.focal_px[image]))
+            pixels = graph.pixels(image, np.arange(some.start, some.stop)).astype(np.float32)
+            rays = pixel_rays(torch.from_numpy(pixels), float(state.focal_px[image]))
             weight = torch.from_numpy(
                 np.stack([np.log(c[some], dtype=np.float32) / np.float32(a) for _, c, a in flat])
             )
@@ -102,9 +101,3 @@ def solve_depth(
         depth[~known] = depth[known].median()
         depths.append(depth.numpy().reshape(size))
     return Dense(tuple(depths), loss)
-
-
-def _pixels(some: slice, size: tuple[int, int]) -> Float[Tensor, "p 2"]:
-    index = np.arange(some.start, some.stop)
-    pixels = np.stack([index % size[1] - size[1] / 2, index // size[1] - size[0] / 2], axis=1)
-    return torch.from_numpy(pixels.astype(np.float32))

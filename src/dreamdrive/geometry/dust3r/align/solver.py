@@ -26,14 +26,10 @@ class Solved:
     Attributes:
         state: Cameras and pairs.
         losses: Loss over the samples before each step and at the end.
-        hessian: Of the unknowns at the last step, without damping.
-        basis: From the unknowns to steps.
     """
 
     state: State
     losses: tuple[float, ...]
-    hessian: Float[np.ndarray, "u u"]
-    basis: csr_array
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ def solve(
         hessian, gradient = _equations(samples, here, penalty, basis, bend)
         if slow:
             break
-    return Solved(here.state, tuple(losses), hessian, basis)
+    return Solved(here.state, tuple(losses))
 
 
 def _at(

@@ -42,7 +42,12 @@ class Start:
 
 
 def spanning_tree(
-    maps: PairMaps, votes: FocalVotes | None = None, *, upstream: bool = False, stale_focals: bool = True
+    maps: PairMaps,
+    votes: FocalVotes | None = None,
+    graph: Graph | None = None,
+    *,
+    upstream: bool = False,
+    stale_focals: bool = True,
 ) -> Start:
     """Join pairs from the strongest on; then pose each image in what was joined.
 
@@ -57,6 +62,7 @@ def spanning_tree(
     Args:
         maps: The pairs.
         votes: Focal lengths by the robust rule where they are known already; not looked at if ``upstream``.
+        graph: Their graph, where that is known already.
         upstream: Do all of it as the authors' program does.
         stale_focals: As it does, take an image's focal length from the pair handled before; without effect
             unless ``upstream``.
@@ -64,7 +70,7 @@ def spanning_tree(
     Raises:
         InputError: See ``graph.graph_of``.
     """
-    graph = graph_of(maps)
+    graph = graph or graph_of(maps)
     tree = _Tree(maps, graph, votes, upstream, stale_focals)
     tree.grow()
     tree.find_focals()
@@ -148,7 +154,7 @@ class _Tree:
         """Focal lengths of all images."""
         count = len(self.graph)
         if not self.upstream:
-            votes = self.votes or focal_votes(self.maps)
+            votes = self.votes or focal_votes(self.maps, graph=self.graph)
             self.focals = dict(enumerate(votes.per_image_px(count).tolist()))
             return
         for edge in self._by_strength():
@@ -171,7 +177,10 @@ class _Tree:
         trusts = [self.maps.confidence[half.edge][half.side] for half in self.graph.halves[image]]
         trust = np.max(trusts, axis=0)
         threshold = PNP_CONFIDENCE if self.upstream else 1.0
-        found = pose_by_pnp(self.points[image], trust > threshold, self.focals.get(image), _PNP_STEPS)
+        cx, cy = self.graph.principal_px[image].tolist()
+        stretch = float(self.graph.stretch[image])
+        focal = self.focals.get(image)
+        found = pose_by_pnp(self.points[image], trust > threshold, focal, _PNP_STEPS, (cx, cy), stretch)
         if found is not None:
             self.focals[image], pose = found
             return pose

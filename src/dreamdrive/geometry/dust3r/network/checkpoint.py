@@ -46,7 +46,8 @@ def load_dust3r(path: Path, *, bfloat16: bool = False) -> Dust3r:
         path = path / "model.safetensors"
     state, stated = _read_hub(path) if path.suffix == ".safetensors" else _read_pth(path)
     state = normalise(state, str(path))
-    found = config_from_shapes({key: tuple(value.shape) for key, value in state.items()}, str(path))
+    heads = None if stated is None else (stated.enc_heads, stated.dec_heads)
+    found = config_from_shapes({key: tuple(value.shape) for key, value in state.items()}, str(path), heads)
     if stated is None:
         stated = found
     check_agreement(stated, found, str(path))

@@ -189,8 +189,15 @@ def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig
     )
 
 
-def config_from_shapes(shapes: Mapping[str, tuple[int, ...]], source: str) -> NetworkConfig:
-    """Configuration from the shapes of a state dict; heads of 64 channels and published modes are assumed.
+def config_from_shapes(
+    shapes: Mapping[str, tuple[int, ...]], source: str, heads: tuple[int, int] | None = None
+) -> NetworkConfig:
+    """Configuration from the shapes of a state dict; published modes are assumed.
+
+    Args:
+        shapes: Shape of each tensor.
+        source: Where they come from, for messages.
+        heads: Heads of encoder and decoders, which no shape tells; None assumes 64 channels each.
 
     Raises:
         InputError: A tensor that tells a size is missing, or the sizes do not fit each other.
@@ -213,14 +220,15 @@ def config_from_shapes(shapes: Mapping[str, tuple[int, ...]], source: str) -> Ne
         a, b, c, d = (shape(f"downstream_head1.dpt.act_postprocess.{i}.0.weight", 4)[0] for i in range(4))
         last_dim, feature_dim, _, _ = shape("downstream_head1.dpt.head.0.weight", 4)
         dpt = DptSizes((a, b, c, d), feature_dim, last_dim)
+    enc_heads, dec_heads = heads or (max(enc_dim // HEAD_DIM, 1), max(dec_dim // HEAD_DIM, 1))
     return _make(
         source,
         enc_dim=enc_dim,
         enc_depth=_depth(shapes, "enc_blocks"),
-        enc_heads=max(enc_dim // HEAD_DIM, 1),
+        enc_heads=enc_heads,
         dec_dim=dec_dim,
         dec_depth=_depth(shapes, "dec_blocks"),
-        dec_heads=max(dec_dim // HEAD_DIM, 1),
+        dec_heads=dec_heads,
         patch=patch,
         mlp_ratio=hidden / max(enc_dim, 1),
         head=head,

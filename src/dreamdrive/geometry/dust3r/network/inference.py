@@ -2,7 +2,7 @@
 
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import torch
@@ -13,12 +13,10 @@ from dreamdrive.geometry.dust3r.network.heads import Pointmap
 from dreamdrive.geometry.dust3r.network.images import as_input
 from dreamdrive.geometry.dust3r.network.memory import Size, plan_memory
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.protocol import Progress, silent
 
 BUDGET_BYTES = 8 * 10**9
 """Memory allowed by default. Not what the machine has free: the size of a batch shows in the last digits."""
-
-Progress = Callable[[int, int], None]
-"""Called with frames and pairs done, and frames and pairs in all."""
 
 _Maps = tuple[Float[np.ndarray, "_ _ 3"], Float[np.ndarray, "_ _"]]
 _log = logging.getLogger("dreamdrive")
@@ -31,7 +29,7 @@ def infer(
     edges: Int[np.ndarray, "e 2"],
     *,
     budget_bytes: int = BUDGET_BYTES,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> PairMaps:
     """Points and confidences of all pairs; each frame is encoded once.
 
@@ -40,7 +38,7 @@ def infer(
         pictures: Frames as ``images.prepare`` makes them, RGB (H, W, 3); shapes may differ.
         edges: Pairs (E, 2) of indices of pictures.
         budget_bytes: Memory that may be taken, the weights included.
-        progress: Told after each batch.
+        progress: Told after each batch of the frames and pairs done, of all of them.
 
     Raises:
         InputError: Not even one pair at a time fits into the memory allowed.
@@ -51,7 +49,8 @@ def infer(
     sizes = [(picture.shape[0], picture.shape[1]) for picture in pictures]
     plan = plan_memory(network, sizes, edges, budget_bytes)
     used = sorted({int(i) for i in edges.flatten()})
-    _log.info("DUSt3R on %d pairs of %d frames takes %s", len(edges), len(used), plan)
+    # A warning, since less is not shown and it may be all of what the machine has.
+    _log.warning("DUSt3R on %d pairs of %d frames takes %s", len(edges), len(used), plan)
     count = _Count(len(used) + len(edges), progress)
     encoded: dict[int, Tokens] = {}
     for batch in _batches([sizes[i] for i in used], plan.images_at_once):
@@ -76,13 +75,12 @@ def infer(
 class _Count:
     """Steps done, told to whoever wants to know."""
 
-    def __init__(self, total: int, progress: Progress | None) -> None:
+    def __init__(self, total: int, progress: Progress) -> None:
         self._done, self._total, self._progress = 0, total, progress
 
     def add(self, steps: int) -> None:
         self._done += steps
-        if self._progress is not None:
-            self._progress(self._done, self._total)
+        self._progress(self._done, self._total)
 
 
 def _batches(kinds: Sequence[Size | tuple[Size, Size]], most: int) -> Iterator[list[int]]:

@@ -88,7 +88,7 @@ def plan_memory(
     if plan.total > budget_bytes:
         raise InputError(
             f"DUSt3R on {len(edges)} pairs of {len(used)} frames needs {plan}; "
-            f"allowed are {_gb(budget_bytes)}: take fewer frames, fewer pairs or smaller pictures"
+            f"allowed are {_gb(budget_bytes)}: take fewer frames (--frames)"
         )
     return plan
 

@@ -6,7 +6,6 @@ points P of an edge, its similarity T and w = ln confidence (Wang et al. 2024, e
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import torch
@@ -14,25 +13,13 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
+from dreamdrive.geometry.dust3r.align.areas import Normalisation, half_areas
 from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.spanning_tree import BASE_SCALE, Start
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
-Normalisation = Literal["pooled", "modular"]
 _FOCAL_BREAK = 20.0
-
-
-def half_areas(maps: PairMaps, normalisation: Normalisation) -> Float[np.ndarray, "e 2"]:
-    """The divisor A (E, 2) of each edge's first and second image.
-
-    ``pooled`` is the number of pixels of all first images, or of all second images; ``modular`` the mean over
-    edges of the means over pixels. They are the same where all images are of one size.
-    """
-    areas = np.array([[side.size for side in pair] for pair in maps.confidence], dtype=np.float64)
-    if normalisation == "modular":
-        return len(areas) * areas
-    return np.broadcast_to(areas.sum(axis=0), areas.shape).copy()
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ from tests.geometry.dust3r.align.goldens import scene
 from tests.geometry.dust3r.align.pairs import path_error, street
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.align.clean import world_points
-from dreamdrive.geometry.dust3r.align.pair_viewer import view_pair
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.dust3r.reference.clean import world_points
+from dreamdrive.geometry.dust3r.reference.pair_viewer import view_pair
 
 
-def test_it_is_upstreams(golden_dir: Path) -> None:
+def test_it_is_golden(golden_dir: Path) -> None:
     maps, _, wanted = scene(golden_dir, "C")
     found = view_pair(maps)
     np.testing.assert_allclose(found.world_from_camera, wanted["poses"], atol=1e-6)
@@ -25,14 +25,14 @@ def test_it_is_upstreams(golden_dir: Path) -> None:
         np.testing.assert_allclose(points, wanted[f"pts3d.{image}"], atol=2e-6)
 
 
-def test_the_mirrored_pair_is_mirrored(golden_dir: Path) -> None:
+def test_the_mirrored_golden_pair_is_mirrored(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "C")
     found, other = view_pair(maps), view_pair(PairMaps(1 - maps.edges, maps.points, maps.confidence))
     np.testing.assert_array_equal(found.world_from_camera[::-1], other.world_from_camera)
     np.testing.assert_array_equal(found.depth[0], other.depth[1])
 
 
-def test_a_failure_is_told(golden_dir: Path) -> None:
+def test_a_failure_on_a_golden_pair_is_told(golden_dir: Path) -> None:
     maps, _, _ = scene(golden_dir, "C")
     assert len(view_pair(maps, confident=1e9).unsure) == 1
     assert view_pair(maps).unsure == ()

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from dreamdrive.geometry.dust3r.align.objective import Objective, Raw
+from dreamdrive.geometry.dust3r.reference.objective import Objective, Raw
 
 Schedule = Literal["cosine", "linear"]
 BETAS = (0.9, 0.9)

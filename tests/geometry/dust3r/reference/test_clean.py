@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from tests.geometry.dust3r.align.goldens import scene
 
-from dreamdrive.geometry.dust3r.align.clean import clean, world_points
+from dreamdrive.geometry.dust3r.reference.clean import clean, world_points
 
 
-def test_it_is_upstreams(golden_dir: Path) -> None:
+def test_it_is_golden(golden_dir: Path) -> None:
     _, _, wanted = scene(golden_dir, "A")
     images = range(5)
     final = {key[13:]: value for key, value in wanted.items() if key.startswith("cosine.final.")}
