@@ -191,5 +191,6 @@ def to_images(frames: UInt8[np.ndarray, "n h w 3"]) -> Float[Tensor, "n 3 h w"]:
 
 def to_frames(images: Float[Tensor, "n 3 h w"]) -> UInt8[np.ndarray, "n h w 3"]:
     """Frames in 8 bits of images in [-1, 1]; what lies outside is cut off."""
-    bytes_ = images.float().add(1).mul(127.5).clamp(0, 255).round().to(torch.uint8)
-    return bytes_.permute(0, 2, 3, 1).contiguous().numpy()
+    # One after the other: what lies between is as large as the images.
+    bytes_ = [image.float().add(1).mul(127.5).clamp(0, 255).round().to(torch.uint8) for image in images]
+    return torch.stack(bytes_).permute(0, 2, 3, 1).contiguous().numpy()
