@@ -28,6 +28,8 @@ def test_six_generated_cameras_become_one_scene(
     report = json.loads((out / "report.json").read_text())
     assert any("generated from the layout" in note for note in report["notes"])
     assert report["requested"]["length_m"] > 0
+    assert report["requested"]["error"] is None
+    assert "the poses are those asked for" in report["requested"]["reason"]
     scene = load_scene(out / "scene")
     assert (len(scene.cameras), len(scene.trajectory)) == (24, 4)
     assert (out / "video" / "surround.mp4").is_file()

@@ -2,11 +2,11 @@
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.prior.vista.kinds import KINDS, KindName
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-INSTALL = 'pip install "dreamdrive[video-prior]"'
 _TAKES = frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"})
 _MEMORY = (
     "at 1024x576 on a GPU in half precision about 9 GB for the UNet and 13 GB for the decoder (reckoned, not "
@@ -52,7 +52,7 @@ SVD = Prior(
     ),
     memory=_MEMORY,
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",
-    package="diffusers",
+    package=PACKAGE,
     install=INSTALL,
 )
 VISTA = Prior(
@@ -67,6 +67,6 @@ VISTA = Prior(
     ),
     memory=_MEMORY,
     weights="vista.safetensors of OpenDriveLab/Vista, or a folder that dreamdrive prior convert made of it",
-    package="diffusers",
+    package=PACKAGE,
     install=INSTALL,
 )
