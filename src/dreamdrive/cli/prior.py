@@ -41,6 +41,8 @@ def convert(
     console.print(
         f"{folder}: {kind.title}, for --prior {kind.name} --weights {folder}", soft_wrap=True, markup=False
     )
+    for note in made.notes:
+        console.print(note, soft_wrap=True, markup=False)
     for what, count in made.ignored.items():
         console.print(f"left out, not needed: {what}, {count} tensors", soft_wrap=True)
 

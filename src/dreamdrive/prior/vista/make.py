@@ -18,6 +18,7 @@ from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
+from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.engine import Engine
 from dreamdrive.prior.vista.features import BLOCK, Window, extract
 from dreamdrive.prior.vista.kinds import SVD, Kind
@@ -60,6 +61,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     held_out = held_out_mask(len(wanted), control.hold_out)
     spans = _rounds(int(wanted[-1]) + 1, kind, networks.per_round)
     check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
+    noticed = notes_of(networks.stored)
     told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
     windows = [
         Window(span, columns, kind.overlap if number else min(len(leading.frames), kind.overlap))
@@ -88,7 +90,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         latents=latents.permute(0, 2, 3, 1).contiguous().numpy(),
         known=Known(intrinsics=leading.calibration.known),
         requested=asked,
-        provenance=_provenance(kind, control, leading, steps, len(spans)),
+        provenance=_provenance(kind, control, leading, steps, len(spans), noticed),
     )
 
 
@@ -169,13 +171,16 @@ def _decoded(engine: Engine, latents: Float[Tensor, "f c h w"]) -> UInt8[np.ndar
     return to_frames(images)
 
 
-def _provenance(kind: Kind, control: Control, leading: Leading, steps: int, rounds: int) -> dict[str, Any]:
+def _provenance(
+    kind: Kind, control: Control, leading: Leading, steps: int, rounds: int, noticed: list[str]
+) -> dict[str, Any]:
     assert control.path is not None
     notes = [
         f"The frames are generated: {kind.title} made them of {control.path.name} in {rounds} "
         f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and "
         "scale are not known and have to be found in the frames.",
         *leading.notes,
+        *noticed,
     ]
     if len(leading.frames) > 1:
         notes.append(f"The first {len(leading.frames)} frames of the input were kept as the first ones.")

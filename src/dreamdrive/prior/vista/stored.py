@@ -120,8 +120,12 @@ def _single(path: Path) -> Path:
     return found[0]
 
 
-def _open(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
-    """Shapes by key, and a reader of one tensor."""
+def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
+    """Shapes by key of a ``.safetensors``, and a reader of one tensor.
+
+    Raises:
+        InputError: There is no such file, or it is cut short.
+    """
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {EXPECTED}")
     try:
@@ -135,7 +139,7 @@ def _open(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
 
 
 def _open_file(path: Path) -> Stored:
-    shapes, read = _open(path)
+    shapes, read = open_tensors(path)
     recipes = recipes_of(shapes)
     if recipes.unknown:
         raise InputError(f"{path} holds unknown tensors: {_some(recipes.unknown)}; expected {EXPECTED}")
@@ -185,7 +189,7 @@ def _folder_part(path: Path, part: Part) -> StoredPart:
     config = path / part / "config.json"
     if not there or not config.is_file():
         raise InputError(f"{path / part} lacks config.json or {FILES[part][0]}; expected {EXPECTED}")
-    shapes, read = _open(there[0])
+    shapes, read = open_tensors(there[0])
     # Older versions of transformers stored these counting numbers.
     shapes = {name: shape for name, shape in shapes.items() if not name.endswith(".position_ids")}
     return StoredPart(read_json(config, "--weights"), shapes, read)
