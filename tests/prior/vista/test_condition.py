@@ -15,7 +15,7 @@ KINDS = {name: [name] for name in NUMBERS} | {"steer": ["speed", "angle"], "free
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_columns_of_each_action(golden: Golden, name: str) -> None:
+def test_golden_columns_of_each_action(golden: Golden, name: str) -> None:
     given = golden.tensors("conditioning")
     columns = embed_action({kind: given[f"in.{kind}"].flatten().tolist() for kind in KINDS[name]})
     image = given["in.cond_frames_without_noise"].flatten()
@@ -34,7 +34,7 @@ def test_the_golden_settings_are_ours(golden: Golden) -> None:
     assert torch.equal(given["all.c.concat"], given["in.cond_frames"])
 
 
-def test_clip_sees_a_square(golden: Golden) -> None:
+def test_golden_clip_sees_a_square(golden: Golden) -> None:
     given = golden.tensors("clip_preprocess")
     made = clip_pixels(given["image_fp16"].float())
     assert made.shape == (1, 3, 224, 224)

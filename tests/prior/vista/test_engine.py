@@ -1,4 +1,4 @@
-"""The networks at work: one at a time, and by the public code's numbers."""
+"""The networks at work, one at a time."""
 
 import gc
 import weakref

@@ -51,7 +51,7 @@ def test_frames_lie_in_main_memory(official_size: Stored) -> None:
 
 def test_what_does_not_fit_is_refused_with_a_size_that_does(official_size: Stored) -> None:
     with pytest.raises(
-        InputError, match=r"needs about 43\.\d GB at once .*8\.0 GB are free: give --size (\d+x\d+)"
+        InputError, match=r"needs about 42\.9 GB at once .*8\.0 GB are free: give --size (\d+x\d+)"
     ) as told:
         check_memory(official_size, Job(SIZE, 25, 25), Free(int(8e9)), half=True)
     width, height = map(int, str(told.value).split("--size ")[1].split(" ")[0].split("x"))
