@@ -41,6 +41,7 @@ def test_leading_frames_are_those_nearest_to_the_models_times(tmp_path, rate_hz,
     write_video(tmp_path / "drive.mp4", list(frames), rate_hz)
     found, notes = leading_frames(tmp_path / "drive.mp4", 3, 10.0)
     np.testing.assert_allclose([frame.rgb.mean() for frame in found], shown, atol=3)
+    assert ("Only 1 of 3 leading frames at 10 Hz" in " ".join(notes)) == (len(shown) == 1)
     assert (f"{off} of a step off the model's 10 Hz" in " ".join(notes)) == (off is not None)
 
 

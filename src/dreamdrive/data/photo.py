@@ -131,7 +131,12 @@ def _nearest(video: Video, count: int, rate_hz: float) -> tuple[list[RawFrame], 
             break
         taken.append((miss, frame))
     frames, worst = [frame for _, frame in taken], max(miss for miss, _ in taken)
-    if worst <= _WORTH_A_NOTE:
-        return frames, []
-    off = f"up to {worst:.0%} of a step off the model's {rate_hz:g} Hz"
-    return frames, [f"The leading frames are {off}: the video has none at its times."]
+    notes: list[str] = []
+    if worst > _WORTH_A_NOTE:
+        off = f"up to {worst:.0%} of a step off the model's {rate_hz:g} Hz"
+        notes.append(f"The leading frames are {off}: the video has none at its times.")
+    if len(taken) < count:
+        notes.append(
+            f"Only {len(taken)} of {count} leading frames at {rate_hz:g} Hz are in {video.path.name}."
+        )
+    return frames, notes

@@ -61,8 +61,8 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     held_out = held_out_mask(len(wanted), control.hold_out)
     spans = _rounds(int(wanted[-1]) + 1, kind, networks.per_round)
     check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
-    noticed = notes_of(networks.stored)
     told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
+    noticed = notes_of(networks.stored)
     windows = [
         Window(span, columns, kind.overlap if number else min(len(leading.frames), kind.overlap))
         for number, (span, columns) in enumerate(zip(spans, told, strict=True))
