@@ -7,7 +7,7 @@ import pytest
 
 from dreamdrive.report import against_request
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
 from dreamdrive.scene.trajectory import Trajectory
 from tests.prior.paths import circle
@@ -57,6 +57,15 @@ def test_the_path_in_the_frames_is_compared_with_the_one_asked_for(clip: Clip) -
     assert straight is not None
     assert straight["error"]["scale"] == pytest.approx(0.5, abs=0.01)
     assert straight["error"]["rotation_deg_per_m"] == pytest.approx(np.rad2deg(0.03), rel=0.01)
+
+
+def test_poses_that_were_taken_as_asked_are_not_compared(clip: Clip) -> None:
+    asked = circle(5.0, 0.03, seconds=1.1)
+    known = Known(asked.world_from_camera, generated=True)
+    made = against_request(replace(clip, requested=asked, known=known), geometry(clip, asked))
+    assert made is not None
+    assert made["error"] is None
+    assert made["reason"].startswith("the poses are those asked for")
 
 
 def test_a_path_of_another_rate_is_compared_at_the_times_of_the_frames(clip: Clip) -> None:

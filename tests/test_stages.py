@@ -198,6 +198,26 @@ def test_digests_follow_content_and_names_only(tmp_path: Path) -> None:
     assert file_digest(tmp_path / "a") != file_digest(tmp_path / "b")
 
 
+def test_a_folder_behind_a_link_counts(tmp_path: Path) -> None:
+    """Weights are joined by links; another one must not go unnoticed, and a circle of them must end."""
+    for name in ("first", "second"):
+        (tmp_path / name / "unet").mkdir(parents=True)
+        (tmp_path / name / "unet" / "weights").write_text(name)
+    joined = tmp_path / "joined"
+    joined.mkdir()
+    (joined / "unet").symlink_to(tmp_path / "first" / "unet")
+    (joined / "circle").symlink_to(joined)
+    first = file_digest(joined, deep=True)
+    assert first == file_digest(tmp_path / "first", deep=True)
+    assert first == file_digest(joined, deep=True)
+    (joined / "unet").unlink()
+    (joined / "unet").symlink_to(tmp_path / "second" / "unet")
+    assert file_digest(joined, deep=True) == file_digest(tmp_path / "second", deep=True) != first
+    (tmp_path / "first" / "back").symlink_to(joined)
+    (joined / "there").symlink_to(tmp_path / "first")
+    assert file_digest(joined, deep=True) != first
+
+
 def test_each_stage_has_its_own_seed() -> None:
     seeds = {stage_seed(seed, name) for seed in (0, 1) for name in STAGES}
     assert len(seeds) == 2 * len(STAGES)

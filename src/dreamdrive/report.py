@@ -18,6 +18,7 @@ from dreamdrive.stages import StageRecord
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "pycolmap", "av", "safetensors")
 """Whose versions a result may depend on."""
+_AS_ASKED = "the poses are those asked for: the frames are too different from one another to look for others"
 
 
 def describe(
@@ -81,9 +82,15 @@ def describe(
 
 
 def against_request(clip: Clip, geometry: Geometry) -> dict[str, Any] | None:
-    """How far the path in the frames is from the one they were asked for; None where none was asked for."""
+    """How far the path in the frames is from the one they were asked for; None where none was asked for.
+
+    Where the path was not looked for in the frames but taken as asked for, ``error`` is None and ``reason``
+    says so.
+    """
     if clip.requested is None:
         return None
+    if clip.known.generated and clip.known.world_from_camera is not None:
+        return {"length_m": clip.requested.length_m, "error": None, "reason": _AS_ASKED}
     lead = clip.of_camera(int(clip.camera[0]))
     found = np.stack([geometry.cameras[i].world_from_camera for i in lead])
     error = compare_paths(found, clip.requested.at(clip.times_s[lead]))

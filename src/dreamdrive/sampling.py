@@ -6,7 +6,7 @@ from typing import Any
 
 from dreamdrive import __version__
 from dreamdrive.data import read_clip
-from dreamdrive.data.feature_file import MAX_CHANNELS, FeatureFile, write_features
+from dreamdrive.data.feature_file import INDEX, MAX_CHANNELS, FeatureFile, write_features
 from dreamdrive.data.recording import write_recording
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
@@ -117,9 +117,9 @@ def clip_features(
     if out.suffix != ".safetensors":
         raise InputError(f"-o {out}: expected a name that ends in .safetensors")
     chosen, folder = FeatureOptions(**options), find_weights(weights)
-    if not (0 <= chosen.sigma < float("inf") and 1 <= chosen.channels <= MAX_CHANNELS):
+    if not (0 < chosen.sigma < float("inf") and 1 <= chosen.channels <= MAX_CHANNELS):
         raise InputError(
-            f"--sigma {chosen.sigma:g} --channels {chosen.channels}: expected a deviation of 0 or more and "
+            f"--sigma {chosen.sigma:g} --channels {chosen.channels}: expected a deviation above 0 and "
             f"1 to {MAX_CHANNELS} channels"
         )
     clip = read_clip(path, frames=frames, size=detailed_size(path))
@@ -131,7 +131,7 @@ def clip_features(
         "features": asdict(chosen),
         "clip": {"name": path.name, "sha256": file_digest(path)},
         "weights": {"name": folder.name, "sha256": file_digest(folder, deep=True)},
-        "frames": frames,
+        INDEX: clip.source_index.tolist(),
         "action": None if action is None else asdict(action),
         "seed": seed,
         "notes": list(found.notes),

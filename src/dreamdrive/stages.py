@@ -6,7 +6,7 @@ import logging
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, is_dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
@@ -175,15 +175,29 @@ def file_digest(path: Path, *, deep: bool = False) -> str:
     """SHA-256 of a file's content, or of names and contents of the files in a folder.
 
     Args:
-        path: A file or a folder; hidden files in it do not count.
+        path: A file or a folder; hidden files in it do not count. Links are followed.
         deep: Whether the folders in a folder count.
     """
     if path.is_file():
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    found = path.rglob("*") if deep else path.iterdir()
-    files = sorted(f for f in found if f.is_file() and not f.name.startswith("."))
+    files = sorted(file for file in _files(path, deep) if not file.name.startswith("."))
     return digest([[f.relative_to(path).as_posix(), file_digest(f)] for f in files])
+
+
+def _files(folder: Path, deep: bool, within: frozenset[Path] = frozenset()) -> Iterator[Path]:
+    """Files of a folder, those behind links too; ``within`` are the folders that lead there.
+
+    ``Path.rglob`` does not enter folders that are links, which is how weights of several places are joined.
+    """
+    real = folder.resolve()
+    if real in within:
+        return
+    for entry in folder.iterdir():
+        if entry.is_file():
+            yield entry
+        elif deep and entry.is_dir():
+            yield from _files(entry, deep, within | {real})
 
 
 def stage_seed(seed: int, name: str) -> int:

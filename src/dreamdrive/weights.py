@@ -6,7 +6,7 @@ import re
 import warnings
 import zipfile
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -78,7 +78,9 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
     wanted = network.state_dict()
     counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
     state = counters | _shared(wanted, state) | state
-    _check_keys(wanted, state, source, expected)
+    wrong = misfits(*({key: value.shape for key, value in each.items()} for each in (wanted, state)))
+    if wrong:
+        raise InputError(f"{source} does not fit ({in_words(wrong)}); expected {expected}")
     values = {key: value.float() if value.is_floating_point() else value for key, value in state.items()}
     network.load_state_dict(values, assign=True)
     return network.eval().requires_grad_(False)
@@ -171,19 +173,30 @@ def _shared(wanted: dict[str, Tensor], state: dict[str, Tensor]) -> dict[str, Te
     return {name: state[key] for key, group in held.items() for name in group}
 
 
-def _check_keys(wanted: dict[str, Tensor], state: dict[str, Tensor], source: str, expected: str) -> None:
-    missing = sorted(set(wanted) - set(state))
-    extra = sorted(set(state) - set(wanted))
-    wrong = [
-        f"{key} is {tuple(state[key].shape)}, not {tuple(wanted[key].shape)}"
-        for key in sorted(set(wanted) & set(state))
-        if state[key].shape != wanted[key].shape
-    ]
-    found = [("missing", missing), ("unknown", extra), ("of a wrong shape", wrong)]
-    trouble = [f"{len(keys)} {what}: {_some(keys)}" for what, keys in found if keys]
-    if trouble:
-        raise InputError(f"{source} does not fit ({'; '.join(trouble)}); expected {expected}")
+def misfits(wanted: Mapping[str, Sequence[int]], given: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
+    """What is wrong with tensors, by what it is; empty where they are those of the network.
+
+    Args:
+        wanted: Shapes of the network's tensors, by key.
+        given: Shapes of those that are there.
+    """
+    found = {
+        "missing": sorted(set(wanted) - set(given)),
+        "unknown": sorted(set(given) - set(wanted)),
+        "of a wrong shape": [
+            f"{key} is {tuple(given[key])}, not {tuple(wanted[key])}"
+            for key in sorted(set(wanted) & set(given))
+            if tuple(given[key]) != tuple(wanted[key])
+        ],
+    }
+    return {what: keys for what, keys in found.items() if keys}
 
 
-def _some(keys: list[str]) -> str:
+def in_words(found: Mapping[str, list[str]]) -> str:
+    """Misfits for a message, the first few of each kind."""
+    return "; ".join(f"{len(keys)} {what}: {some(keys)}" for what, keys in found.items())
+
+
+def some(keys: Sequence[str]) -> str:
+    """The first few keys, for a message."""
     return ", ".join(keys[:_SHOWN]) + (", ..." if len(keys) > _SHOWN else "")

@@ -3,10 +3,11 @@
 import json
 from pathlib import Path
 
+import av
 import pytest
 from tests.cli.conftest import Run
 from tests.prior.vista.photos import save_photo
-from tests.prior.vista.tiny import save_folder, save_official
+from tests.prior.vista.tiny import FRAMES, save_folder, save_official
 from tests.test_pipeline import shorten
 
 from dreamdrive.prior.vista.kinds import SVD, VISTA
@@ -26,6 +27,30 @@ def test_a_single_file_becomes_a_folder(run: Run, tmp_path: Path) -> None:
     wrong = run("prior", "convert", tmp_path / "none.safetensors", tmp_path / "other")
     assert wrong.code == 2
     assert "does not exist" in wrong.err
+
+
+@pytest.mark.slow
+def test_a_photo_becomes_a_video_that_says_where_it_is_from(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dreamdrive.prior.vista.sampler.sigmas", lambda steps: [700.0, 0.0])
+    photo, weights = save_photo(tmp_path / "photo.jpg"), save_folder(tmp_path / "model", VISTA)
+    out, action = tmp_path / "out", "speed=8,8,8,8 wheel=0,0,0,0"
+    asked = ("--prior", "vista", "--weights", weights, "--size", "64x64", "--action", action)
+    made = run("prior", "sample", photo, *asked, "-o", out)
+    assert made.code == 0, made
+    with av.open(str(out / "video.mp4")) as container:
+        shown = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        assert container.streams.video[0].average_rate == 10
+    assert len(shown) == len(list((out / "frames").iterdir())) == FRAMES
+    assert shown[0].shape == (64, 64, 3)
+    about = json.loads((out / "provenance.json").read_text())
+    assert about["files"]["weights"]["name"] == "model"
+    assert any("They hold no geometry" in note for note in about["provenance"]["notes"])
+    asked_for = json.loads((out / "requested.json").read_text())["world_from_camera"]
+    assert asked_for[-1][2][3] == pytest.approx(8 * (FRAMES - 1) / 10)
+    assert not (out / "poses.json").exists()
+    assert f"--features {out / 'features.safetensors'}" in made.out
 
 
 @pytest.mark.slow

@@ -91,12 +91,14 @@ def test_features_of_a_recording_are_written(
     assert made.provenance["features"]["sigma"] == 0.1
     assert made.provenance["notes"] == ["so"]
     assert made.provenance["action"] == {"direction": "left"}
+    assert made.provenance["frame_index"] == [0, 2]
     assert (seen["size"], seen["action"]) == ((128, 64), Command("left"))
     assert seen["frames"].shape == (2, 256, 1024, 3)
     clip = read_clip(tmp_path / "drive", frames="0:3:2", features=out)
     np.testing.assert_array_equal(clip.features["vista:one"], made.arrays["vista:one"])
     for option, value, message in (
         ("--channels", 900, "1 to 128 channels"),
+        ("--sigma", 0, "expected a deviation above 0"),
         ("-o", tmp_path / "f.npz", "ends in .safetensors"),
         ("--weights", "none", "--weights none does not exist"),
     ):

@@ -103,6 +103,21 @@ def test_what_is_wrong_is_named(tmp_path, arrays, metadata, problem):
         read_features(tmp_path / "f.safetensors")
 
 
+def test_rows_are_those_of_the_frames_that_the_file_names(tmp_path):
+    """Features of frames 4 to 9 are no features of frames 0 to 5, though both are six."""
+    made = FeatureFile({"a": features(6)}, {"frame_index": [4, 5, 6, 7, 8, 9]})
+    path = tmp_path / "f.safetensors"
+    for wanted, rows in (([4, 5, 6, 7, 8, 9], [0, 1, 2, 3, 4, 5]), ([5, 7], [1, 3])):
+        got = made.of_frames(np.array(wanted), lambda: 20, path)
+        np.testing.assert_array_equal(got.arrays["a"], made.arrays["a"][rows])
+    for wanted in ([0, 1, 2, 3, 4, 5], [9, 10]):
+        with pytest.raises(InputError, match=r"is of 6 frames of its clip, from 4 to 9; frame (0|10) is"):
+            made.of_frames(np.array(wanted), lambda: 20, path)
+    for index in ([4, 5], "0:6", [0, 1, 2, 3, 4, None]):
+        with pytest.raises(InputError, match="frame_index is no list of 6 frames"):
+            FeatureFile(made.arrays, {"frame_index": index}).of_frames(np.arange(6), lambda: 20, path)
+
+
 def test_a_missing_file_and_unusable_arrays(tmp_path):
     with pytest.raises(InputError, match=r"none.safetensors cannot be read"):
         read_features(tmp_path / "none.safetensors")

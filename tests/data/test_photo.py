@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from tests.data.pictures import texture
 
-from dreamdrive.data.photo import read_photo
+from dreamdrive.data.photo import leading_frames, read_photo
+from dreamdrive.data.video_writer import write_video
+from dreamdrive.errors import InputError
 
 
 def test_a_photo_is_cut_to_the_size_and_its_camera_with_it(tmp_path):
@@ -27,6 +29,26 @@ def test_a_recording_gives_its_first_frame(tmp_path):
     photo = read_photo(tmp_path, (64, 32))
     np.testing.assert_array_equal(photo.rgb[..., ::-1], texture(32, 64, 0))
     assert any("first frame of" in note for note in photo.notes)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "shown", "off"),
+    [(20.0, [0, 40, 80], None), (15.0, [0, 20, 60], "33%"), (24.0, [0, 40, 100], "17%"), (5.0, [0], None)],
+)
+def test_leading_frames_are_those_nearest_to_the_models_times(tmp_path, rate_hz, shown, off):
+    """At 15 Hz the frame for 0.1 s is at 0.067 s, and at 5 Hz there is none for it."""
+    frames = np.broadcast_to(20 * np.arange(12, dtype=np.uint8)[:, None, None, None], (12, 64, 64, 3)).copy()
+    write_video(tmp_path / "drive.mp4", list(frames), rate_hz)
+    found, notes = leading_frames(tmp_path / "drive.mp4", 3, 10.0)
+    np.testing.assert_allclose([frame.rgb.mean() for frame in found], shown, atol=3)
+    assert ("Only 1 of 3 leading frames at 10 Hz" in " ".join(notes)) == (len(shown) == 1)
+    assert (f"{off} of a step off the model's 10 Hz" in " ".join(notes)) == (off is not None)
+
+
+def test_one_source_of_the_focal_length_is_enough(tmp_path):
+    cv2.imwrite(str(tmp_path / "photo.png"), texture(32, 64, 0))
+    with pytest.raises(InputError, match="--intrinsics and --hfov both tell the focal length"):
+        read_photo(tmp_path / "photo.png", (64, 32), tmp_path / "k.json", 60.0)
 
 
 def test_a_known_lens_is_taken_out(tmp_path):

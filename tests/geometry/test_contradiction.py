@@ -53,6 +53,11 @@ def test_wrong_poses_are_refused(clip: Clip, wrong) -> None:
     assert "guess" not in str(refused.value)
 
 
+def test_frames_that_a_model_drew_are_nobodys_mistake(clip: Clip) -> None:
+    drawn = replace(clip, known=Known(np.linalg.inv(PATH), intrinsics=True, generated=True))
+    check(drawn, look(drawn))
+
+
 def test_a_wrong_focal_length_is_thought_of(clip: Clip) -> None:
     narrow = replace(clip.rig[0], fx_px=4 * clip.rig[0].fx_px, fy_px=4 * clip.rig[0].fy_px)
     given = replace(clip, rig=(narrow,), known=Known(world_from_camera=PATH, intrinsics=False))

@@ -122,6 +122,8 @@ def test_what_cannot_be_made_is_refused(photo, path, weights, tmp_path):
         prior(control(photo, path, weights, frames="0:6"))
     with pytest.raises(InputError, match="needs an input: a photo"):
         prior(control(None, path, weights))
+    with pytest.raises(InputError, match="withholds nothing of 5 frames"):
+        prior(control(photo, path, tmp_path, frames="0:5", hold_out=50))
     (tmp_path / "model_index.json").write_text(json.dumps({"_class_name": "WanPipeline"}))
     with pytest.raises(InputError, match="holds a WanPipeline; --prior cosmos takes a Cosmos3OmniPipeline"):
         prior(control(photo, path, tmp_path))

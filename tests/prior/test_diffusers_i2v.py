@@ -97,6 +97,52 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch):
         find_kind(named(tmp_path / "wan", "WanImageToVideoPipeline"))
 
 
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"frames": "0:9", "hold_out": 99}, "withholds nothing of 9 frames"),
+        ({"frames": "0:1"}, "selects a single frame"),
+        ({"frames": "0:0"}, "selects no frame"),
+        ({"frames": "200:"}, "has 161 frames"),
+        ({"frames": "0:x"}, "expected START:STOP"),
+    ],
+)
+def test_frames_are_checked_before_anything_is_loaded(photo, weights, monkeypatch, options, problem):
+    monkeypatch.setattr("dreamdrive.prior.diffusers_pipeline.load", lambda *_: pytest.fail("loaded"))
+    with pytest.raises(InputError, match=problem):
+        choose_prior("diffusers")(Control(photo, weights=weights, size=SIZE, **options))
+
+
+def test_an_end_counted_from_the_end_is_that_of_the_usual_number(photo, weights, monkeypatch):
+    def made(pipeline, steps, progress, num_frames, **more):
+        assert num_frames == 161
+        return type("Made", (), {"frames": np.zeros((1, num_frames, 32, 64, 3), np.float32)})
+
+    monkeypatch.setattr("dreamdrive.prior.diffusers_pipeline.run", made)
+    clip = choose_prior("diffusers")(Control(photo, weights=weights, size=SIZE, frames="-9:-1:2"))
+    assert clip.source_index.tolist() == [152, 154, 156, 158]
+
+
+def test_a_model_that_makes_fewer_frames_is_said_to(photo, weights, monkeypatch):
+    made = type("Made", (), {"frames": np.zeros((1, 9, 32, 64, 3), np.float32)})
+    monkeypatch.setattr("dreamdrive.prior.diffusers_pipeline.run", lambda *_, **__: made)
+    clip = choose_prior("diffusers")(Control(photo, weights=weights, size=SIZE, frames="0:12"))
+    assert len(clip) == 9
+    assert clip.provenance["notes"][-1].startswith("The model made 9 frames instead of 12")
+
+
+def test_svd_says_its_number_of_frames_before_it_is_loaded(photo, tmp_path, monkeypatch):
+    monkeypatch.setattr("dreamdrive.prior.diffusers_pipeline.load", lambda *_: pytest.fail("loaded"))
+    svd = named(tmp_path / "svd", "StableVideoDiffusionPipeline")
+    prior = choose_prior("diffusers")
+    with pytest.raises(InputError, match="has no number of frames of its own: give --frames 0:STOP"):
+        prior(Control(photo, weights=svd, size=SIZE))
+    (svd / "unet").mkdir()
+    (svd / "unet" / "config.json").write_text('{"num_frames": 14}')
+    with pytest.raises(InputError, match="has 14 frames"):
+        prior(Control(photo, weights=svd, size=SIZE, frames="14:"))
+
+
 def test_what_it_cannot_do_is_refused(photo, weights, tmp_path):
     prior = choose_prior("diffusers")
     cog = named(tmp_path / "cog", "CogVideoXImageToVideoPipeline")

@@ -7,7 +7,18 @@ from hypothesis import strategies as st
 from tests.prior.paths import circle
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.relative_poses import PER_METRE, accumulated, relative_poses
+from dreamdrive.prior.relative_poses import PER_METRE, relative_poses
+
+
+def accumulated(rows: np.ndarray) -> np.ndarray:
+    """The poses (N + 1, 4, 4) that steps (N, 9) lead to, from the identity on."""
+    poses = [np.eye(4)]
+    for row in rows:
+        step = np.eye(4)
+        step[:3, 3] = row[:3] / PER_METRE
+        step[:3, :3] = np.column_stack([row[3:6], row[6:9], np.cross(row[3:6], row[6:9])])
+        poses.append(poses[-1] @ step)
+    return np.stack(poses)
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)

@@ -1,6 +1,5 @@
 """``dreamdrive prior``: priors on their own."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,8 +27,7 @@ def convert(
         dtype: float16 halves the folder and suits a GPU; the autoencoder stays in float32.
         force: Replace a folder that is there already.
     """
-    if find_spec("diffusers") is None:
-        raise InputError('the package diffusers is missing: pip install "dreamdrive[video-prior]"')
+    _check_packages()
     from dreamdrive.prior.vista.convert import convert as run
 
     console = Console(highlight=False)
@@ -41,6 +39,8 @@ def convert(
     console.print(
         f"{folder}: {kind.title}, for --prior {kind.name} --weights {folder}", soft_wrap=True, markup=False
     )
+    for note in made.notes:
+        console.print(note, soft_wrap=True, markup=False)
     for what, count in made.ignored.items():
         console.print(f"left out, not needed: {what}, {count} tensors", soft_wrap=True)
 
@@ -158,9 +158,8 @@ def features(
         action: What the car does, for Vista, as for generate.
         seed: Seed of the noise.
     """
-    if find_spec("diffusers") is None:
-        raise InputError('the package diffusers is missing: pip install "dreamdrive[video-prior]"')
     use_all_cores()
+    _check_packages()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.sampling import clip_features
 
@@ -182,6 +181,14 @@ def features(
         count, rows, columns, kept = array.shape
         words = f"{name}, {count} frames of {columns}x{rows}, {kept} channels"
         console.print(f"{out}: {words}", soft_wrap=True, markup=False)
+
+
+def _check_packages() -> None:
+    """What networks of video models need is installed."""
+    from dreamdrive.prior import choose_prior
+
+    if (missing := choose_prior("vista").missing_package()) is not None:
+        raise InputError(missing)
 
 
 _Prior = (

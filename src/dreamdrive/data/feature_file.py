@@ -1,14 +1,15 @@
 """Features of frames on disk: what a model that ran elsewhere thought of each pixel (docs/replay.md).
 
 A ``.safetensors`` file holds one array (F, h, w, C) a name, half or single precision, each covering the whole
-of the input's pictures, and in its metadata under ``provenance`` a JSON object that says where they are from.
+of the input's pictures, and in its metadata under ``provenance`` a JSON object that says where they are from;
+``frame_index`` in it, where it is given, lists which frames of the input the rows are of.
 """
 
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -22,6 +23,8 @@ from dreamdrive.scene.atomic import new_file
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
+INDEX = "frame_index"
+"""Where the provenance may list the frames of the input that the rows are of."""
 _KEY = "provenance"
 _EXPECTED = "a .safetensors file with arrays (frames, rows, columns, channels), see docs/replay.md"
 
@@ -47,9 +50,12 @@ class FeatureFile:
             path: The file, for messages.
 
         Raises:
-            InputError: There is neither one row a frame of the source nor one a selected frame.
+            InputError: There is neither one row a frame of the source nor one a selected frame; or the file
+                says that it is of other frames.
         """
         rows = len(next(iter(self.arrays.values())))
+        if INDEX in self.provenance:
+            return self._rows(self._by_index(index, rows, path))
         if rows == len(index):
             return self
         if rows != count():
@@ -57,7 +63,24 @@ class FeatureFile:
                 f"--features {path} has {rows} frames, but the input has {count()}, {len(index)} of them "
                 "selected; expected features of each frame of the input or of each selected frame"
             )
-        return FeatureFile({name: array[index] for name, array in self.arrays.items()}, self.provenance)
+        return self._rows(index)
+
+    def _rows(self, rows: Int[np.ndarray, " f"]) -> "FeatureFile":
+        return FeatureFile({name: array[rows] for name, array in self.arrays.items()}, self.provenance)
+
+    def _by_index(self, index: Int[np.ndarray, " f"], rows: int, path: Path) -> Int[np.ndarray, " f"]:
+        """The row of each selected frame, as the file itself says which frames it is of."""
+        own: Any = self.provenance[INDEX]
+        if not _is_index(own) or len(own) != rows:
+            raise InputError(f"--features {path}: {INDEX} is no list of {rows} frames, one for each row")
+        row_of = {frame: row for row, frame in enumerate(own)}
+        if missing := [frame for frame in index.tolist() if frame not in row_of]:
+            raise InputError(
+                f"--features {path} is of {rows} frames of its clip, from {min(row_of)} to {max(row_of)}; "
+                f"frame {missing[0]} is selected and not among them: choose the --frames that the features "
+                "were computed with, or compute them again"
+            )
+        return np.array([row_of[frame] for frame in index.tolist()])
 
     def cropped(
         self, sizing: Sizing, lens: Lens | None, path: Path | None
@@ -120,6 +143,10 @@ def write_features(path: Path, features: FeatureFile) -> None:
     blob = save(arrays, metadata={_KEY: json.dumps(features.provenance)})
     with new_file(path) as partial:
         partial.write_bytes(blob)
+
+
+def _is_index(values: Any) -> TypeGuard[list[int]]:
+    return isinstance(values, list) and all(type(each) is int for each in cast("list[Any]", values))
 
 
 def _problem(array: np.ndarray) -> str | None:

@@ -1,4 +1,4 @@
-"""One picture for a video model to start from."""
+"""What a video model starts from: a photo, or the first frames of a recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,14 +6,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import SUFFIXES, read_image
-from dreamdrive.data.intrinsics import guess_camera, read_intrinsics
+from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
 from dreamdrive.data.lens import Lens, Undistorter
+from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.size import cover
 from dreamdrive.data.source import open_source
+from dreamdrive.data.video import Video
+from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
 _WORTH_A_NOTE = 0.02
+_ROUNDING = 1e-6
+_HALF_STEP = 0.5 + _ROUNDING
 
 
 @dataclass(frozen=True)
@@ -49,12 +55,10 @@ def read_photo(
     Raises:
         InputError: The picture or the calibration cannot be used.
     """
-    if path.is_file() and path.suffix.lower() in SUFFIXES:
-        raw, notes = read_image(path), []
-    else:
-        raw = next(iter(open_source(path).read(range(1))))
-        notes = [f"The video goes on from the first frame of {path.name}."]
-    known = guess_camera(raw.size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, raw.size)
+    (raw,), notes = leading_frames(path, 1)
+    if not is_photo(path):
+        notes.append(f"The video goes on from the first frame of {path.name}.")
+    known = calibration(raw.size, intrinsics, hfov_deg)
     sizing = cover(raw.size, size)
     camera = sizing.camera(known.camera)
     if known.distortion is None:
@@ -67,3 +71,72 @@ def read_photo(
     if sizing.shrink < 1:
         notes.append(f"The photo was enlarged {1 / sizing.shrink:.2f} times; it holds no more detail.")
     return Photo(rgb, camera, known.known, (*raw.notes, *known.notes, *notes))
+
+
+def is_photo(path: Path) -> bool:
+    """Whether it is a file of one picture, not a recording."""
+    return path.is_file() and path.suffix.lower() in SUFFIXES
+
+
+def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
+    """The camera of an input, as far as it is told.
+
+    Raises:
+        InputError: It is told twice, or cannot be read.
+    """
+    if intrinsics is not None and hfov_deg is not None:
+        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
+    return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
+
+
+def leading_frames(path: Path, count: int, rate_hz: float = 1.0) -> tuple[list[RawFrame], list[str]]:
+    """A photo; or the first frames of a recording, of a video those nearest to a model's times.
+
+    Args:
+        path: A photo, a video, or a folder of images, whose rate counts as that of the model.
+        count: Frames to take at most.
+        rate_hz: The model's rate.
+
+    Returns:
+        The frames, at least one, and what the report should say, a sentence each.
+
+    Raises:
+        InputError: There is no such input, or it cannot be read.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist; expected a photo, or a video or folder of leading frames")
+    if is_photo(path):
+        return [read_image(path)], []
+    source = open_source(path)
+    if isinstance(source, Video):
+        return _nearest(source, count, rate_hz)
+    return list(source.read(range(min(count, source.count())))), []
+
+
+def _nearest(video: Video, count: int, rate_hz: float) -> tuple[list[RawFrame], list[str]]:
+    """The frames nearest to whole numbers of steps, up to the first step that has none of its own near it."""
+    found: list[tuple[float, RawFrame]] = []
+    for frame in video.read(range(UNBOUNDED)):
+        time_s = frame.index / (video.rate_hz or rate_hz) if frame.time_s is None else frame.time_s
+        misses = [abs(time_s * rate_hz - step) for step in range(count)]
+        found = [
+            (miss, frame) if not found or miss < found[step][0] - _ROUNDING else found[step]
+            for step, miss in enumerate(misses)
+        ]
+        if time_s >= (count - 1) / rate_hz:
+            break
+    taken = found[:1]
+    for miss, frame in found[1:]:
+        if miss > _HALF_STEP or frame.index == taken[-1][1].index:
+            break
+        taken.append((miss, frame))
+    frames, worst = [frame for _, frame in taken], max(miss for miss, _ in taken)
+    notes: list[str] = []
+    if worst > _WORTH_A_NOTE:
+        off = f"up to {worst:.0%} of a step off the model's {rate_hz:g} Hz"
+        notes.append(f"The leading frames are {off}: the video has none at its times.")
+    if len(taken) < count:
+        notes.append(
+            f"Only {len(taken)} of {count} leading frames at {rate_hz:g} Hz are in {video.path.name}."
+        )
+    return frames, notes

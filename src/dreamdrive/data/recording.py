@@ -101,8 +101,10 @@ def _write_frame(clip: Clip, index: int, path: Path) -> None:
 
 
 def _write_path(clip: Clip, folder: Path) -> None:
-    if clip.known.world_from_camera is not None and clip.known.metric:
-        write_trajectory(Trajectory(clip.known.world_from_camera, clip.times_s), folder / "poses.json")
+    poses = clip.known.world_from_camera
+    # Poses that a model was asked for tell nothing of its frames, and are in the request.
+    if poses is not None and clip.known.metric and not clip.known.generated:
+        write_trajectory(Trajectory(poses, clip.times_s), folder / "poses.json")
     if clip.requested is not None:
         write_trajectory(clip.requested, folder / "requested.json")
 

@@ -13,10 +13,11 @@ from jaxtyping import Float, UInt8
 from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
-from dreamdrive.prior.diffusers_pipeline import PROMPT, frame_count, make_clip, photo_of
+from dreamdrive.prior.diffusers_pipeline import PROMPT, Wanted, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.path_to_action import from_first
 from dreamdrive.prior.protocol import Prior, Progress, silent
 from dreamdrive.prior.relative_poses import relative_poses
+from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory
@@ -47,7 +48,8 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
         InputError: The photo, the path, the size or the weights cannot be used.
     """
     path = _path(control)
-    size, count = _size(control), _count(control)
+    size, wanted = _size(control), _wanted(control)
+    count = wanted.count
     rows = relative_poses(path, count - 1, RATE_HZ)
     photo = photo_of(control, size, "cosmos")
     pipeline = _load(control)
@@ -77,7 +79,9 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
             "NVIDIA's guardrail, which checks prompt and frames, was off.",
         ],
     }
-    return make_clip(control, photo, made.video, RATE_HZ, provenance, Trajectory(path.at(times_s), times_s))
+    return make_clip(
+        control, wanted, photo, made.video, RATE_HZ, provenance, Trajectory(path.at(times_s), times_s)
+    )
 
 
 def _path(control: Control) -> Trajectory:
@@ -96,14 +100,15 @@ def _size(control: Control) -> tuple[int, int]:
     return size
 
 
-def _count(control: Control) -> int:
-    count = frame_count(control, FRAMES)
+def _wanted(control: Control) -> Wanted:
+    wanted = wanted_frames(control, FRAMES)
+    count = wanted.count
     if not 1 < count <= FRAMES or (count - 1) % _A_LATENT:
         raise InputError(
             f"--frames {control.frames}: Cosmos 3 makes {_A_LATENT}n + 1 frames, at most {FRAMES}; "
             "choose such a STOP"
         )
-    return count
+    return wanted
 
 
 def _load(control: Control) -> Any:
@@ -154,6 +159,6 @@ COSMOS = Prior(
     licence="diffusers Apache-2.0; weights OpenMDW-1.1, as NVIDIA states it",
     memory="weights in half precision 32 GB (Nano, 16 B) or 8 GB (Edge, 4 B); a GPU",
     weights="the folder of a Cosmos 3 that follows actions, with model_index.json",
-    package=diffusers_pipeline.PACKAGE,
-    install=diffusers_pipeline.INSTALL,
+    package=PACKAGE,
+    install=INSTALL,
 )

@@ -13,10 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from dreamdrive.data.json_file import read_json
+from dreamdrive.data.select import Selection
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
-from dreamdrive.prior.diffusers_pipeline import PROMPT, frame_count, make_clip, photo_of
+from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
@@ -60,16 +63,16 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
     given = _arguments(kind, control, rate_hz)
     photo = photo_of(control, _size(kind, control), "diffusers")
     steps = control.steps or kind.defaults["num_inference_steps"]
+    wanted = wanted_frames(control, kind.defaults["num_frames"] or _own_frames(kind, control))
     pipeline = diffusers_pipeline.load(kind.make, control.weights)
     if "height" in kind.defaults:
         given |= {"height": photo.rgb.shape[0], "width": photo.rgb.shape[1]}
-    count = frame_count(control, kind.defaults["num_frames"] or _own_frames(pipeline))
     made = diffusers_pipeline.run(
         pipeline,
         steps,
         progress,
         image=Image.fromarray(photo.rgb),
-        num_frames=count,
+        num_frames=wanted.count,
         generator=diffusers_pipeline.generator(control.seed),
         **given,
     )
@@ -84,7 +87,7 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
             "it was not told where to drive."
         ],
     }
-    return make_clip(control, photo, np.asarray(made.frames[0]), rate_hz, provenance)
+    return make_clip(control, wanted, photo, np.asarray(made.frames[0]), rate_hz, provenance)
 
 
 def find_kind(folder: Path) -> Kind:
@@ -168,18 +171,20 @@ def _size(kind: Kind, control: Control) -> tuple[int, int]:
     return usual if "height" in kind.defaults else _USUAL_SIZE  # pyright: ignore[reportReturnType]
 
 
-def _own_frames(pipeline: Any) -> int:
+def _own_frames(kind: Kind, control: Control) -> int:
     """How many frames a model makes whose pipeline leaves that to its network, as SVD's does.
 
     Raises:
-        InputError: Its network does not tell.
+        InputError: Its network does not tell, and nor does ``--frames``.
     """
-    network = getattr(pipeline, "unet", None)
-    if network is None or "num_frames" not in network.config:
-        raise InputError(
-            f"{type(pipeline).__name__} has no number of frames of its own: give --frames 0:STOP"
-        )
-    return int(network.config["num_frames"])
+    assert control.weights is not None  # by ``Prior.check``
+    config = control.weights / "unet" / "config.json"
+    told = read_json(config, "--weights").get("num_frames") if config.is_file() else None
+    selection = Selection.parse(control.frames)
+    told = selection.stop if told is None else told
+    if not isinstance(told, int) or told < 1:
+        raise InputError(f"{kind.name} has no number of frames of its own: give --frames 0:STOP")
+    return told
 
 
 DIFFUSERS = Prior(
@@ -193,6 +198,6 @@ DIFFUSERS = Prior(
     licence="diffusers Apache-2.0; weights as their model card states",
     memory="as its model card states; 1.3 to 19 B parameters",
     weights="the folder of a pipeline, with model_index.json",
-    package=diffusers_pipeline.PACKAGE,
-    install=diffusers_pipeline.INSTALL,
+    package=PACKAGE,
+    install=INSTALL,
 )

@@ -1,11 +1,12 @@
 """What all pipelines of diffusers have in common: how they are loaded, and how their video becomes a clip."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from dreamdrive.data.json_file import read_json
 from dreamdrive.data.photo import Photo, read_photo
@@ -14,13 +15,13 @@ from dreamdrive.errors import InputError
 from dreamdrive.memory import best_device
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.protocol import Progress
+from dreamdrive.prior.running import check_finite, enough_memory, first_line
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory
 
 PROMPT = "The view ahead from a car that drives along a street."
 """What pipelines that take words are told unless the user says it."""
-PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
 
 
 def class_name(folder: Path) -> str:
@@ -62,7 +63,7 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
         )
     except (OSError, ValueError, TypeError, KeyError, AttributeError, ImportError, RuntimeError) as error:
         raise InputError(
-            f"--weights {folder} cannot be loaded as {kind.__name__}: {_first_line(error)}; expected all its "
+            f"--weights {folder} cannot be loaded as {kind.__name__}: {first_line(error)}; expected all its "
             "parts with weights as .safetensors"
         ) from error
     pipeline.set_progress_bar_config(disable=True)
@@ -89,15 +90,13 @@ def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
         return values
 
     try:
-        return pipeline(num_inference_steps=steps, callback_on_step_end=tell, output_type="np", **arguments)
+        with enough_memory("choose a smaller --size or fewer --frames"):
+            return pipeline(
+                num_inference_steps=steps, callback_on_step_end=tell, output_type="np", **arguments
+            )
     except ValueError as error:
         name = type(pipeline).__name__
-        raise InputError(f"{name} refuses what it was asked for: {_first_line(error)}") from error
-    except torch.OutOfMemoryError as error:
-        raise InputError(
-            f"the GPU's memory does not suffice ({_first_line(error)}); choose a smaller --size or fewer "
-            "--frames"
-        ) from error
+        raise InputError(f"{name} refuses what it was asked for: {first_line(error)}") from error
 
 
 def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
@@ -111,13 +110,41 @@ def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
     return read_photo(control.path, size, control.intrinsics, control.hfov_deg)
 
 
-def frame_count(control: Control, usual: int) -> int:
-    """How many frames have to be made for ``--frames``."""
-    return Selection.parse(control.frames).stop or usual
+@dataclass(frozen=True)
+class Wanted:
+    """Which frames of a video are made, and which of them kept.
+
+    Attributes:
+        count: Frames to make.
+        index: Those to keep (F,).
+    """
+
+    count: int
+    index: Int[np.ndarray, " f"]
+
+
+def wanted_frames(control: Control, usual: int) -> Wanted:
+    """What ``--frames`` and ``--hold-out`` ask for, before anything is loaded or made.
+
+    Args:
+        control: The options.
+        usual: How many frames the model makes unless told.
+
+    Raises:
+        InputError: Fewer than two frames are selected, or none can be withheld of those.
+    """
+    selection = Selection.parse(control.frames)
+    count = usual if selection.stop is None or selection.stop <= 0 else selection.stop
+    index = np.array(selection.resolve(count, "the video to be made"))
+    if len(index) < 2:
+        raise InputError(f"--frames {control.frames} selects a single frame; expected two or more")
+    held_out_mask(len(index), control.hold_out)
+    return Wanted(count, index)
 
 
 def make_clip(
     control: Control,
+    wanted: Wanted,
     photo: Photo,
     video: Float[np.ndarray, "t h w 3"],
     rate_hz: float,
@@ -127,7 +154,8 @@ def make_clip(
     """The clip of a video that a model made from a photo.
 
     Args:
-        control: Which frames are wanted, and which withheld.
+        control: Which frames are withheld.
+        wanted: Which frames were asked for; some models make fewer, as a whole number of latents.
         photo: What it started from.
         video: RGB in [0, 1], frame 0 the photo.
         rate_hz: Frames a second.
@@ -135,14 +163,18 @@ def make_clip(
         asked: The path that was asked for, one pose a frame of the video.
 
     Raises:
-        InputError: The frames cannot be selected, or are not finite.
+        InputError: The frames are not finite, or too few were made.
     """
-    if not np.isfinite(video).all():
+    check_finite(video, "frames")
+    index = wanted.index[wanted.index < len(video)]
+    notes = list(provenance["notes"])
+    if len(index) < len(wanted.index):
+        notes.append(f"The model made {len(video)} frames instead of {wanted.count}; the others are missing.")
+    if len(index) < 2:
         raise InputError(
-            "the model gave frames that hold NaN; its weights are damaged or overflow in bfloat16"
+            f"--frames {control.frames}: the model made {len(video)} frames instead of {wanted.count}, and "
+            f"{len(index)} of those that were asked for"
         )
-    wanted = Selection.parse(control.frames).resolve(len(video), "the video that was made")
-    index = np.array(wanted)
     frames = np.rint(np.clip(video[index], 0, 1) * 255).astype(np.uint8)
     height, width = frames.shape[1:3]
     times_s = (index - index[0]) / rate_hz
@@ -159,7 +191,7 @@ def make_clip(
         features={"appearance": appearance(frames, valid)},
         known=Known(intrinsics=photo.calibrated and same),
         requested=None if asked is None else _selected(asked, index, times_s),
-        provenance={**provenance, "notes": [*photo.notes, *provenance["notes"]]},
+        provenance={**provenance, "notes": [*photo.notes, *notes]},
     )
 
 
@@ -171,7 +203,3 @@ def _selected(asked: Trajectory, index: np.ndarray, times_s: np.ndarray) -> Traj
 def generator(seed: int) -> torch.Generator:
     """On the CPU, so that a seed gives the same noise on every machine."""
     return torch.Generator("cpu").manual_seed(seed)
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n")[0].rstrip(".")

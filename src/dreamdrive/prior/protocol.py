@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 
 from dreamdrive.backend import Backend
 from dreamdrive.errors import InputError
+from dreamdrive.scene.action import check_action
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
@@ -48,8 +49,8 @@ class Prior(Backend):
         """Whether it could start and honour all that is asked.
 
         Raises:
-            InputError: A field is given that it does not take or that contradicts another, or weights or a
-                package are missing.
+            InputError: A field is given that it does not take, that contradicts another or is outside its
+                range, or weights or a package are missing.
         """
         given = [field.name for field in fields(control) if getattr(control, field.name) is not None]
         if refused := [name for name in given if name not in self.takes | {"seed", "weights"}]:
@@ -59,6 +60,8 @@ class Prior(Backend):
             )
         if control.trajectory is not None and control.action is not None:
             raise InputError("--trajectory and --action both tell where to drive; give one of them")
+        if control.action is not None:
+            check_action(control.action)
         if control.steps is not None and control.steps < 1:
             raise InputError(f"--steps {control.steps}: expected 1 or more")
         self.check_start("prior", control.weights)

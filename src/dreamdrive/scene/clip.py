@@ -23,6 +23,8 @@ class Known:
         metric: Whether poses, depth and points are in metres; otherwise all share a unit that is not known.
         points: Sparse points of the street (P, 3), in the world of the poses.
         ground: The road plane, in the world of the poses.
+        generated: Whether a model drew the frames for these poses, or for the rig's mountings: that the
+            frames show something else is then no mistake of the user's.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
@@ -32,6 +34,7 @@ class Known:
     metric: bool = True
     points: Float[np.ndarray, "p 3"] | None = None
     ground: Ground | None = None
+    generated: bool = False
 
 
 @dataclass(frozen=True)

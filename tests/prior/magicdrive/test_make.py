@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from tests.prior.magicdrive.tiny import SIZE, Written, write_folder
 
 from dreamdrive.data.layout_file import read_layout, write_layout
@@ -68,6 +69,8 @@ def test_the_poses_are_those_of_the_path(drive: Clip, inputs: Control) -> None:
     np.testing.assert_array_equal(drive.requested.world_from_camera, poses[::6])
     np.testing.assert_array_equal(drive.requested.times_s, [0.0, 1.0, 2.0])
     assert drive.known.intrinsics
+    assert drive.known.generated
+    assert "No motion can be seen" in drive.provenance["notes"][1]
 
 
 def test_what_was_done_is_told(drive: Clip) -> None:
@@ -101,6 +104,28 @@ def test_everything_asked_for_has_a_say(once: Clip, inputs: Control, tmp_path: P
         assert np.abs(latents - once.latents).max() > 1e-4
 
 
+@pytest.mark.parametrize("where", ["run.sample", "sample.denoised"])
+def test_numbers_that_are_not_finite_are_refused(
+    inputs: Control, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    from dreamdrive.prior.magicdrive import run, sample
+
+    module, name = {"run": run, "sample": sample}[where.split(".")[0]], where.split(".")[1]
+    right = getattr(module, name)
+    monkeypatch.setattr(module, name, lambda *given, **more: right(*given, **more) * np.nan)
+    with pytest.raises(InputError, match="gave latents that hold NaN"):
+        MAGICDRIVE(inputs)
+
+
+def test_a_gpu_that_is_too_small_is_a_message(inputs: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*given: object, **more: object) -> None:
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2 GiB")
+
+    monkeypatch.setattr("dreamdrive.prior.magicdrive.run.sample", full)
+    with pytest.raises(InputError, match=r"memory does not suffice .*take the weights for 400x224"):
+        MAGICDRIVE(inputs)
+
+
 def test_progress_counts_to_its_end(inputs: Control) -> None:
     told: list[tuple[int, int]] = []
     MAGICDRIVE(replace(inputs, frames="0:2"), lambda done, total: told.append((done, total)))
@@ -116,6 +141,10 @@ def test_the_temporal_variant_samples_all_time_steps_together(inputs: Control, t
     assert clip.source_index[::6].tolist() == [1, 8, 15]
     np.testing.assert_allclose(clip.times_s[::6], [0, 7 / 12, 14 / 12])
     assert "sampled together" in clip.provenance["notes"][1]
+    assert clip.known.world_from_camera is None
+    assert clip.known.generated
+    assert clip.requested is not None
+    np.testing.assert_allclose(clip.requested.times_s, [0, 7 / 12, 14 / 12])
     whole = MAGICDRIVE_T(replace(control, frames=None))
     assert len(whole) == 96
     np.testing.assert_array_equal(

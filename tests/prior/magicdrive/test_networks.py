@@ -192,7 +192,7 @@ def test_the_map_becomes_the_size_of_the_latents(cells: int, pooled: Any, size: 
     assert [key for key in encoder.state_dict() if key.startswith("blocks.6")] == []
 
 
-def test_half_precision_runs_close_to_single(networks, conditions, golden, golden_configs) -> None:
+def test_golden_half_precision_runs_close_to_single(networks, conditions, golden, golden_configs) -> None:
     """Half a step: weights are exact in half precision, cameras and corners are read in single."""
     made: list[Tensor] = []
     for dtype in (torch.float32, torch.float16):
@@ -221,7 +221,7 @@ def test_the_memory_of_the_published_models(temporal: bool, element_bytes: int, 
     assert needed / 1e9 == pytest.approx(gigabytes, abs=0.06)
 
 
-def test_the_ring_may_start_at_any_camera(networks, conditions, golden) -> None:
+def test_golden_the_ring_may_start_at_any_camera(networks, conditions, golden) -> None:
     """Which is why our list can start at the front camera, where MagicDrive's starts on its left."""
     unet, controlnet = networks
     moved = {

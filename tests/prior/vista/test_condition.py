@@ -7,7 +7,6 @@ import torch
 from diffusers.models.embeddings import Timesteps
 from tests.prior.vista.conftest import Golden
 
-from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.condition import NUMBERS, clip_pixels, embed_action, numbers_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, MOTION_BUCKET, VISTA
 from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
@@ -16,7 +15,7 @@ KINDS = {name: [name] for name in NUMBERS} | {"steer": ["speed", "angle"], "free
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_columns_of_each_action(golden: Golden, name: str) -> None:
+def test_golden_columns_of_each_action(golden: Golden, name: str) -> None:
     given = golden.tensors("conditioning")
     columns = embed_action({kind: given[f"in.{kind}"].flatten().tolist() for kind in KINDS[name]})
     image = given["in.cond_frames_without_noise"].flatten()
@@ -35,7 +34,7 @@ def test_the_golden_settings_are_ours(golden: Golden) -> None:
     assert torch.equal(given["all.c.concat"], given["in.cond_frames"])
 
 
-def test_clip_sees_a_square(golden: Golden) -> None:
+def test_golden_clip_sees_a_square(golden: Golden) -> None:
     given = golden.tensors("clip_preprocess")
     made = clip_pixels(given["image_fp16"].float())
     assert made.shape == (1, 3, 224, 224)
@@ -53,8 +52,6 @@ def test_units_of_the_car() -> None:
     assert steer["speed"] == [36.0] * 4
     assert steer["angle"] == pytest.approx([0, 90 / 780, 180 / 780, -180 / 780])
     assert numbers_of(Goal(0.5, 0.6)) == {"goal": [0.5, 0.6]}
-    with pytest.raises(InputError, match=r"between 0 and 1"):
-        numbers_of(Goal(1.5, 0.6))
 
 
 def test_a_missing_kind_is_not_the_number_zero() -> None:

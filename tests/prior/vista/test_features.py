@@ -9,7 +9,10 @@ import torch
 from tests.prior.vista.tiny import FRAMES
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.vista.features import FeatureOptions, video_features, windows
+from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.features import FeatureOptions, spans_of, video_features
+from dreamdrive.prior.vista.rollout import Seen
+from dreamdrive.scene.action import Command, Goal
 
 
 def recording(count: int, width: int = 96, height: int = 54) -> np.ndarray:
@@ -17,9 +20,9 @@ def recording(count: int, width: int = 96, height: int = 54) -> np.ndarray:
 
 
 def test_windows_cover_all_frames() -> None:
-    assert windows(30, 25) == [range(0, 25), range(5, 30)]
-    assert windows(50, 25) == [range(0, 25), range(25, 50)]
-    assert windows(3, 25) == [range(0, 3)]
+    assert spans_of(30, 25) == [range(0, 25), range(5, 30)]
+    assert spans_of(50, 25) == [range(0, 25), range(25, 50)]
+    assert spans_of(3, 25) == [range(0, 3)]
 
 
 def test_features_of_a_recording_fit_its_frames(svd_dir: Path) -> None:
@@ -39,10 +42,43 @@ def test_features_of_a_recording_fit_its_frames(svd_dir: Path) -> None:
 
 
 def test_a_wrong_block_or_model_is_refused(svd_dir: Path) -> None:
-    with pytest.raises(InputError, match=r"no block 'down.9'; such as down_blocks.1.attentions.0"):
-        video_features(recording(2), svd_dir, FeatureOptions(block="down.9"))
-    with pytest.raises(InputError, match="not Vista"):
-        video_features(recording(2), svd_dir, kind="vista")
+    for block in ("down.9", "down_blocks", "down_blocks.1.attentions", "mid_block.attentions.0.norm"):
+        with pytest.raises(InputError, match=rf"--block {block}: .* it has conv_in, down_blocks.0, "):
+            video_features(recording(2), svd_dir, FeatureOptions(block=block))
+    with pytest.raises(InputError, match="--action: Stable Video Diffusion knows of none"):
+        video_features(recording(2), svd_dir, action=Command("left"))
+
+
+def test_every_named_block_gives_activations(svd_dir: Path) -> None:
+    for block in ("down_blocks.0", "mid_block.resnets.1"):
+        made = video_features(recording(2), svd_dir, FeatureOptions(block=block, channels=2))
+        assert made.name == f"svd:{block}"
+        assert made.values.shape[3] == 2
+
+
+def test_no_memory_is_asked_for_the_decoder(svd_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dreamdrive.prior.vista.memory._DECODER", 10**9)
+    assert len(video_features(recording(2), svd_dir).values) == 2
+
+
+def test_each_window_is_told_the_action_and_a_goal_is_of_the_first(
+    vista_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[tuple[torch.Tensor, list[float]]] = []
+    look = Engine.look
+
+    def watched(engine: Engine, seen: Seen, x: object, time: float, mask: torch.Tensor, *more: object):
+        assert seen.action is not None
+        looks.append((seen.action, mask.tolist()))
+        return look(engine, seen, x, time, mask, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Engine, "look", watched)
+    for action, again in ((Command("left"), True), (Goal(0.5, 0.5), False)):
+        looks.clear()
+        video_features(recording(FRAMES + 2), vista_dir, action=action)
+        assert [fixed for _, fixed in looks] == [[1.0] + [0.0] * (FRAMES - 1)] * 2
+        assert looks[0][0].any()
+        assert bool(looks[1][0].any()) == again
 
 
 def test_weights_that_are_not_finite_are_refused(tmp_path: Path, svd_dir: Path) -> None:

@@ -9,7 +9,7 @@ from tests.prior.vista.tiny import official, states
 
 from dreamdrive.prior.vista.configs import config_of
 from dreamdrive.prior.vista.keys import PARTS, UNET, Part, Recipes, recipes_of
-from dreamdrive.prior.vista.kinds import SVD, VISTA, Kind
+from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 
 MAPS: dict[Part, str] = {
@@ -45,7 +45,9 @@ def test_the_rules_are_the_golden_tables(golden: Golden, part: Part) -> None:
 
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("kind", [VISTA, SVD])
-def test_the_official_file_is_the_network_by_name_and_shape(golden: Golden, part: Part, kind: Kind) -> None:
+def test_golden_official_file_is_the_network_by_name_and_shape(
+    golden: Golden, part: Part, kind: Kind
+) -> None:
     keys = json.loads((golden.folder / "vista_checkpoint_keys.json").read_text())
     if kind is SVD:
         keys = {k: v for k, v in keys.items() if "action_control" not in k and "cond_time_stack" not in k}
@@ -55,7 +57,7 @@ def test_the_official_file_is_the_network_by_name_and_shape(golden: Golden, part
     assert shapes == wanted
     if part == "unet":
         assert config["num_attention_heads"] == [5, 10, 20, 20]
-        assert config["cross_attention_dim"] == kind.context_columns
+        assert config["cross_attention_dim"] == 1024 + (ACTION_COLUMNS if kind is VISTA else 0)
         assert len(wanted) == 1428 + (4 if kind is VISTA else 0)
     if part == "image_encoder":
         assert (config["num_attention_heads"], config["num_hidden_layers"]) == (16, 32)

@@ -7,16 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from tests.prior.paths import circle
 from tests.prior.vista.photos import save_photo
 from tests.prior.vista.tiny import FRAMES
+from torch import Tensor
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS
+from dreamdrive.prior.action_to_path import path_of
 from dreamdrive.prior.path_to_action import waypoints
 from dreamdrive.prior.vista.condition import numbers_of
-from dreamdrive.scene.action import Command, Goal
+from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.memory import Job
+from dreamdrive.prior.vista.rollout import Seen
+from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
@@ -97,6 +103,46 @@ def test_a_path_is_told_as_its_waypoints(
     assert "A path was asked for, as four waypoints" in made.provenance["notes"][-1]
 
 
+@pytest.mark.parametrize(
+    "action", [Waypoints((0, 0, -0.5, -1), (4, 8, 12, 16)), Steering((8.0,) * 4, (0, 0, 0.1, 0.1))]
+)
+def test_an_action_that_says_a_path_asks_for_it_in_every_round(
+    control: Control, action: Waypoints | Steering
+) -> None:
+    made = PRIORS["vista"](replace(control, frames=f"1:{FRAMES + 3}", action=action))
+    assert made.requested is not None
+    one = path_of(action, np.arange(FRAMES) / 10).world_from_camera
+    poses = np.concatenate([one[1:4], one[3] @ one[1:]])
+    np.testing.assert_allclose(made.requested.world_from_camera, np.linalg.inv(one[1]) @ poses, atol=1e-9)
+    assert made.known.world_from_camera is None
+    assumed = "steering ratio of 16.6 is assumed" in " ".join(made.provenance["notes"])
+    assert assumed == isinstance(action, Steering)
+
+
+def test_features_are_looked_at_as_the_frames_were_made(
+    control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The conditional looks: action, first frame's latent and fixed frames of both rounds, and again."""
+    looks: list[tuple[Tensor, Tensor, list[float]]] = []
+    look = Engine.look
+
+    def watched(engine: Engine, seen: Seen, x: Tensor, time: float, mask: Tensor, given: float = 1.0):
+        if given:
+            assert seen.action is not None
+            looks.append((seen.action, seen.latent, mask.tolist()))
+        return look(engine, seen, x, time, mask, given)
+
+    monkeypatch.setattr(Engine, "look", watched)
+    write_trajectory(circle(8.0, 0.03), tmp_path / "path.json")
+    PRIORS["vista"](replace(control, frames=f"0:{FRAMES + 3}", trajectory=tmp_path / "path.json"))
+    assert len(looks) == 4
+    for sampled, again in zip(looks[:2], looks[2:], strict=True):
+        assert torch.equal(sampled[0], again[0])
+        torch.testing.assert_close(sampled[1], again[1])
+        assert sampled[2] == again[2]
+    assert [sum(fixed) for _, _, fixed in looks] == [1, 3, 1, 3]
+
+
 def test_svd_makes_its_frames_at_7_hz(control: Control, svd_dir: Path) -> None:
     made = PRIORS["svd"](replace(control, weights=svd_dir))
     assert len(made) == FRAMES
@@ -118,7 +164,8 @@ def test_svd_makes_its_frames_at_7_hz(control: Control, svd_dir: Path) -> None:
         ({"frames": "0:999999999"}, "below 1000"),
         ({"path": None}, "needs an input, a photo"),
         ({"weights": None}, "needs --weights"),
-        ({"action": Goal(2.0, 0.5)}, "between 0 and 1"),
+        ({"action": Goal(2.0, 0.5)}, "outside its range: column is 2; expected 0 to 1"),
+        ({"action": Waypoints((900.0,) * 4, (1.0,) * 4)}, "outside its range: right_m is 900"),
         ({"prompt": "rain"}, "takes no prompt"),
     ],
 )
@@ -130,10 +177,41 @@ def test_what_it_cannot_use_is_refused(control: Control, changes: dict[str, obje
 def test_too_little_memory_is_told_before_anything_is_loaded(
     control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dreamdrive.prior.vista.load.free_bytes", lambda device: 10_000_000)
+    monkeypatch.setattr("dreamdrive.prior.vista.load.free_bytes", lambda *device: 10_000_000)
     monkeypatch.setattr("dreamdrive.prior.vista.networks.Networks._load", lambda *_: pytest.fail("loaded"))
     with pytest.raises(InputError, match=r"0\.0 GB are free: no smaller size fits"):
         PRIORS["vista"](control)
+
+
+@pytest.mark.parametrize(("frames", "made"), [("0:4", 6), ("0:7", 9), ("900:", 906), ("3:20:4", 21)])
+def test_memory_is_planned_for_all_frames_that_are_made(
+    control: Control, monkeypatch: pytest.MonkeyPatch, frames: str, made: int
+) -> None:
+    def stop(networks: object, job: Job) -> None:
+        raise InputError(f"{job.frames} of {job.per_round}")
+
+    monkeypatch.setattr("dreamdrive.prior.vista.make.check_fit", stop)
+    with pytest.raises(InputError, match=f"^{made} of {FRAMES}$"):
+        PRIORS["vista"](replace(control, frames=frames))
+
+
+@pytest.mark.parametrize("where", ["look", "decode"])
+def test_numbers_that_are_not_finite_are_refused(
+    control: Control, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    right = getattr(Engine, where)
+    monkeypatch.setattr(Engine, where, lambda *given: right(*given) * torch.nan)
+    with pytest.raises(InputError, match=r"gave (latents|frames) that hold NaN.*; its weights are damaged"):
+        PRIORS["vista"](control)
+
+
+def test_a_gpu_that_is_too_small_is_a_message(control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*given: object) -> None:
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2 GiB")
+
+    monkeypatch.setattr(Engine, "decode", full)
+    with pytest.raises(InputError, match=r"memory does not suffice .*smaller --size, such as 128x64"):
+        PRIORS["vista"](replace(control, size=(192, 64)))
 
 
 def test_listing_the_priors_loads_no_network() -> None:

@@ -48,7 +48,7 @@ def stand_in(given: dict[str, Tensor], described: list[Tensor]) -> Model:
 
 
 @pytest.mark.parametrize("rounds", [1, 3])
-def test_rounds(golden: Golden, rounds: int) -> None:
+def test_golden_rounds(golden: Golden, rounds: int) -> None:
     given, described = golden.tensors("rollout_standin"), list[Tensor]()
     model = stand_in(given, described)
     noise = given[f"r{rounds}.noise"]
@@ -65,7 +65,7 @@ def test_rounds(golden: Golden, rounds: int) -> None:
 
 
 @pytest.mark.parametrize("count", [14, 25, 47])
-def test_chunks_overlap_by_their_mean(golden: Golden, count: int) -> None:
+def test_golden_chunks_overlap_by_their_mean(golden: Golden, count: int) -> None:
     given = golden.tensors("rollout_standin")
     model = stand_in(given, [])
     made = decode_in_chunks(model.decode, given[f"decode_in_{count}"] / SCALE)

@@ -6,6 +6,10 @@ from tests.prior.vista.conftest import Golden
 from tests.prior.vista.golden import Given, golden_unet
 from torch import Tensor
 
+from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, VISTA
+from dreamdrive.prior.vista.networks import Networks
+from dreamdrive.prior.vista.rollout import Seen
 from dreamdrive.prior.vista.sampler import (
     Branches,
     Fixed,
@@ -16,17 +20,18 @@ from dreamdrive.prior.vista.sampler import (
     sample,
     sigmas,
 )
+from dreamdrive.prior.vista.stored import Stored
 
 NAMES: dict[str, Schedule] = {"VanillaCFG": "constant", "TrianglePredictionGuider": "triangle"}
 
 
 @pytest.mark.parametrize("steps", [5, 10, 25, 50])
-def test_noise_levels(golden: Golden, steps: int) -> None:
+def test_golden_noise_levels(golden: Golden, steps: int) -> None:
     expected = golden.tensors("sampler")[f"sigmas_{steps}"]
     torch.testing.assert_close(torch.tensor(sigmas(steps)), expected, atol=0, rtol=4e-6)
 
 
-def test_guidance(golden: Golden) -> None:
+def test_golden_guidance(golden: Golden) -> None:
     given = golden.tensors("sampler")
     for frames in (14, 25):
         torch.testing.assert_close(guidance("triangle", frames), given[f"triangle_scale_{frames}"][0])
@@ -37,7 +42,7 @@ def test_guidance(golden: Golden) -> None:
 
 @pytest.mark.parametrize("guider", ["VanillaCFG", "TrianglePredictionGuider", "LinearPredictionGuider"])
 @pytest.mark.parametrize(("name", "known"), [("none", []), ("c0", [0]), ("c012", [0, 1, 2])])
-def test_runs_with_a_linear_network(golden: Golden, guider: str, name: str, known: list[int]) -> None:
+def test_golden_runs_with_a_linear_network(golden: Golden, guider: str, name: str, known: list[int]) -> None:
     given = golden.tensors("sampler")
     mask = torch.zeros(25)
     mask[known] = 1
@@ -56,21 +61,24 @@ def test_runs_with_a_linear_network(golden: Golden, guider: str, name: str, know
         torch.testing.assert_close(x * (sigma**2 + 1) ** 0.5, expected, atol=2e-5, rtol=1e-5)
 
 
+class Held(Networks):
+    """The golden UNet where a stored model would be."""
+
+    def __init__(self, golden: Golden, vector: Tensor) -> None:
+        unet = golden_unet(golden)
+        unet.add_time_proj = Given(vector)  # type: ignore[assignment]
+        super().__init__(Stored(golden.folder, VISTA, {}), torch.device("cpu"), half=False)
+        self._held = "unet", unet
+
+
 def tiny_velocity(golden: Golden, given: dict[str, Tensor]) -> Velocity:
-    unet = golden_unet(golden)
-    unet.add_time_proj = Given(given["vector"][0])  # type: ignore[assignment]
-
-    def velocity(x: Tensor, time: float, mask: Tensor) -> Branches:
-        made: list[Tensor] = []
-        for on in (0.0, 1.0):
-            both = torch.cat([x, on * given["concat"].expand(len(x), -1, -1, -1)], dim=1)
-            made.append(unet(both[None], time, on * given["crossattn"], torch.zeros(1, 3), mask)[0])
-        return made[0], made[1]
-
-    return velocity
+    """What the engine makes of a round's conditions."""
+    image, action = given["crossattn"][0, 0].split([64, ACTION_COLUMNS])
+    engine = Engine(Held(golden, given["vector"][0]))
+    return engine.velocity(Seen(image, given["concat"][0], action))
 
 
-def test_runs_with_a_tiny_unet(golden: Golden) -> None:
+def test_golden_engine_runs_with_a_tiny_unet(golden: Golden) -> None:
     given = golden.tensors("sampler_tiny_unet")
     velocity, frames = tiny_velocity(golden, given), len(given["noise"])
     mask = torch.zeros(frames)

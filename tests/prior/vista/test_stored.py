@@ -33,7 +33,8 @@ def test_file_and_folder_hold_the_same(vista_file: Path, vista_dir: Path) -> Non
         assert file.parts[part].shapes == folder.parts[part].shapes
         name = next(iter(file.parts[part].shapes))
         assert torch.equal(file.parts[part].read(name), folder.parts[part].read(name))
-    assert len(file.ignored) == 2
+    second = [key for key in file.ignored if key.startswith("first_stage_model.encoder.")]
+    assert len(file.ignored) == len(second) + 1
 
 
 @pytest.mark.parametrize(

@@ -30,14 +30,14 @@ def look(unet: VideoUNet, given: dict[str, Tensor], context: Tensor, *, mask: bo
 
 
 @pytest.mark.parametrize(("tokens", "mask"), [("1tok", True), ("1tok", False), ("3tok", True)])
-def test_actions_and_fixed_frames(golden: Golden, tokens: str, mask: bool) -> None:
+def test_golden_actions_and_fixed_frames(golden: Golden, tokens: str, mask: bool) -> None:
     name = f"out.out_{tokens}_{'mask' if mask else 'nomask'}"
     given = golden.tensors("unet_forward")
     made = look(golden_unet(golden), given, given[f"in.context_{tokens}"], mask=mask)
     torch.testing.assert_close(made, given[name], atol=ATOL, rtol=0)
 
 
-def test_zero_actions_are_no_actions(golden: Golden) -> None:
+def test_golden_zero_actions_are_no_actions(golden: Golden) -> None:
     given = golden.tensors("unet_forward")
     context = given["in.context_3tok"].clone()
     context[..., 64:] = 0
@@ -49,7 +49,7 @@ def test_zero_actions_are_no_actions(golden: Golden) -> None:
         torch.testing.assert_close(made, given[f"out.out_3tok_{name}_noaction"], atol=ATOL, rtol=0)
 
 
-def test_blocks_hand_over_what_they_make(golden: Golden) -> None:
+def test_golden_blocks_hand_over_what_they_make(golden: Golden) -> None:
     given, unet = golden.tensors("unet_forward"), golden_unet(golden)
     places = {
         "input_blocks.0": "conv_in",

@@ -5,7 +5,7 @@ from tests.prior.vista.conftest import Golden
 from tests.prior.vista.golden import build
 
 
-def test_frames_there_and_back(golden: Golden) -> None:
+def test_golden_frames_there_and_back(golden: Golden) -> None:
     given = golden.tensors("vae")
     vae = build("vae", {k: v.float() for k, v in golden.tensors("tiny_vae_state_fp16").items()})
     coded = vae.encode(given["image"]).latent_dist

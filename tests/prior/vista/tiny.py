@@ -99,8 +99,17 @@ def official(kind: Kind, seed: int = 0) -> dict[str, Tensor]:
         found[_vae_key(name)] = value[..., None, None] if re.search(r"to_.*weight", name) else value
     found |= _visual_state(all_states["image_encoder"])
     found["conditioner.embedders.0.open_clip.model.logit_scale"] = torch.zeros(())
-    found["first_stage_model.encoder.conv_in.weight"] = torch.zeros(2, 2)
-    return found
+    return found | _second_encoder(found)
+
+
+def _second_encoder(found: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The encoder without a convolution of its own behind it, which gives what the other one does."""
+    first = f"{_CONDITION}encoder."
+    second = {key.removeprefix(first): value for key, value in found.items() if key.startswith(first)}
+    quant = found[f"{_CONDITION}quant_conv.weight"][..., 0, 0]
+    second["conv_out.weight"] = torch.einsum("oc,cikl->oikl", quant, second["conv_out.weight"])
+    second["conv_out.bias"] = quant @ second["conv_out.bias"] + found[f"{_CONDITION}quant_conv.bias"]
+    return {f"first_stage_model.encoder.{name}": value.clone() for name, value in second.items()}
 
 
 def save_official(path: Path, kind: Kind, seed: int = 0) -> Path:

@@ -48,7 +48,7 @@ class Explained:
 
 
 def check(clip: Clip, evidence: Evidence) -> None:
-    """Refuse known poses that contradict the frames, where there are any.
+    """Refuse known poses that contradict the frames, where there are any and the user gave them.
 
     Args:
         clip: The frames.
@@ -57,7 +57,7 @@ def check(clip: Clip, evidence: Evidence) -> None:
     Raises:
         InputError: The frames clearly show another motion.
     """
-    if clip.known.world_from_camera is None:
+    if clip.known.world_from_camera is None or clip.known.generated:
         return
     found = explain(evidence.grey, evidence.street, evidence.small, clip.known.world_from_camera)
     if not found.contradictory:

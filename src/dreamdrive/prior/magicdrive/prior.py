@@ -16,6 +16,7 @@ from dreamdrive.prior.magicdrive.condition import prompt_of
 from dreamdrive.prior.magicdrive.config import EXPECTED
 from dreamdrive.prior.magicdrive.raster import check_map
 from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.running import INSTALL, PACKAGE, enough_memory
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.layout import Layout
@@ -78,15 +79,16 @@ def _make(
         from dreamdrive.prior.magicdrive.folder import read_parts
         from dreamdrive.prior.magicdrive.run import Run, generate
     except ImportError as error:
-        raise InputError(f"the prior magicdrive cannot start ({error}): {_INSTALL}") from None
-    parts = read_parts(weights, temporal=temporal)
-    if wanted is None:
-        selection = Selection.parse(control.frames)
-        wanted = np.array(selection.resolve(parts.settings.frames, "the clip of these weights"))
-    steps = STEPS if control.steps is None else control.steps
-    run = Run(layout, parts, prompt_of(control.prompt), steps, control.seed, rate_hz)
-    held_out = np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS)
-    frames, latents = generate(run, wanted, progress)
+        raise InputError(f"the prior magicdrive cannot start ({error}): {INSTALL}") from None
+    with enough_memory(_GPU):
+        parts = read_parts(weights, temporal=temporal)
+        if wanted is None:
+            selection = Selection.parse(control.frames)
+            wanted = np.array(selection.resolve(parts.settings.frames, "the clip of these weights"))
+        steps = STEPS if control.steps is None else control.steps
+        run = Run(layout, parts, prompt_of(control.prompt), steps, control.seed, rate_hz)
+        held_out = np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS)
+        frames, latents = generate(run, wanted, progress)
     clip = Clip(
         frames=frames,
         valid=np.ones(frames.shape[:3], dtype=bool),
@@ -94,7 +96,7 @@ def _make(
         latents=latents,
         source_index=np.repeat(wanted, CAMERAS),
         provenance=_provenance(control, layout, temporal) | run.about(),
-        **_cameras(layout, wanted / rate_hz, parts.settings.size),
+        **_cameras(layout, wanted / rate_hz, parts.settings.size, temporal),
     )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
 
@@ -114,19 +116,26 @@ def _inputs(control: Control) -> tuple[Layout, Path]:
     return layout, control.weights
 
 
-def _cameras(layout: Layout, times_s: Float[np.ndarray, " t"], size: tuple[int, int]) -> dict[str, Any]:
-    """Times, rig and poses by time, then camera; the world is the front camera of the first time step."""
+def _cameras(
+    layout: Layout, times_s: Float[np.ndarray, " t"], size: tuple[int, int], temporal: bool
+) -> dict[str, Any]:
+    """Times, rig and the path by time, then camera; the world is the front camera of the first time step.
+
+    Time steps that were sampled together may show how the cameras move, which is for the geometry to find.
+    Those that were sampled one by one cannot: their poses are taken as asked for.
+    """
     pinholes = rig(size)
     map_from_front = map_from_car(layout.ego, times_s) @ car_from_camera(NUSCENES[0])
     world_from_front = np.linalg.inv(map_from_front[0]) @ map_from_front
     world_from_front[0] = np.eye(4)
     mounted = np.stack([camera.world_from_camera for camera in pinholes])
+    poses = None if temporal else (world_from_front[:, None] @ mounted).reshape(-1, 4, 4)
     since_s = times_s - times_s[0]
     return {
         "times_s": np.repeat(since_s, CAMERAS),
         "camera": np.tile(np.arange(CAMERAS), len(times_s)),
         "rig": pinholes,
-        "known": Known((world_from_front[:, None] @ mounted).reshape(-1, 4, 4), intrinsics=True),
+        "known": Known(poses, intrinsics=True, generated=True),
         "requested": Trajectory(world_from_front, since_s),
     }
 
@@ -138,8 +147,8 @@ def _provenance(control: Control, layout: Layout, temporal: bool) -> dict[str, A
         "prior": name,
         "cameras": [camera.name for camera in NUSCENES],
         "notes": [
-            f"The frames are generated from {source} by {name}, six cameras at each time step. Poses and "
-            "intrinsics are those that were asked for; a generated picture follows them only roughly.",
+            f"The frames are generated from {source} by {name}, six cameras at each time step, for "
+            "intrinsics, mountings and a path that a generated picture follows only roughly.",
             _TOGETHER if temporal else _ALONE,
             f"The cameras are typical ones of nuScenes, the front one {NUSCENES[0].place_m[2]:g} m high; the "
             f"layout's camera height of {layout.ego.camera_height_m:g} m and its shaking are not followed.",
@@ -147,18 +156,22 @@ def _provenance(control: Control, layout: Layout, temporal: bool) -> dict[str, A
     }
 
 
-_TOGETHER = "All time steps were sampled together; frames agree in time as far as the network learned it."
+_TOGETHER = (
+    "All time steps were sampled together; frames agree in time as far as the network learned it. The path "
+    "is looked for in them, and the report compares it with the one asked for."
+)
 _ALONE = (
     "Each time step was sampled by itself, from the same noise: beyond map, boxes and noise nothing ties one "
-    "to the next, and what the layout leaves open (houses, colours, sky) changes from step to step."
+    "to the next, and what the layout leaves open (houses, colours, sky) changes from step to step. No "
+    "motion can be seen in such frames: the poses are those that they were asked for."
 )
-_INSTALL = "pip install 'dreamdrive[video-prior]'"
+_GPU = "take the weights for 400x224, which need least, or a GPU with more memory"
 _LICENCE = (
     "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); Stable "
     "Diffusion 1.5 CreativeML Open RAIL-M"
 )
 _TAKES = frozenset({"path", "frames", "prompt", "steps", "hold_out"})
-_GIVES = "six cameras at each time step, the intrinsics and poses asked for, latents"
+_GIVES = "six cameras at each time step, the intrinsics, mountings and path asked for, latents"
 
 MAGICDRIVE = Prior(
     name="magicdrive",
@@ -169,8 +182,8 @@ MAGICDRIVE = Prior(
     licence=_LICENCE,
     memory="for 400x224 about 7.5 GB on a CPU (float32), 4.5 GB on a GPU (half precision)",
     weights=EXPECTED,
-    package="diffusers",
-    install=_INSTALL,
+    package=PACKAGE,
+    install=INSTALL,
 )
 MAGICDRIVE_T = Prior(
     name="magicdrive-t",
@@ -181,6 +194,6 @@ MAGICDRIVE_T = Prior(
     licence=_LICENCE,
     memory="about 13 GB on a CPU (float32), 7 GB on a GPU (half precision)",
     weights=EXPECTED,
-    package="diffusers",
-    install=_INSTALL,
+    package=PACKAGE,
+    install=INSTALL,
 )

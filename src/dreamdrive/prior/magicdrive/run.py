@@ -13,6 +13,7 @@ from dreamdrive.prior.magicdrive.condition import Seen, see
 from dreamdrive.prior.magicdrive.folder import Parts
 from dreamdrive.prior.magicdrive.sample import GUIDANCE, Conditions, decode, sample, unipc
 from dreamdrive.prior.protocol import Progress
+from dreamdrive.prior.running import check_finite, counted
 from dreamdrive.scene.layout import Layout
 
 
@@ -59,22 +60,20 @@ def generate(
         run: What is sampled.
         wanted: Indices of the time steps.
         progress: Told of every sampler step and every decoded time step.
+
+    Raises:
+        InputError: Latents or frames are not finite.
     """
     together = run.parts.settings.frames
     sampled = wanted if together == 1 else np.arange(together)
-    total, done = len(sampled) // together * run.steps + len(wanted), 0
-
-    def tell() -> None:
-        nonlocal done
-        done += 1
-        progress(done, total)
-
+    tell = counted(progress, len(sampled) // together * run.steps + len(wanted))
     parts = run.parts
     clips = [
         _sampled(run, see(run.layout, steps / run.rate_hz, parts.settings.map_shape[1]), tell)
         for steps in sampled.reshape(-1, together)
     ]
     by_time = torch.cat(clips).unflatten(0, (-1, parts.settings.views))
+    check_finite(by_time, "latents")
     kept = by_time[np.searchsorted(sampled, wanted).tolist()]
     pictures: list[np.ndarray] = []
     for latents in kept:

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from dreamdrive.prior.magicdrive.memory import DECODE_PICTURES
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised
+from dreamdrive.prior.running import check_finite
 
 GUIDANCE = 2.0
 _SCHEDULE = (
@@ -118,11 +119,16 @@ def sample(
 
 @torch.inference_mode()
 def decode(vae: AutoencoderKL, latents: Float[Tensor, "bn c h w"]) -> UInt8[np.ndarray, "bn _ _ 3"]:
-    """Pictures of latents, a few at a time."""
+    """Pictures of latents, a few at a time.
+
+    Raises:
+        InputError: They are not finite.
+    """
     scaled = (latents / vae.config["scaling_factor"]).to(vae.dtype)
     pictures: list[np.ndarray] = []
     for chunk in scaled.split(DECODE_PICTURES):
         decoded = vae.decode(chunk, return_dict=False)[0].float()
+        check_finite(decoded, "frames")
         eight_bit = (decoded.clamp(-1, 1) + 1) * 127.5
         pictures.append(eight_bit.round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy())
     return np.concatenate(pictures)

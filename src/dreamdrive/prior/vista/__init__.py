@@ -2,15 +2,16 @@
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.prior.vista.kinds import KINDS, KindName
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-INSTALL = 'pip install "dreamdrive[video-prior]"'
 _TAKES = frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"})
 _MEMORY = (
-    "at 1024x576 on a GPU in half precision about 9 GB for the UNet and 13 GB for the decoder (reckoned, not "
-    "measured); on a CPU 17 GB, and hours; a run that does not fit is refused before it starts"
+    "at 1024x576 about 9 GB for the UNet in half precision (17 GB on a CPU, and hours) and 43 GB for the "
+    "decoder, at 576x320 5 and 14 GB (reckoned, not measured); a run that does not fit is refused before it "
+    "starts"
 )
 
 
@@ -52,7 +53,7 @@ SVD = Prior(
     ),
     memory=_MEMORY,
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",
-    package="diffusers",
+    package=PACKAGE,
     install=INSTALL,
 )
 VISTA = Prior(
@@ -67,6 +68,6 @@ VISTA = Prior(
     ),
     memory=_MEMORY,
     weights="vista.safetensors of OpenDriveLab/Vista, or a folder that dreamdrive prior convert made of it",
-    package="diffusers",
+    package=PACKAGE,
     install=INSTALL,
 )

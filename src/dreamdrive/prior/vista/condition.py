@@ -13,7 +13,6 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
-from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS
 from dreamdrive.scene.action import Action, Command, Goal, Steering, Waypoints
 
@@ -36,9 +35,6 @@ def numbers_of(action: Action) -> dict[str, list[float]]:
     * The steering wheel is in degrees over 780, the signal's range; to the left is positive [inferred: as in
       nuScenes' ``steeranglefeedback``; the signal of that range has no documented sign].
     * A goal is (u, v) as shares of width and height.
-
-    Raises:
-        InputError: A goal lies outside the frame.
     """
     if isinstance(action, Command):
         return {"command": [_CLASSES[action.direction]]}
@@ -51,11 +47,6 @@ def numbers_of(action: Action) -> dict[str, list[float]]:
             "angle": [degrees(wheel) / _WHEEL_RANGE_DEG for wheel in action.wheel_rad],
         }
     assert isinstance(action, Goal)
-    if not (0 <= action.column <= 1 and 0 <= action.row <= 1):
-        raise InputError(
-            f"the goal is at {action.column:g}, {action.row:g}; expected a point of the first frame, as "
-            "shares of its width and height between 0 and 1"
-        )
     return {"goal": [action.column, action.row]}
 
 
@@ -74,6 +65,16 @@ def embed_action(numbers: Mapping[str, Sequence[float]]) -> Float[Tensor, " a"]:
             columns[start : start + _COLUMNS * count] = encoded.flatten()
         start += _COLUMNS * count
     return columns
+
+
+def columns_by_round(action: Action | None, count: int) -> list[Float[Tensor, " a"]]:
+    """The columns of an action, which each round or window of frames is told anew; zeros without one."""
+    free = embed_action({})
+    if action is None:
+        return [free] * count
+    given = embed_action(numbers_of(action))
+    # A goal is a point of the first frame, which later rounds no longer see.
+    return [given, *[free if isinstance(action, Goal) else given] * (count - 1)]
 
 
 def clip_pixels(image: Float[Tensor, "1 3 h w"], side_px: int = 224) -> Float[Tensor, "1 3 s s"]:

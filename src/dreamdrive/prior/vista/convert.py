@@ -11,7 +11,9 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
+from dreamdrive.prior.protocol import Progress, silent
 from dreamdrive.prior.vista.configs import Shapes
+from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
 from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
 from dreamdrive.scene.atomic import new_folder
@@ -26,7 +28,6 @@ _CLASSES: dict[Part, dict[str, str]] = {
     "vae": {"_class_name": "AutoencoderKLTemporalDecoder"},
     "image_encoder": {"model_type": "clip_vision_model"},
 }
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -36,10 +37,12 @@ class Converted:
     Attributes:
         stored: What it was made from.
         ignored: How many tensors were left out, by what they are.
+        notes: What to say of the file, a sentence each.
     """
 
     stored: Stored
     ignored: dict[str, int]
+    notes: list[str]
 
 
 def convert(
@@ -48,7 +51,7 @@ def convert(
     dtype: DtypeName = "float16",
     *,
     replace: bool = False,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
 ) -> Converted:
     """Write the folder; it appears whole or not at all, and one tensor at a time is in memory.
 
@@ -65,6 +68,7 @@ def convert(
     if file.is_dir() and (file / "unet").is_dir():
         raise InputError(f"{file} has diffusers' layout already; --weights takes it as it is")
     stored = open_weights(file)
+    notes = notes_of(stored)
     total, done = sum(len(stored.parts[part].shapes) for part in PARTS), 0
     with new_folder(folder, replace=replace, mark=NOTE) as partial:
         for part in PARTS:
@@ -85,12 +89,12 @@ def convert(
                 tell,
             )
             done += len(own.shapes)
-        note = {"kind": stored.kind.name, "dtype": dtype, "from": stored.path.name}
+        note = {"kind": stored.kind.name, "dtype": dtype, "from": stored.path.name, "notes": notes}
         (partial / NOTE).write_text(json.dumps(note, indent=1) + "\n")
     counted = {
         what: sum(bool(pattern.match(key)) for key in stored.ignored) for what, pattern in IGNORED.items()
     }
-    return Converted(stored, {what: count for what, count in counted.items() if count})
+    return Converted(stored, {what: count for what, count in counted.items() if count}, notes)
 
 
 def write_tensors(

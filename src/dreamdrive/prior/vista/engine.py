@@ -1,7 +1,5 @@
 """The stored networks as what sampling, decoding and features ask for. Importing this loads diffusers."""
 
-from collections.abc import Callable
-
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -82,15 +80,3 @@ class Engine:
     @property
     def _device(self) -> torch.device:
         return self.networks.device
-
-
-def counted(progress: Callable[[int, int], None], total: int) -> Callable[[], None]:
-    """A function to call after each of ``total`` steps."""
-    done = 0
-
-    def tell() -> None:
-        nonlocal done
-        done += 1
-        progress(done, total)
-
-    return tell

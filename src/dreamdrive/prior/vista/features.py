@@ -5,7 +5,8 @@ recorded, get a little noise and go through the UNet once, as in DIFT (Tang et a
 depends on how they were sampled.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,18 +19,22 @@ from torch import Tensor
 from dreamdrive.errors import InputError
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.protocol import Progress, silent
-from dreamdrive.prior.vista.condition import embed_action, numbers_of
-from dreamdrive.prior.vista.engine import Engine, counted
-from dreamdrive.prior.vista.kinds import KINDS, VISTA, KindName
-from dreamdrive.prior.vista.load import start
+from dreamdrive.prior.running import check_finite, counted, enough_memory
+from dreamdrive.prior.vista.condition import columns_by_round
+from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.kinds import SVD
+from dreamdrive.prior.vista.load import check_fit, open_networks
+from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, SIDE, check_size, to_images
 from dreamdrive.prior.vista.rollout import SCALE, Seen
 from dreamdrive.prior.vista.sampler import time_of
-from dreamdrive.prior.vista.unet import VideoUNet, watch
-from dreamdrive.scene.action import Action
+from dreamdrive.prior.vista.unet import watch
+from dreamdrive.scene.action import Action, check_action
 
 BLOCK = "down_blocks.1.attentions.1"
 """The second level, behind its last transformer over time: 1/16 of the frame's size, mixed over time."""
+_BLOCKS = re.compile(r"conv_in|(mid_block|(down|up)_blocks\.\d+)(\.(attentions|resnets)\.\d+)?")
+"""What gives activations (B T, C, h, w)."""
 
 
 @dataclass(frozen=True)
@@ -62,12 +67,26 @@ class VideoFeatures:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Window:
+    """Frames that go through the UNet at once.
+
+    Attributes:
+        span: Which.
+        action: Columns of the action (A,); None for SVD, which knows of none.
+        fixed: How many of the first frames count as known.
+    """
+
+    span: range
+    action: Float[Tensor, " a"] | None
+    fixed: int
+
+
 def video_features(
     frames: UInt8[np.ndarray, "f h w 3"],
     weights: Path,
     options: FeatureOptions | None = None,
     *,
-    kind: KindName | None = None,
     size: tuple[int, int] | None = None,
     action: Action | None = None,
     seed: int = 0,
@@ -79,47 +98,53 @@ def video_features(
         frames: RGB (F, H, W, 3) of one camera, at about the model's rate (Vista 10 Hz, SVD 7 Hz).
         weights: Of SVD or Vista, see ``stored.EXPECTED``.
         options: Which features.
-        kind: Which model it must be; None takes both.
         size: Width and height at which the network sees the frames, multiples of 64; None takes the nearest.
-        action: What the car does, for Vista.
+        action: What the car does, for Vista; each window of frames is told it anew.
         seed: Of the noise.
         progress: Told of every window of frames.
 
     Raises:
-        InputError: The weights cannot be used, or memory does not suffice.
+        InputError: The weights, the block or the action cannot be used, or memory does not suffice.
     """
+    chosen = options or FeatureOptions()
     height, width = frames.shape[1:3]
     seen_size = size or _nearest((width, height))
     check_size(seen_size)
-    networks, _, count = start(weights, None if kind is None else KINDS[kind], seen_size, len(frames))
-    engine = Engine(networks)
+    networks = open_networks(weights, None)
+    kind = networks.stored.kind
+    _check_block(networks.stored.parts["unet"].shapes, chosen.block)
+    if action is not None:
+        if kind is SVD:
+            raise InputError(f"--action: {kind.title} knows of none; leave it out, or give weights of Vista")
+        check_action(action)
+    check_fit(networks, Job(seen_size, len(frames), networks.per_round, LOOKING))
+    spans = spans_of(len(frames), networks.per_round)
+    told = [None] * len(spans) if kind is SVD else columns_by_round(action, len(spans))
+    windows = [Window(span, columns, int(kind is not SVD)) for span, columns in zip(spans, told, strict=True)]
     resized = np.stack([_resize(each, seen_size) for each in frames])
-    with torch.inference_mode():
-        latents = SCALE * engine.encode(to_images(resized)).cpu()
-        columns = None if action is None else embed_action(numbers_of(action))
-        values = extract(
-            engine, latents, resized, count, options, action=columns, seed=seed, progress=progress
-        )
-    notes = (
-        []
-        if seen_size == (width, height)
-        else [f"The video model saw the frames at {seen_size[0]}x{seen_size[1]} instead of {width}x{height}."]
-    )
+    smaller = "x".join(map(str, smaller_size(seen_size)))
+    with torch.inference_mode(), enough_memory(f"choose a smaller --size, such as {smaller}"):
+        engine = Engine(networks)
+        coded = [engine.encode(to_images(resized[i : i + 1])).cpu() for i in range(len(resized))]
+        tell = counted(progress, len(windows))
+        values = extract(engine, SCALE * torch.cat(coded), resized, windows, chosen, seed=seed, tell=tell)
+    networks.free()
     values, said = _onto_clip(values, (width, height))
-    chosen = options or FeatureOptions()
-    return VideoFeatures(f"{networks.stored.kind.name}:{chosen.block}", values, (*notes, *said))
+    if seen_size != (width, height):
+        shown = f"{seen_size[0]}x{seen_size[1]} instead of {width}x{height}"
+        said = (f"The video model saw the frames at {shown}.", *said)
+    return VideoFeatures(f"{kind.name}:{chosen.block}", values, tuple(said))
 
 
 def extract(
     engine: Engine,
     latents: Float[Tensor, "f c h w"],
     frames: UInt8[np.ndarray, "f h2 w2 3"],
-    window: int,
+    windows: Sequence[Window],
     options: FeatureOptions | None = None,
     *,
-    action: Float[Tensor, " a"] | None = None,
     seed: int = 0,
-    progress: Progress = silent,
+    tell: Callable[[], None] = lambda: None,
 ) -> Float16[np.ndarray, "f h3 w3 d"]:
     """Principal components of a block's activations.
 
@@ -127,34 +152,28 @@ def extract(
         engine: The networks.
         latents: Scaled clean latents of all frames.
         frames: The frames, of which the first of each window is described.
-        window: Frames that the UNet sees at once.
+        windows: What the UNet sees at once, in order; of frames in two windows the first one counts.
         options: Which features.
-        action: Columns of the action.
         seed: Of the noise.
-        progress: Told of every window.
+        tell: Called after every window.
 
     Raises:
-        InputError: The UNet has no such block.
+        InputError: The features are not finite.
     """
     chosen = options or FeatureOptions()
-    vista = engine.networks.stored.kind is VISTA
-    spans = windows(len(latents), window)
-    described = [engine.describe(to_images(frames[span.start : span.start + 1])) for span in spans]
-    columns = (embed_action({}) if action is None else action) if vista else None
-    draw = torch.Generator().manual_seed(seed)
-    noise = torch.randn(latents.shape, generator=draw)
+    described = [engine.describe(to_images(frames[w.span.start : w.span.start + 1])) for w in windows]
+    noise = torch.randn(latents.shape, generator=torch.Generator().manual_seed(seed))
     made: list[Float16[np.ndarray, "h w c"]] = []
-    tell = counted(progress, len(spans))
-    for span, image in zip(spans, described, strict=True):
-        part = slice(span.start, span.stop)
-        seen = Seen(image, latents[span.start] / SCALE, columns)
-        values = _activations(engine, seen, latents[part], noise[part], chosen, fixed=vista)
-        made += list(values[len(made) - span.start :])
+    for window, image in zip(windows, described, strict=True):
+        part = slice(window.span.start, window.span.stop)
+        seen = Seen(image, latents[window.span.start] / SCALE, window.action)
+        values = _activations(engine, seen, latents[part], noise[part], chosen, window.fixed)
+        made += list(values[len(made) - window.span.start :])
         tell()
     return reduce(made, chosen.channels)
 
 
-def windows(count: int, length: int) -> list[range]:
+def spans_of(count: int, length: int) -> list[range]:
     """Windows over all frames; the last one ends with them and so may overlap the one before."""
     starts = [min(start, max(count - length, 0)) for start in range(0, count, length)]
     return [range(start, min(start + length, count)) for start in starts]
@@ -166,34 +185,34 @@ def _activations(
     latents: Float[Tensor, "t c h w"],
     noise: Float[Tensor, "t c h w"],
     options: FeatureOptions,
-    *,
-    fixed: bool,
+    fixed: int,
 ) -> Float16[np.ndarray, "t h2 w2 d"]:
-    """One window through the UNet, its first frame known as when it is generated."""
-    unet = engine.networks.unet()
+    """One window through the UNet, its first frames known as when they are generated."""
     mask = torch.zeros(len(latents))
-    mask[0] = float(fixed)
+    mask[:fixed] = 1
     noisy = latents + options.sigma * noise * (1 - mask)[:, None, None, None]
     caught: list[Tensor] = []
-    handle = watch(unet, _known(unet, options.block), caught.append)
+    handle = watch(engine.networks.unet(), options.block, caught.append)
     try:
         scaled = (noisy / (options.sigma**2 + 1) ** 0.5).to(engine.networks.device)
         engine.look(seen, scaled, time_of(options.sigma), mask.to(scaled))
     finally:
         handle.remove()
-    return caught[0].permute(0, 2, 3, 1).cpu().numpy().astype(np.float16)
+    values = caught[0].permute(0, 2, 3, 1).half()
+    check_finite(values, "features")
+    return values.cpu().numpy()
 
 
-def _known(unet: VideoUNet, block: str) -> str:
-    """The name of a block.
+def _check_block(weights: Iterable[str], block: str) -> None:
+    """Whether activations of a block can be had, by the names of the UNet's weights.
 
     Raises:
         InputError: There is none of that name.
     """
-    names = [name for name, _ in unet.named_modules() if name.count(".") in (1, 3) and "attentions" in name]
-    if block not in dict(unet.named_modules()):
-        raise InputError(f"the UNet has no block {block!r}; such as {', '.join(names[:6])}")
-    return block
+    matches = (_BLOCKS.match(name) for name in weights)
+    names = {name for match in matches if match for name in (match[0], match[1]) if name}
+    if block not in names:
+        raise InputError(f"--block {block}: the UNet has no such block; it has {', '.join(sorted(names))}")
 
 
 def _nearest(size: tuple[int, int]) -> tuple[int, int]:

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 KindName = Literal["svd", "vista"]
-IMAGE_COLUMNS = 1024
-"""Width of the context that describes the first frame."""
 ACTION_COLUMNS = 2432
 """Width of the context that describes the action: 19 numbers of 128 columns."""
 
@@ -30,11 +28,6 @@ class Kind:
     noise: float
     steps: int
     overlap: int
-
-    @property
-    def context_columns(self) -> int:
-        """Width of the context of the official network."""
-        return IMAGE_COLUMNS + (ACTION_COLUMNS if self.overlap else 0)
 
 
 SVD = Kind("svd", "Stable Video Diffusion", rate_hz=7.0, noise=0.02, steps=25, overlap=0)

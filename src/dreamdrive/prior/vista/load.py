@@ -4,32 +4,31 @@ from pathlib import Path
 
 from dreamdrive.memory import best_device, free_bytes
 from dreamdrive.prior.vista.kinds import Kind
-from dreamdrive.prior.vista.memory import Plan, plan_memory
+from dreamdrive.prior.vista.memory import Free, Job, check_memory
 from dreamdrive.prior.vista.networks import Networks
 from dreamdrive.prior.vista.stored import open_weights
 
 
-def start(
-    weights: Path, kind: Kind | None, size: tuple[int, int], frames: int | None
-) -> tuple[Networks, Plan, int]:
-    """Check weights and memory, without loading anything yet.
+def open_networks(weights: Path, kind: Kind | None) -> Networks:
+    """Check weights, without loading anything yet; on a GPU the UNet will compute in float16.
 
     Args:
         weights: File or folder.
         kind: Which model it must be; None takes both.
-        size: Width and height of the frames.
-        frames: How many there will be; None for as many as the UNet sees at once.
-
-    Returns:
-        The networks, what they will take, and how many frames the UNet sees at once.
 
     Raises:
-        InputError: The weights cannot be used, or memory does not suffice.
+        InputError: The weights cannot be used.
     """
-    stored = open_weights(weights, kind)
     device = best_device()
-    half = device.type == "cuda"
-    free = free_bytes(device)
-    count = int(stored.parts["unet"].config.get("num_frames", 25))
-    plan = plan_memory(stored, size, max(frames or 0, count), count, free, half=half)
-    return Networks(stored, device, half=half), plan, count
+    return Networks(open_weights(weights, kind), device, half=device.type == "cuda")
+
+
+def check_fit(networks: Networks, job: Job) -> None:
+    """Whether there is memory for a job, before anything is loaded.
+
+    Raises:
+        InputError: There is not; the message says how much is missing and what to do.
+    """
+    shared = networks.device.type != "cuda"
+    free = Free(free_bytes(networks.device), None if shared else free_bytes(), shared=shared)
+    check_memory(networks.stored, job, free, half=networks.half)

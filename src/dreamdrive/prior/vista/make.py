@@ -6,25 +6,28 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.path_to_action import STEERING_RATIO
 from dreamdrive.prior.protocol import Progress
-from dreamdrive.prior.vista.condition import embed_action, numbers_of
+from dreamdrive.prior.running import check_finite, counted, enough_memory
+from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
-from dreamdrive.prior.vista.engine import Engine, counted
-from dreamdrive.prior.vista.features import BLOCK, extract, windows
-from dreamdrive.prior.vista.kinds import Kind
-from dreamdrive.prior.vista.load import start
-from dreamdrive.prior.vista.memory import Plan
-from dreamdrive.prior.vista.path import asked_path, waypoints_by_round
+from dreamdrive.prior.vista.encoders import notes_of
+from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.features import BLOCK, Window, extract
+from dreamdrive.prior.vista.kinds import SVD, Kind
+from dreamdrive.prior.vista.load import check_fit, open_networks
+from dreamdrive.prior.vista.memory import Job, smaller_size
+from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
-from dreamdrive.scene.action import Action, Goal
+from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory
@@ -46,39 +49,32 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     Raises:
         InputError: The input, an option or the weights cannot be used, or memory does not suffice.
     """
-    path, weights, steps = control.path, control.weights, control.steps or kind.steps
-    size = control.size or NATIVE
-    if path is None or weights is None:
+    if control.path is None or control.weights is None:
         raise InputError(f"the prior {kind.name} needs an input, a photo, and --weights")
+    size, steps = control.size or NATIVE, control.steps or kind.steps
     check_size(size)
     leading = read_leading(
-        path, max(kind.overlap, 1), kind.rate_hz, size, control.intrinsics, control.hfov_deg
+        control.path, max(kind.overlap, 1), kind.rate_hz, size, control.intrinsics, control.hfov_deg
     )
-    networks, plan, per_round = start(weights, kind, size, _stop(control.frames))
-    wanted = _wanted(control.frames, kind, per_round)
+    networks = open_networks(control.weights, kind)
+    wanted = _wanted(control.frames, kind, networks.per_round)
     held_out = held_out_mask(len(wanted), control.hold_out)
-    rounds = rounds_for(int(wanted[-1]) + 1, kind, per_round)
-    made = per_round + (rounds - 1) * (per_round - kind.overlap)
-    path_asked = None if control.trajectory is None else read_trajectory(control.trajectory)
-    engine, actions = (
-        Engine(networks),
-        _actions(control, path_asked, kind, rounds, per_round, int(wanted[-1])),
-    )
-    tell = counted(progress, rounds * steps + 1 + len(windows(made, per_round)))
-    with torch.inference_mode():
-        latents = _sample(engine, kind, leading, actions, steps, rounds, per_round, plan, control.seed, tell)
-        images = decode_in_chunks(engine.decode, latents / SCALE, plan.chunk)
-        frames, latents = to_frames(images), latents.cpu()
+    spans = _rounds(int(wanted[-1]) + 1, kind, networks.per_round)
+    check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
+    told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
+    noticed = notes_of(networks.stored)
+    windows = [
+        Window(span, columns, kind.overlap if number else min(len(leading.frames), kind.overlap))
+        for number, (span, columns) in enumerate(zip(spans, told, strict=True))
+    ]
+    tell = counted(progress, len(spans) * steps + 1 + len(spans))
+    smaller = "x".join(map(str, smaller_size(size)))
+    with torch.inference_mode(), enough_memory(f"choose a smaller --size, such as {smaller}"):
+        engine = Engine(networks)
+        latents = _sample(engine, kind, leading, windows, steps, control.seed, tell).cpu()
+        frames = _decoded(engine, latents)
         tell()
-        features = extract(
-            engine,
-            latents,
-            frames,
-            per_round,
-            action=actions[0],
-            seed=control.seed,
-            progress=lambda done, total: tell(),
-        )
+        features = extract(engine, latents, frames, windows, seed=control.seed, tell=tell)
     networks.free()
     frames, latents, features = frames[wanted], latents[torch.from_numpy(wanted)], features[wanted]
     valid = np.ones(frames.shape[:3], dtype=bool)
@@ -93,15 +89,9 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         features={"appearance": appearance(frames, valid), f"{kind.name}:{BLOCK}": features},
         latents=latents.permute(0, 2, 3, 1).contiguous().numpy(),
         known=Known(intrinsics=leading.calibration.known),
-        requested=None if path_asked is None else asked_path(path_asked, wanted / kind.rate_hz),
-        provenance=_provenance(kind, control, leading, steps, rounds, plan),
+        requested=asked,
+        provenance=_provenance(kind, control, leading, steps, len(spans), noticed),
     )
-
-
-def _stop(frames: str | None) -> int | None:
-    """Frames that are made, as far as the selection alone tells."""
-    stop = Selection.parse(frames).stop
-    return None if stop is None else min(stop, _MOST_FRAMES)
 
 
 def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, " f"]:
@@ -125,33 +115,35 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, "
     return np.array(wanted, dtype=np.int64)
 
 
-def _actions(
-    control: Control, path: Trajectory | None, kind: Kind, rounds: int, per_round: int, last: int
-) -> list[Float[Tensor, " a"] | None]:
-    """Columns of the action in each round; None for SVD, which has none."""
-    if kind.overlap == 0:
-        return [None] * rounds
-    if path is not None:
-        starts_s = np.arange(rounds) * (per_round - kind.overlap) / kind.rate_hz
-        asked = waypoints_by_round(path, starts_s, last / kind.rate_hz)
-        return [embed_action(numbers_of(action)) for action in asked]
-    free = embed_action({})
-    if control.action is None:
-        return [free] * rounds
-    given = embed_action(numbers_of(control.action))
-    # A goal is a point of the first frame, which later rounds no longer see.
-    return [given, *[free if isinstance(control.action, Goal) else given] * (rounds - 1)]
+def _rounds(frames: int, kind: Kind, per_round: int) -> list[range]:
+    """Frames of each round, the overlap with the round before among them."""
+    starts = [number * (per_round - kind.overlap) for number in range(rounds_for(frames, kind, per_round))]
+    return [range(start, start + per_round) for start in starts]
+
+
+def _told(
+    control: Control, kind: Kind, spans: list[range], times_s: Float[np.ndarray, " f"]
+) -> tuple[list[Float[Tensor, " a"] | None], Trajectory | None]:
+    """Columns of the action in each round, None for SVD; and the path that it asks for, if it does."""
+    if kind is SVD:
+        return [None] * len(spans), None
+    if control.trajectory is not None:
+        path = read_trajectory(control.trajectory)
+        starts_s = np.array([span.start for span in spans]) / kind.rate_hz
+        points = waypoints_by_round(path, starts_s, float(times_s[-1]))
+        return [embed_action(numbers_of(each)) for each in points], asked_path(path, times_s)
+    path = None
+    if isinstance(control.action, Waypoints | Steering):
+        path = asked_path(path_by_rounds(control.action, spans, kind.rate_hz), times_s)
+    return list(columns_by_round(control.action, len(spans))), path
 
 
 def _sample(
     engine: Engine,
     kind: Kind,
     leading: Leading,
-    actions: list[Float[Tensor, " a"] | None],
+    windows: list[Window],
     steps: int,
-    rounds: int,
-    per_round: int,
-    plan: Plan,
     seed: int,
     tell: Callable[[], None],
 ) -> Float[Tensor, "f c h w"]:
@@ -160,25 +152,27 @@ def _sample(
     images = leading.images()
     height, width = images.shape[2] // 8, images.shape[3] // 8
     channels = engine.networks.stored.parts["unet"].config.get("out_channels", 4)
-    noise = torch.randn((rounds, per_round, channels, height, width), generator=draw)
+    shape = len(windows), len(windows[0].span), channels, height, width
+    noise = torch.randn(shape, generator=draw)
     first = None
     if kind.noise > 0:
         first = images[:1] + kind.noise * torch.randn(images[:1].shape, generator=draw)
-    return roll_out(
-        engine.model(),
-        kind,
-        images,
-        noise.to(engine.networks.device),
-        actions,
-        steps,
-        first=first,
-        chunk=plan.chunk,
-        tell=tell,
+    actions = [window.action for window in windows]
+    made = roll_out(
+        engine.model(), kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
     )
+    check_finite(made, "latents")
+    return made
+
+
+def _decoded(engine: Engine, latents: Float[Tensor, "f c h w"]) -> UInt8[np.ndarray, "f h2 w2 3"]:
+    images = decode_in_chunks(engine.decode, latents / SCALE)
+    check_finite(images, "frames")
+    return to_frames(images)
 
 
 def _provenance(
-    kind: Kind, control: Control, leading: Leading, steps: int, rounds: int, plan: Plan
+    kind: Kind, control: Control, leading: Leading, steps: int, rounds: int, noticed: list[str]
 ) -> dict[str, Any]:
     assert control.path is not None
     notes = [
@@ -186,6 +180,7 @@ def _provenance(
         f"round{'s' if rounds > 1 else ''} of {steps} steps. They hold no geometry: camera poses, depth and "
         "scale are not known and have to be found in the frames.",
         *leading.notes,
+        *noticed,
     ]
     if len(leading.frames) > 1:
         notes.append(f"The first {len(leading.frames)} frames of the input were kept as the first ones.")
@@ -195,6 +190,11 @@ def _provenance(
             "The action was asked for"
             + (f", {again}" if rounds > 1 else "")
             + "; how well the frames follow it is not known."
+        )
+    if isinstance(control.action, Steering):
+        notes.append(
+            "The path that speed and wheel ask for is that of a bicycle model; its steering ratio of "
+            f"{STEERING_RATIO:g} is assumed."
         )
     if control.trajectory is not None:
         notes.append(
@@ -211,7 +211,6 @@ def _provenance(
         "rounds": rounds,
         "size": list(control.size or NATIVE),
         "action": None if control.action is None else _named(control.action),
-        "decoded_at_once": plan.chunk,
         "crop_offset": list(leading.framing.corner),
         "crop_size": list(leading.framing.part),
         "lens": None,

@@ -6,108 +6,154 @@ width of the network's first level, the frames and the pixels. Attention takes n
 as the fused kernels have it. On a GPU it was not measured.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.decode import CHUNK
-from dreamdrive.prior.vista.keys import Part
 from dreamdrive.prior.vista.picture import SIDE
 from dreamdrive.prior.vista.stored import Stored
 
-LEAST_CHUNK = 4
-"""Frames that must be decoded at once: three shared with the chunk before, and one."""
+Step = Literal["image encoder", "encoder", "UNet", "decoder"]
+MAKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet", "decoder")
+LOOKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet")
+"""What features of frames that are there already need."""
 _FLOAT = 4
 # Numbers that live at once for each channel of the first level, frame and pixel of the latents.
 _UNET, _DECODER, _ENCODER = 27, 512, 322
 _MARGIN = 1.25  # for workspaces of the libraries and what the allocator cannot give back
-_RESULT = 3 * _FLOAT + 3  # bytes a pixel of a decoded frame
+_RESULT = 3 * _FLOAT + 2 * 3  # bytes a pixel of a decoded frame: as it comes, and twice as bytes
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a run does.
+
+    Attributes:
+        size: Width and height of the frames.
+        frames: How many the decoder makes in all.
+        per_round: How many the UNet sees at once.
+        steps: The networks that work.
+    """
+
+    size: tuple[int, int]
+    frames: int
+    per_round: int
+    steps: tuple[Step, ...] = MAKING
+
+
+@dataclass(frozen=True)
+class Free:
+    """Bytes that may be taken; None where nobody knows.
+
+    Attributes:
+        networks: Where the networks run.
+        frames: In main memory, where decoded frames lie.
+        shared: Whether the two are the same memory; ``frames`` then does not count.
+    """
+
+    networks: int | None
+    frames: int | None = None
+    shared: bool = True
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Bytes that each part of a run takes, its weights included.
+    """Bytes that a run takes.
 
     Attributes:
-        image_encoder: Describing the first frame.
-        encoder: Encoding frames.
-        unet: Sampling and features.
-        decoder: Decoding.
-        chunk: Frames decoded at once.
+        steps: Of each network at work, its weights included.
+        frames: Of decoded frames, in main memory.
     """
 
-    image_encoder: int
-    encoder: int
-    unet: int
-    decoder: int
-    chunk: int
+    steps: Mapping[Step, int]
+    frames: int
 
-    @property
-    def peak(self) -> int:
-        """The most at once."""
-        return max(self.image_encoder, self.encoder, self.unet, self.decoder)
+    def peak(self, *, shared: bool) -> int:
+        """The most at once where the networks run; decoded frames are there too if it is the main memory."""
+        decoding = self.steps.get("decoder", 0) + self.frames if shared else 0
+        return max(*self.steps.values(), decoding)
+
+    def fits(self, free: Free) -> bool:
+        """Whether it fits, as far as anybody knows."""
+        networks = free.networks is None or self.peak(shared=free.shared) <= free.networks
+        return networks and (free.shared or free.frames is None or self.frames <= free.frames)
 
     def __str__(self) -> str:
-        return (
-            f"{_gb(self.peak)} (image encoder {_gb(self.image_encoder)}, encoder {_gb(self.encoder)}, UNet "
-            f"{_gb(self.unet)}, decoder {_gb(self.decoder)} for {self.chunk} frames at once)"
-        )
+        steps = ", ".join(f"{step} {_gb(count)}" for step, count in self.steps.items())
+        return f"{steps}" + (f", decoded frames {_gb(self.frames)}" if self.frames else "")
 
 
-def plan_memory(
-    stored: Stored, size: tuple[int, int], frames: int, per_round: int, available: int | None, *, half: bool
-) -> Plan:
-    """What a run will take, with as many frames decoded at once as fit.
+def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
+    """What a run will take.
 
     Args:
         stored: The model.
-        size: Width and height of the frames.
-        frames: How many are made in all.
-        per_round: How many the UNet sees at once.
-        available: Bytes that may be taken; None where nobody knows.
+        job: What is done.
+        half: Whether the UNet computes in float16.
+    """
+    pixels = job.size[0] * job.size[1] // 64
+    width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
+    bytes_ = 2 if half else _FLOAT
+    weights = {part: own.count for part, own in stored.parts.items()}
+    vae, alive = _FLOAT * weights["vae"], _MARGIN * _FLOAT * width["vae"] * pixels
+    steps: dict[Step, int] = {
+        "image encoder": int(_FLOAT * weights["image_encoder"] * _MARGIN),
+        "encoder": int(vae + alive * _ENCODER),
+        "UNet": int(bytes_ * (weights["unet"] + _MARGIN * _UNET * width["unet"] * pixels * job.per_round)),
+        "decoder": int(vae + alive * _DECODER * min(CHUNK, job.frames)),
+    }
+    frames = _RESULT * job.frames * job.size[0] * job.size[1] if "decoder" in job.steps else 0
+    return Plan({step: steps[step] for step in job.steps}, frames)
+
+
+def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
+    """Refuse a run that does not fit.
+
+    Args:
+        stored: The model.
+        job: What is done.
+        free: What there is.
         half: Whether the UNet computes in float16.
 
     Raises:
         InputError: It does not fit; the message names a size that does.
     """
-    plans = [
-        _plan(stored, size, frames, per_round, chunk, half) for chunk in range(CHUNK, LEAST_CHUNK - 1, -1)
-    ]
-    fitting = [plan for plan in plans if available is None or plan.peak <= available]
-    if fitting:
-        return fitting[0]
-    smaller = [
-        (size[0] - SIDE * i, _side((size[0] - SIDE * i) * size[1] / size[0]))
-        for i in range(1, size[0] // SIDE)
-    ]
-    suits = (
-        each
-        for each in smaller
-        if _plan(stored, each, frames, per_round, LEAST_CHUNK, half).peak <= (available or 0)
+    plan = plan_memory(stored, job, half=half)
+    if plan.fits(free):
+        return
+    found = next(
+        (
+            size
+            for size in _smaller_sizes(job.size)
+            if plan_memory(stored, replace(job, size=size), half=half).fits(free)
+        ),
+        None,
     )
-    found = next(suits, None)
     advice = (
         "no smaller size fits either" if found is None else f"give --size {found[0]}x{found[1]} or smaller"
     )
+    fewer = ", or fewer --frames" if job.frames > job.per_round else ""
+    there = f"{_gb(free.networks or 0)} are free"
+    if not free.shared:
+        there = f"{_gb(free.networks or 0)} of the GPU and {_gb(free.frames or 0)} of main memory are free"
     raise InputError(
-        f"{stored.kind.title} at {size[0]}x{size[1]} needs about {plans[-1]}, and {_gb(available or 0)} are "
-        f"free: {advice}, or take a machine with more memory"
+        f"{stored.kind.title} at {job.size[0]}x{job.size[1]} needs about "
+        f"{_gb(plan.peak(shared=free.shared))} at once ({plan}), and {there}: {advice}{fewer}, "
+        "or take a machine with more memory"
     )
 
 
-def _plan(stored: Stored, size: tuple[int, int], frames: int, per_round: int, chunk: int, half: bool) -> Plan:
-    pixels = size[0] * size[1] // 64
-    width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
-    bytes_ = 2 if half else _FLOAT
-    weights: dict[Part, int] = {part: own.count for part, own in stored.parts.items()}
-    vae = _FLOAT * weights["vae"]
-    made = _RESULT * frames * size[0] * size[1]
-    return Plan(
-        image_encoder=int(_FLOAT * weights["image_encoder"] * _MARGIN),
-        encoder=int(vae + _MARGIN * _FLOAT * _ENCODER * width["vae"] * pixels),
-        unet=int(bytes_ * (weights["unet"] + _MARGIN * _UNET * width["unet"] * pixels * per_round)),
-        decoder=int(vae + made + _MARGIN * _FLOAT * _DECODER * width["vae"] * pixels * min(chunk, frames)),
-        chunk=chunk,
-    )
+def smaller_size(size: tuple[int, int]) -> tuple[int, int]:
+    """About three quarters of a size, whose sides the network can make."""
+    return _side(0.75 * size[0]), _side(0.75 * size[1])
+
+
+def _smaller_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
+    """All of the same shape, the largest first."""
+    widths = range(size[0] - SIDE, 0, -SIDE)
+    return [(width, _side(width * size[1] / size[0])) for width in widths]
 
 
 def _side(length: float) -> int:

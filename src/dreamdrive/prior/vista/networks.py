@@ -55,6 +55,11 @@ class Networks:
         """Of the UNet."""
         return torch.float16 if self.half else torch.float32
 
+    @property
+    def per_round(self) -> int:
+        """Frames that the UNet sees at once; an official single file does not tell, and has 25."""
+        return int(self.stored.parts["unet"].config.get("num_frames", 25))
+
     def unet(self) -> VideoUNet:
         """The UNet."""
         network = self._use("unet")

@@ -1,11 +1,14 @@
-"""A wanted path as Vista is told it: four waypoints in each round."""
+"""A wanted path as Vista is told it, four waypoints in each round; and the path that an action means."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
+from dreamdrive.prior.action_to_path import path_of
 from dreamdrive.prior.path_to_action import from_first, waypoints
-from dreamdrive.scene.action import AT_S, Waypoints
+from dreamdrive.scene.action import AT_S, Steering, Waypoints
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -39,3 +42,18 @@ def asked_path(path: Trajectory, times_s: Float[np.ndarray, " f"]) -> Trajectory
         times_s: Time of each frame since the first that is made.
     """
     return from_first(Trajectory(from_first(path).at(times_s), times_s))
+
+
+def path_by_rounds(action: Waypoints | Steering, spans: Sequence[range], rate_hz: float) -> Trajectory:
+    """The path of all frames that are made where every round is told the same action.
+
+    Args:
+        action: What each round is told.
+        spans: Frames of each round; the action counts from the first of them.
+        rate_hz: Frames a second.
+    """
+    round_ = path_of(action, np.arange(len(spans[0])) / rate_hz).world_from_camera
+    poses = round_
+    for span in spans[1:]:
+        poses = np.concatenate([poses[: span.start], poses[span.start] @ round_])
+    return Trajectory(poses, np.arange(len(poses)) / rate_hz)

@@ -1,8 +1,6 @@
 """Photos as the network wants them: cut to its shape, scaled by Lanczos, their intrinsics with them."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +8,10 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dreamdrive.data.frame import RawFrame
-from dreamdrive.data.images import SUFFIXES, read_image
-from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
+from dreamdrive.data.intrinsics import Calibration
 from dreamdrive.data.lens import Lens, Undistorter
-from dreamdrive.data.select import UNBOUNDED
+from dreamdrive.data.photo import calibration, leading_frames
 from dreamdrive.data.size import Sizing
-from dreamdrive.data.source import open_source
-from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -134,7 +128,7 @@ def read_leading(
     Args:
         path: A photo, a video, or a folder of images at the model's rate.
         count: Frames to take at most.
-        rate_hz: The model's rate, at which a video is sampled.
+        rate_hz: The model's rate, to whose times the nearest frames of a video are taken.
         size: Width and height of the frames.
         intrinsics: Calibration file of the input; a lens in it is taken out of the frames.
         hfov_deg: Horizontal field of view of the input, instead of ``intrinsics``.
@@ -143,15 +137,13 @@ def read_leading(
         InputError: The input cannot be read, is too small, or changes its size.
     """
     check_size(size)
-    if intrinsics is not None and hfov_deg is not None:
-        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
-    raw = list(islice(_raw_frames(path, count, rate_hz), count))
+    raw, said = leading_frames(path, count, rate_hz)
     source = raw[0].size
     if any(each.size != source for each in raw):
         raise InputError(f"{path}: its frames differ in size; expected one size")
     framing = frame(source, size, path.name)
-    lens = guess_camera(source, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, source)
-    notes = [*dict.fromkeys(note for each in raw for note in each.notes), *lens.notes]
+    lens = calibration(source, intrinsics, hfov_deg)
+    notes = [*said, *dict.fromkeys(note for each in raw for note in each.notes), *lens.notes]
     photos = [each.rgb for each in raw]
     if lens.distortion is not None:
         straight = Undistorter.create(
@@ -170,20 +162,6 @@ def read_leading(
     return Leading(frames, replace(lens, camera=framing.camera(lens.camera)), framing, tuple(notes))
 
 
-def _raw_frames(path: Path, count: int, rate_hz: float) -> Iterator[RawFrame]:
-    if not path.exists():
-        raise InputError(f"{path} does not exist; expected a photo, or a video or folder of leading frames")
-    if path.is_file() and path.suffix.lower() in SUFFIXES:
-        yield read_image(path)
-        return
-    source = open_source(path)
-    if isinstance(source, Video):
-        step = max(1, round((source.rate_hz or rate_hz) / rate_hz))
-        yield from source.read(range(0, UNBOUNDED, step))
-    else:
-        yield from source.read(range(min(count, source.count())))
-
-
 def to_images(frames: UInt8[np.ndarray, "n h w 3"]) -> Float[Tensor, "n 3 h w"]:
     """8-bit frames in [-1, 1], channels first."""
     return torch.from_numpy(frames.astype(np.float32)).permute(0, 3, 1, 2).div(127.5).sub(1)
@@ -191,5 +169,6 @@ def to_images(frames: UInt8[np.ndarray, "n h w 3"]) -> Float[Tensor, "n 3 h w"]:
 
 def to_frames(images: Float[Tensor, "n 3 h w"]) -> UInt8[np.ndarray, "n h w 3"]:
     """Frames in 8 bits of images in [-1, 1]; what lies outside is cut off."""
-    bytes_ = images.float().add(1).mul(127.5).clamp(0, 255).round().to(torch.uint8)
-    return bytes_.permute(0, 2, 3, 1).contiguous().numpy()
+    # One after the other: what lies between is as large as the images.
+    bytes_ = [image.float().add(1).mul(127.5).clamp(0, 255).round().to(torch.uint8) for image in images]
+    return torch.stack(bytes_).permute(0, 2, 3, 1).contiguous().numpy()

@@ -66,7 +66,6 @@ def roll_out(
     steps: int,
     *,
     first: Images | None = None,
-    chunk: int = CHUNK,
     tell: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "f c y x"]:
     """Scaled latents of all frames: 25 of the first round, and what each later one adds to its overlap.
@@ -79,7 +78,6 @@ def roll_out(
         actions: For each round.
         steps: Of the sampler in each round.
         first: The first frame as the network is given it beside the noise, where noise was added (SVD).
-        chunk: Frames that are decoded at once.
         tell: Called after each step.
     """
     rounds, count = noise.shape[:2]
@@ -91,7 +89,7 @@ def roll_out(
     made: Tensor | None = None
     for number in range(rounds):
         if made is not None:
-            tail = decode_in_chunks(model.decode, made[-CHUNK:] / SCALE, chunk)
+            tail = decode_in_chunks(model.decode, made[-CHUNK:] / SCALE)
             image = tail[-kind.overlap][None]
             known = made[-kind.overlap :]
             seen = Seen(model.describe(image), known[0] / SCALE, actions[number])

@@ -15,6 +15,7 @@ from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
+from dreamdrive.weights import in_words, misfits, some
 
 EXPECTED = (
     "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert "
@@ -35,7 +36,6 @@ _NEEDED: dict[Part, tuple[str, ...]] = {
 }
 """What of the configuration is used beside the network's making."""
 _SECOND_TIME = "cond_time_embedding."
-_SHOWN = 3
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,12 @@ def _single(path: Path) -> Path:
     return found[0]
 
 
-def _open(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
-    """Shapes by key, and a reader of one tensor."""
+def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
+    """Shapes by key of a ``.safetensors``, and a reader of one tensor.
+
+    Raises:
+        InputError: There is no such file, or it is cut short.
+    """
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {EXPECTED}")
     try:
@@ -135,10 +139,10 @@ def _open(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
 
 
 def _open_file(path: Path) -> Stored:
-    shapes, read = _open(path)
+    shapes, read = open_tensors(path)
     recipes = recipes_of(shapes)
     if recipes.unknown:
-        raise InputError(f"{path} holds unknown tensors: {_some(recipes.unknown)}; expected {EXPECTED}")
+        raise InputError(f"{path} holds unknown tensors: {some(recipes.unknown)}; expected {EXPECTED}")
     kind = _kind_of(path, recipes)
     parts: dict[Part, StoredPart] = {part: _part(path, part, recipes, shapes, read) for part in PARTS}
     return Stored(path, kind, parts, tuple(recipes.ignored))
@@ -185,7 +189,7 @@ def _folder_part(path: Path, part: Part) -> StoredPart:
     config = path / part / "config.json"
     if not there or not config.is_file():
         raise InputError(f"{path / part} lacks config.json or {FILES[part][0]}; expected {EXPECTED}")
-    shapes, read = _open(there[0])
+    shapes, read = open_tensors(there[0])
     # Older versions of transformers stored these counting numbers.
     shapes = {name: shape for name, shape in shapes.items() if not name.endswith(".position_ids")}
     return StoredPart(read_json(config, "--weights"), shapes, read)
@@ -201,29 +205,14 @@ def _check(stored: Stored, part: Part) -> None:
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError(f"{stored.path}: config.json of the {TITLES[part]} is of no use ({error})") from None
     wanted = {name: tuple(value.shape) for name, value in network.state_dict().items()}
-    given = own.shapes
-    groups = {
-        "missing": sorted(set(wanted) - set(given)),
-        "unknown": sorted(set(given) - set(wanted)),
-        "of another shape": [
-            f"{name} is {given[name]}, not {wanted[name]}"
-            for name in sorted(set(wanted) & set(given))
-            if tuple(given[name]) != wanted[name]
-        ],
-    }
-    if trouble := [f"{len(names)} {what}: {_some(names)}" for what, names in groups.items() if names]:
+    if wrong := misfits(wanted, own.shapes):
         raise InputError(
-            f"{stored.path}: the {_blamed(part, groups)} does not fit ({'; '.join(trouble)}); "
-            f"expected {EXPECTED}"
+            f"{stored.path}: the {_blamed(part, wrong)} does not fit ({in_words(wrong)}); expected {EXPECTED}"
         )
 
 
 def _blamed(part: Part, groups: dict[str, list[str]]) -> str:
     """What to call the part that does not fit: of the UNet, the action adapters may be what is missing."""
-    narrow = [name for name in groups["of another shape"] if ".attn2.to_" in name]
+    narrow = [name for name in groups.get("of a wrong shape", []) if ".attn2.to_" in name]
     whole = part != "unet" or not narrow or len(narrow) < sum(len(names) for names in groups.values())
     return TITLES[part] if whole else "set of action adapters"
-
-
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")

@@ -14,6 +14,24 @@ _EPS = 1e-5
 """Of the residual blocks' normalisations in Stability's code; diffusers has 1e-6 in 72 of them."""
 
 
+class _Change:
+    """What a look at a clip adds to the embedding of each frame, for the hooks of the blocks.
+
+    They must not hold the network: it would hold itself by them, and stay in memory after its last use.
+
+    Attributes:
+        value: To add (B T, D); None where no frame is known.
+    """
+
+    value: Tensor | None = None
+
+    def __call__(
+        self, block: nn.Module, args: tuple[Any, ...], kwargs: dict[str, Any]
+    ) -> tuple[tuple[Any, ...], dict[str, Any]] | None:
+        """Before a block: the embedding that frames of a clip share becomes one for each frame."""
+        return None if self.value is None else (args, {**kwargs, "temb": kwargs["temb"] + self.value})
+
+
 class VideoUNet(UNetSpatioTemporalConditionModel):
     """The UNet with a second time embedding, for frames that are known.
 
@@ -22,7 +40,7 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
     """
 
     cond_time_embedding: TimestepEmbedding | None
-    _change: Tensor | None = None
+    _change: _Change
 
     def forward(  # type: ignore[override]
         self,
@@ -44,10 +62,10 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         times = torch.full((len(sample),), time, device=sample.device)
         try:
             if fixed is not None and self.cond_time_embedding is not None and bool(fixed.any()):
-                self._change = self._of_fixed(times[:1], fixed.to(sample)).repeat(len(sample), 1)
+                self._change.value = self._of_fixed(times[:1], fixed.to(sample)).repeat(len(sample), 1)
             made = super().forward(sample, times, context, time_ids, return_dict=False)
         finally:
-            self._change = None
+            self._change.value = None
         return made[0]
 
     def prepare(self, *, fixed_frames: bool) -> "VideoUNet":
@@ -59,12 +77,12 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         for module in self.modules():
             if isinstance(module, ResnetBlock2D | TemporalResnetBlock):
                 module.norm1.eps = module.norm2.eps = _EPS
-        self.cond_time_embedding = None
+        self.cond_time_embedding, self._change = None, _Change()
         if fixed_frames:
             first = self.time_embedding.linear_1
             self.cond_time_embedding = TimestepEmbedding(first.in_features, first.out_features)
             for block in (*self.down_blocks, self.mid_block, *self.up_blocks):
-                block.register_forward_pre_hook(self._changed, with_kwargs=True)
+                block.register_forward_pre_hook(self._change, with_kwargs=True)
         return self
 
     def _of_fixed(self, time: Float[Tensor, "1"], fixed: Float[Tensor, " t"]) -> Float[Tensor, "t d"]:
@@ -73,14 +91,6 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         encoded = self.time_proj(time).to(fixed.dtype)
         change = self.cond_time_embedding(encoded) - self.time_embedding(encoded)
         return fixed[:, None] * change
-
-    def _changed(
-        self, block: nn.Module, args: tuple[Any, ...], kwargs: dict[str, Any]
-    ) -> tuple[tuple[Any, ...], dict[str, Any]] | None:
-        """Before a block: the embedding that frames of a clip share becomes one for each frame."""
-        if self._change is None:
-            return None
-        return args, {**kwargs, "temb": kwargs["temb"] + self._change}
 
 
 def make_unet(config: Mapping[str, Any], *, fixed_frames: bool) -> VideoUNet:

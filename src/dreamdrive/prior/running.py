@@ -1,0 +1,66 @@
+"""What priors have in common while their networks run."""
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from dreamdrive.errors import InputError
+from dreamdrive.prior.protocol import Progress
+
+PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
+"""What priors with a network need, and how to get it."""
+
+
+@contextmanager
+def enough_memory(advice: str) -> Generator[None]:
+    """Work that may find the GPU too small.
+
+    Args:
+        advice: What to do then, for the message.
+
+    Raises:
+        InputError: The GPU has not the memory.
+    """
+    try:
+        yield
+    except torch.OutOfMemoryError as error:
+        raise InputError(f"the GPU's memory does not suffice ({first_line(error)}); {advice}") from error
+
+
+def check_finite(values: Tensor | Shaped[np.ndarray, "..."], what: str) -> None:
+    """Refuse what damaged weights, or numbers too large for their type, lead to.
+
+    Args:
+        values: What a network made.
+        what: What to call it in the message.
+
+    Raises:
+        InputError: A number is NaN or infinite.
+    """
+    finite = torch.isfinite(values).all() if isinstance(values, Tensor) else np.isfinite(values).all()
+    if not bool(finite):
+        raise InputError(
+            f"the model gave {what} that hold NaN or infinite numbers; its weights are damaged, or overflow "
+            "in half precision"
+        )
+
+
+def counted(progress: Progress, total: int) -> Callable[[], None]:
+    """A function to call after each of ``total`` steps."""
+    done = 0
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    return tell
+
+
+def first_line(error: Exception) -> str:
+    """What an error of a library says, as part of a sentence."""
+    return str(error).strip().split("\n")[0].rstrip(".")
