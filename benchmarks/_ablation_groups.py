@@ -46,7 +46,7 @@ def density_labels(
     try:
         from sklearn.cluster import HDBSCAN  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        raise SystemExit("the variant hdbscan needs scikit-learn: pip install scikit-learn") from error
+        raise RuntimeError("the variant hdbscan needs scikit-learn: pip install scikit-learn") from error
     if len(places_m) < smallest:
         return np.full(len(places_m), -1)
     values = np.column_stack([places_m, METRES_PER_S * times_s, METRES_PER_SCORE * scores])

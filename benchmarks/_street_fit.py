@@ -127,6 +127,7 @@ def equal_time(begin: Start, representation: Representation, quality: Quality) -
         ``steps``, and ``hybrid_s``, the seconds of hybrid's whole fit that they follow from.
     """
     short = with_steps(quality, PROBE_STEPS)
+    fit_case(begin, "static", with_steps(quality, 2))  # what a process does once is in neither
     hybrid_s = fit_case(begin, "hybrid", short).cost.of_steps(quality.fit.steps)
     return {"steps": fit_case(begin, representation, short).cost.steps_in(hybrid_s), "hybrid_s": hybrid_s}
 

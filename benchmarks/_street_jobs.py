@@ -153,7 +153,6 @@ def fitted(job: Job) -> tuple[Fitted, dict[str, Any]]:
     plan: dict[str, Any] = {"steps": 0 if job.budget == "equal_time" else steps_of(job.budget)}
     if job.budget == "equal_time":
         plan = kept(job.plan, job.fit_key, lambda: equal_time(begin(), representation, QUALITY))
-        del plan["key"]
     quality = with_steps(QUALITY, plan["steps"])
     return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin(), representation, quality)), plan
 

@@ -19,7 +19,7 @@ def kept(path: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, 
     found = load(path)
     if found is None or found.get("key") != key:
         save(path, key, make())
-    return json.loads(path.read_text())
+    return {name: value for name, value in json.loads(path.read_text()).items() if name != "key"}
 
 
 def save(path: Path, key: str, record: dict[str, Any], features: Features | None = None) -> None:

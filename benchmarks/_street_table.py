@@ -11,6 +11,7 @@ from _street_consistency import FOUND_BY, KINDS, MEASURES
 from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
 from _street_keep import Features
 from _street_recording import CLIP
+from _street_renderer import ASKED
 from _street_views import NEAR_M
 
 CAPTION = """\
@@ -188,6 +189,8 @@ def markdown(report: dict[str, Any]) -> str:
     parts += _captions(report)
     if report.get("mask_iou_by_world"):
         parts.append(_world_lines(report["mask_iou_by_world"]))
+    if report.get("renderer"):
+        parts.append(_renderer_line(report["renderer"]))
     if report.get("seconds"):
         parts.append(_seconds_lines(report["seconds"]))
     parts += [_consistency_lines(table) for table in report.get("consistency", [])]
@@ -247,6 +250,14 @@ def _world_lines(rows: list[dict[str, Any]]) -> str:
     means = [_mean([row.get(name) for row in rows]) for name in names]
     lines.append(["mean", *(number(mean, ".2f") for mean in means)])
     return "## IoU of hybrid's moving mask, world by world\n\n" + grid(lines)
+
+
+def _renderer_line(found: dict[str, Any]) -> str:
+    width, height = found["size"]
+    rates = ", ".join(
+        f"{name} {found[name]:.1f} (asked: {asked:.0f} on two cores)" for name, asked in ASKED.items()
+    )
+    return f"Frames a second of the world's renderer at {width}x{height}, all truth included: {rates}.\n"
 
 
 def _seconds_lines(rows: list[dict[str, Any]]) -> str:

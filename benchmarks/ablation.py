@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -289,6 +290,9 @@ def main() -> int:
     """Fit what is not there yet and print the tables."""
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     options = options_of()
+    if "hdbscan" in options.variants and find_spec("sklearn") is None:
+        print("not measured: hdbscan: pip install scikit-learn", file=sys.stderr)
+        options.variants.remove("hdbscan")
     wanted = cuts(options)
     for cut in wanted:
         if not (options.resume and is_current(cut.result, cut.key)):

@@ -29,14 +29,15 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from _street_case import FRAMES, Poses, References, references_digest
+from _street_case import FRAMES, Poses, References, references_digest, world_digest
 from _street_claims import claims
 from _street_consistency import consistency_tables
 from _street_jobs import BUDGETS, QUALITY, REPRESENTATIONS, SEEDS, Job, in_order, jobs, recorded, run
-from _street_keep import is_current, load, load_features
+from _street_keep import is_current, kept, load, load_features
 from _street_measure import truth_features
 from _street_picture import picture
 from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
+from _street_renderer import frames_a_second
 from _street_table import as_text, markdown, summary
 from _street_views import views_digest
 from _workers import work_off
@@ -88,11 +89,13 @@ def report_of(
     records = [record for job in there if (record := load(job.result)) is not None]
     features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
     truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
+    renderer = kept(runs / "renderer.json", world_digest(seeds[0]), lambda: frames_a_second(seeds[0]))
     report = {
         "frames": FRAMES,
         "machine": native_info(),
         "weights": toolbox.weights,
         "missing": toolbox.missing,
+        "renderer": renderer,
         "rows": records,
         "recording": [record for job in clips if (record := load(job.result)) is not None],
         "consistency": consistency_tables(records),

@@ -63,16 +63,18 @@ def test_steps_at_equal_time_follow_from_both_timed_now(
 ) -> None:
     fits, jobs_of = sys.modules["_street_fit"], sys.modules["_street_jobs"]
     quality = jobs_of.QUALITY
+    asked: list[tuple[str, int]] = []
     costs = {"hybrid": fits.Cost(30, 5.0, 0.1, 1), "hexplane": fits.Cost(30, 8.0, 0.25, 1)}
 
     def timed(begin: None, representation: str, given) -> object:
-        assert given.fit.steps == fits.PROBE_STEPS
-        return fits.Fitted(None, costs[representation])
+        asked.append((representation, given.fit.steps))
+        return fits.Fitted(None, costs.get(representation))
 
     monkeypatch.setattr(fits, "fit_case", timed)
     plan = fits.equal_time(None, "hexplane", quality)
     # Hybrid: 2 s once and 0.1 s a step; hexplane: half a second once and 0.25 s a step.
     whole = 2 + 0.1 * quality.fit.steps
+    assert asked[1:] == [("hybrid", fits.PROBE_STEPS), ("hexplane", fits.PROBE_STEPS)]
     assert plan["hybrid_s"] == pytest.approx(whole)
     assert plan["steps"] == pytest.approx((whole - 0.5) / 0.25, abs=0.5)
     assert costs["hexplane"].of_steps(plan["steps"]) == pytest.approx(whole, rel=0.01)
@@ -340,6 +342,16 @@ def test_tables_tell_frames_time_and_worlds(street: ModuleType) -> None:
     assert "| 1 | 0.75 | - | - | - |" in text
     assert "| mean | 0.50 | - | - | - |" in text
     assert "| hybrid | equal_steps | 60.0 | 70.0 | 60 | no |" in text
+
+
+def test_the_renderer_has_its_line(street: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = sys.modules["_street_renderer"]
+    monkeypatch.setattr(renderer, "FRAMES", 2)
+    monkeypatch.setattr(renderer, "SIZE", (32, 20))
+    found = renderer.frames_a_second(0)
+    assert min(found["antialiased"], found["one_ray"]) > 0
+    text = street.markdown({"tables": [], "renderer": {**found, "antialiased": 12.34}})
+    assert "at 32x20, all truth included: antialiased 12.3 (asked: 10 on two cores), one_ray" in text
 
 
 def test_a_view_without_frames_leaves_its_world_out(street: ModuleType) -> None:
