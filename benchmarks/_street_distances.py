@@ -169,10 +169,10 @@ def _ratio(ours: float, theirs: float, drawn: Float[np.ndarray, " r"] | None) ->
     return {"ours_over_this": value, "ratio_low": low, "ratio_high": high, "undecided": undecided}
 
 
-def _bounds(drawn: Float[np.ndarray, " r"]) -> tuple[float, float]:
-    """Quantiles of what was drawn; not interpolated, since some may be infinite."""
+def _bounds(drawn: Float[np.ndarray, " r"]) -> tuple[float, float] | tuple[None, None]:
+    """Quantiles of what was drawn, not interpolated, as some may be infinite; None if the upper one is."""
     low, high = np.quantile(drawn, [TAIL, 1 - TAIL], method="inverted_cdf")
-    return float(low), float(high)
+    return (float(low), float(high)) if np.isfinite(high) else (None, None)
 
 
 def _interval(value: float, drawn: Float[np.ndarray, " r"]) -> tuple[float, float]:

@@ -117,7 +117,9 @@ def test_ratios_have_the_quantiles_that_were_drawn(distances: ModuleType) -> Non
     drawn[-4:] = np.inf  # the other without any excess, in a hundredth of the draws
     assert distances._ratio(0.8, 1.0, drawn)["ratio_high"] < 1.1
     drawn[-40:] = np.inf
-    assert distances._ratio(0.8, 1.0, drawn)["undecided"]
+    unbounded = distances._ratio(0.8, 1.0, drawn)
+    assert unbounded["undecided"]
+    assert unbounded["ratio_high"] is None
 
 
 def test_intervals_of_ratios_hold_the_true_ratio(
