@@ -1,8 +1,9 @@
 """What the street benchmark fits: seeded worlds, seen and understood in several ways."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -12,21 +13,17 @@ from jaxtyping import UInt8
 from dreamdrive.data.corruption import corrupt, parse_corruption
 from dreamdrive.data.intrinsics import guess_camera
 from dreamdrive.data.select import held_out_mask
-from dreamdrive.data.world import Drive, WorldBox, make_street
+from dreamdrive.data.world import Drive, make_street
 from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.scene.atomic import new_file
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.similarity import Similarity
-from dreamdrive.stages import Stages, stage_seed
+from dreamdrive.stages import Stages, digest, stage_seed
 
 FRAMES, RATE_HZ, SIZE, HOLD_OUT = 24, 10.0, (320, 192), 8
-SHIFTS_M = (1.0, 2.0, 3.0)
 Poses = Literal["true", "estimated", "unknown_focal"]
 References = Literal["clean", "corrupted"]
 VIEWS = ("held_out", "shift_1", "shift_2", "shift_3", "raise_1", "yaw_10")
@@ -63,12 +60,40 @@ def world_of(seed: int) -> Drive:
     return make_street(seed, FRAMES, RATE_HZ, SIZE)
 
 
+@cache
+def world_digest(seed: int) -> str:
+    """Of the drive as it is drawn: another layout, path or renderer gives another one."""
+    made = world_of(seed)
+    drawn = hashlib.sha256(made.frames.tobytes() + made.depth_m.tobytes() + made.moving.tobytes())
+    poses = made.trajectory.world_from_camera.tolist()
+    return digest([drawn.hexdigest(), poses, made.times_s.tolist(), made.cameras[0].fx_px])
+
+
+@lru_cache(maxsize=2)
+def references_of(seed: int, references: References) -> UInt8[np.ndarray, "f h w 3"]:
+    """The frames that a scene is made from."""
+    made = world_of(seed)
+    if references == "clean":
+        return made.frames
+    return corrupt(made.frames, parse_corruption("generated", seed), made.depth_m)
+
+
+@cache
+def references_digest(seed: int, references: References) -> str:
+    """Of the frames that a scene is made from, and of the drive behind them."""
+    frames = hashlib.sha256(references_of(seed, references).tobytes()).hexdigest()
+    return digest([frames, world_digest(seed)])
+
+
+def case_digest(case: Case) -> str:
+    """Of everything a case's clip is made from."""
+    return digest([case, HOLD_OUT, references_digest(case.seed, case.references)])
+
+
 def clip_of(case: Case) -> Clip:
     """The frames as a prior would hand them over."""
     made = world_of(case.seed)
-    frames = made.frames
-    if case.references == "corrupted":
-        frames = corrupt(frames, parse_corruption("generated", case.seed), made.depth_m)
+    frames = references_of(case.seed, case.references)
     pinhole = made.cameras[0].at(np.eye(4))
     if case.geometry == "unknown_focal":
         pinhole = guess_camera(SIZE).camera
@@ -88,8 +113,7 @@ def clip_of(case: Case) -> Clip:
 
 def start(case: Case, quality: Quality, folder: Path) -> Start:
     """Geometry, seeds and static fit of a case, kept in the folder."""
-    about = [case.name, FRAMES, SIZE, world_of(case.seed).frames[0].mean().item()]
-    return prepare(lambda: clip_of(case), about, quality, folder / case.name)
+    return prepare(lambda: clip_of(case), [case_digest(case)], quality, folder / case.name)
 
 
 def prepare(
@@ -123,77 +147,3 @@ def prepare(
         lambda tell: fit_static(clip, geometry, seeds, quality.static, number, tell),
     )
     return Start(clip, geometry, seeds, static)
-
-
-def to_scene(camera: Camera, similarity: Similarity) -> Camera:
-    """A camera of the true world in that of a scene; what it sees is the same."""
-    pose = np.eye(4)
-    pose[:3, :3] = similarity.rotation.T @ camera.world_from_camera[:3, :3]
-    away = camera.world_from_camera[:3, 3] - similarity.translation
-    pose[:3, 3] = similarity.rotation.T @ away / similarity.scale
-    return camera.at(pose)
-
-
-def true_cameras(seed: int, view: str) -> list[Camera]:
-    """The cameras of a view in the true world, one a frame.
-
-    Shifts go to the side on which the boxes are further away: to the left or to the right.
-    """
-    made = world_of(seed)
-    if view.startswith("shift"):
-        metres = float(view[-1])
-        offset = np.array([metres * _free_side(made, metres), 0.0, 0.0])
-        return [_moved(camera, offset) for camera in made.cameras]
-    if view == "raise_1":
-        return [_moved(camera, np.array([0.0, -1.0, 0.0])) for camera in made.cameras]
-    if view == "yaw_10":
-        cos, sin = np.cos(np.deg2rad(10)), np.sin(np.deg2rad(10))
-        turn = np.eye(4)
-        turn[:3, :3] = [[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]
-        return [camera.at(camera.world_from_camera @ turn) for camera in made.cameras]
-    return list(made.cameras)
-
-
-def _moved(camera: Camera, offset_m: np.ndarray) -> Camera:
-    pose = camera.world_from_camera.copy()
-    pose[:3, 3] += pose[:3, :3] @ offset_m
-    return camera.at(pose)
-
-
-def _free_side(made: Drive, metres: float) -> int:
-    """1 for right, -1 for left: where the nearest box is further away."""
-
-    def clearance_m(side: int) -> float:
-        offset = np.array([side * metres, 0.0, 0.0])
-        centres = [_moved(camera, offset).world_from_camera[:3, 3] for camera in made.cameras]
-        gaps = [_gap_m(box, k, centre) for box in made.boxes for k, centre in enumerate(centres)]
-        return min(gaps, default=np.inf)
-
-    return 1 if clearance_m(1) > clearance_m(-1) else -1
-
-
-def _gap_m(box: WorldBox, frame: int, point: np.ndarray) -> float:
-    """Distance on the ground of a point from a box."""
-    local = _local(box.world_from_box[frame], point)[:2]
-    return float(np.hypot(*np.maximum(np.abs(local) - box.size_m[:2] / 2, 0)))
-
-
-def _local(pose: np.ndarray, point: np.ndarray) -> np.ndarray:
-    return pose[:3, :3].T @ (point - pose[:3, 3])
-
-
-def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 3"]:
-    """What those cameras see, kept in the folder; of the recorded path the frames themselves."""
-    made = world_of(seed)
-    if view == "held_out":
-        return made.frames
-    path = folder / f"truth-{seed}-{view}.npz"
-    if path.exists():
-        with np.load(path) as kept:
-            if kept["first"] == made.frames[0].astype(np.int64).sum():
-                return kept["frames"]
-    seen = made.views(true_cameras(seed, view), made.times_s.tolist())
-    frames = np.stack([v.frame for v in seen])
-    with new_file(path) as partial:
-        np.savez_compressed(partial, frames=frames, first=made.frames[0].astype(np.int64).sum())
-    return frames

@@ -71,14 +71,16 @@ def _distances(table: dict[str, Any]) -> Iterator[Claim]:
         return
     for row in table["distances_compared"]:
         video = row["network"] in VIDEO_NETWORKS
-        if video and row["against"] == "static":
+        if not row["projected"] or (video and row["against"] == "static"):
             continue
         most = VIDEO_RATIO if video else IMAGE_RATIO_TO_STATIC if row["against"] == "static" else IMAGE_RATIO
         span = "" if row["ratio_low"] is None else f" ({row['ratio_low']:.2f} to {row['ratio_high']:.2f})"
         yield Claim(
             f"{_name(table)}: {row['network']}, excess over that of {row['against']}",
             f"at most {most}",
-            f"{row['ours_over_this']:.2f}{span}",
+            "the other has no excess"
+            if row["ours_over_this"] is None
+            else f"{row['ours_over_this']:.2f}{span}",
             None if row["undecided"] else row["ours_over_this"] <= most,
         )
 

@@ -1,21 +1,22 @@
 """Whether a rendered drive is more consistent than the references it was made from."""
 
-import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _street_case import Case, References, clip_of, true_cameras, world_of
-from _street_fit import frames_of
+from _street_case import Case, References, references_digest, references_of, world_of
+from _street_keep import kept
+from _street_measure import frames_of
+from _street_views import true_cameras
 from jaxtyping import UInt8
 
 from dreamdrive.evaluate.consistency import Consistency, evaluate_consistency
-from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 
-Figures = dict[str, float | None]
+Figures = dict[str, float | str | None]
 MEASURES = {
     "ate_percent": "path: distance (ATE), %",
     "translation_percent": "path: translation (RPE), %",
@@ -27,6 +28,9 @@ MEASURES = {
     "warp_4": "the same, 4 apart",
     "warp_8": "the same, 8 apart",
 }
+PATH_MEASURES = tuple(name for name, text in MEASURES.items() if text.startswith("path"))
+FOUND_BY = "found_by"
+"""What found the path in a video; paths are compared where it is the same in all three."""
 KINDS = ("truth", "references", "rendered")
 SHARPNESS = "sharpness"
 RESAMPLES = 2000
@@ -58,9 +62,9 @@ def sharpness(frames: UInt8[np.ndarray, "f h w 3"]) -> float:
 
 
 def flat(found: Consistency) -> Figures:
-    """By name, all of them lower where better; None where nothing was measured."""
-    figures: Figures = {}
-    for name in ("ate_percent", "translation_percent", "rotation_deg_per_m"):
+    """By name, all numbers lower where better; None where nothing was measured."""
+    figures: Figures = {FOUND_BY: found.found_by}
+    for name in PATH_MEASURES:
         figures[name] = None if found.path is None else getattr(found.path, name)
     for at in found.gaps:
         share = None if at.epipolar is None else at.epipolar.share
@@ -71,13 +75,10 @@ def flat(found: Consistency) -> Figures:
 
 def _of_frames(seed: int, references: References, runs: Path) -> Figures:
     """Errors of the references of a world, kept."""
-    path = runs / "truth" / f"consistency-{seed}-{references}.json"
-    if not path.exists():
-        frames = clip_of(Case(seed, "true", references)).frames
-        found = errors_of(frames, seed, world_of(seed).cameras[0])
-        with new_file(path) as partial:
-            partial.write_text(json.dumps(found, indent=1) + "\n")
-    return json.loads(path.read_text())
+    path, key = runs / "truth" / f"consistency-{seed}-{references}.json", references_digest(seed, references)
+    return kept(
+        path, key, lambda: errors_of(references_of(seed, references), seed, world_of(seed).cameras[0])
+    )
 
 
 def consistency_tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -89,12 +90,16 @@ def consistency_tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
         rows = [row for name in MEASURES if (row := _row(name, found)) is not None]
         halved = [row["measure"] for row in rows if row["ratio"] <= 0.5]
         sharp = {kind: float(np.mean([world[kind][SHARPNESS] for world in found])) for kind in KINDS}
-        tables.append({"geometry": geometry, "rows": rows, "at_most_half": halved, SHARPNESS: sharp})
+        methods = {kind: dict(Counter(str(world[kind][FOUND_BY]) for world in found)) for kind in KINDS}
+        table = {"geometry": geometry, "rows": rows, "at_most_half": halved, SHARPNESS: sharp}
+        tables.append({**table, FOUND_BY: methods})
     return tables
 
 
 def _row(name: str, found: list[dict[str, Figures]]) -> dict[str, Any] | None:
-    """One measure, over the worlds in which all three have it."""
+    """One measure, over the worlds in which all three have it, of paths found in one way."""
+    if name in PATH_MEASURES:
+        found = [world for world in found if len({world[kind][FOUND_BY] for kind in KINDS}) == 1]
     known = [[world[kind][name] for kind in KINDS] for world in found]
     values = np.array([row for row in known if None not in row], dtype=np.float64)
     if not len(values):

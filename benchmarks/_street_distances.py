@@ -11,18 +11,17 @@ from typing import Any
 
 import numpy as np
 from _street_case import NOVEL
-from _street_fit import Features
+from _street_keep import Features
 from jaxtyping import Float
 
-from dreamdrive.evaluate.bootstrap import frechet_ratio, frechet_with_interval
+from dreamdrive.evaluate.bootstrap import half_distances
+from dreamdrive.evaluate.frechet import frechet_distance
 
 COMPONENTS = 64
 """Principal components that are kept, at most."""
 SAMPLES_EACH = 4
 """True samples a component must have: halves, which floors are measured by, then have two."""
-OFFICIAL = ("fid", "fvd")
-"""Distances with a name of their own, which are given in all dimensions as well."""
-RESAMPLES = 200
+RESAMPLES = 400
 TAIL = 0.025
 """Share of the resamples beyond each end of an interval."""
 SPLITS = 40
@@ -57,7 +56,7 @@ def networks_of(truth: Worlds) -> list[str]:
 def bases_of(truth: Worlds) -> dict[str, Basis]:
     """The basis of each network, from the true novel views of all worlds."""
     worlds = {name: [pooled(found, name) for found in truth.values()] for name in networks_of(truth)}
-    return {name: principal(np.concatenate(rows)) for name, rows in worlds.items()}
+    return {name: principal(np.concatenate([r for r in rows if len(r)])) for name, rows in worlds.items()}
 
 
 def principal(rows: Float[np.ndarray, "n d"]) -> Basis:
@@ -71,7 +70,8 @@ def principal(rows: Float[np.ndarray, "n d"]) -> Basis:
 
 def pooled(features: Features, network: str) -> Float[np.ndarray, "n d"]:
     """All novel views of a world together: frames of image networks, windows of video networks."""
-    return np.concatenate([features[f"{network}/{view}"] for view in NOVEL])
+    there = [features[key] for view in NOVEL if (key := f"{network}/{view}") in features]
+    return np.concatenate(there) if there else np.zeros((0, 0))
 
 
 def distance_rows(ours: str, fits: dict[str, Worlds], truth: Worlds, bases: dict[str, Basis]) -> list[Row]:
@@ -90,25 +90,28 @@ def distance_rows(ours: str, fits: dict[str, Worlds], truth: Worlds, bases: dict
         return []
     rows: list[Row] = []
     for network, basis in bases.items():
-        real = [pooled(truth[seed], network) for seed in worlds]
-        fake = {name: [pooled(found[seed], network) for seed in worlds] for name, found in fits.items()}
-        if network in OFFICIAL:
-            rows += _in_all_dimensions(network, ours, real, fake)
+        there = [seed for seed in worlds if len(pooled(truth[seed], network))]
+        if not there:
+            continue
+        real = [pooled(truth[seed], network) for seed in there]
+        fake = {name: [pooled(found[seed], network) for seed in there] for name, found in fits.items()}
         shown = {name: [basis.project(clip) for clip in clips] for name, clips in fake.items()}
         rows += _projected(network, ours, [basis.project(clip) for clip in real], shown)
-    return rows
+        rows += _in_all_dimensions(network, ours, real, fake)
+    return sorted(rows, key=lambda row: not row["projected"])
 
 
 def _in_all_dimensions(network: str, ours: str, real: Clips, fake: dict[str, Clips]) -> list[Row]:
     """Values alone: an interval would take minutes a row."""
+    truth, pools = np.concatenate(real), {name: np.concatenate(clips) for name, clips in fake.items()}
+    rng = np.random.default_rng(0)
+    floor, halves = half_distances(truth, tuple(pools.values()), frechet_distance, rng)
+    half = dict(zip(pools, halves, strict=True))
     rows: list[Row] = []
-    for name, clips in fake.items():
-        figure = frechet_with_interval(real, clips, paired=True, resamples=0)
-        row = _row(network, name, real, figure.value, figure.half, figure.floor, projected=False)
-        if name != ours:
-            found = frechet_ratio(real, fake[ours], clips, resamples=0)
-            row |= _ratio(found.a - found.floor, found.b - found.floor, None)
-        rows.append(row)
+    for name, rows_of in pools.items():
+        whole = frechet_distance(truth, rows_of)
+        row = _row(network, name, real, whole, half[name], floor, projected=False)
+        rows.append(row if name == ours else row | _ratio(half[ours] - floor, half[name] - floor, None))
     return rows
 
 
@@ -160,9 +163,16 @@ def _ratio(ours: float, theirs: float, drawn: Float[np.ndarray, " r"] | None) ->
     if theirs <= 0:
         return {"ours_over_this": None, "ratio_low": None, "ratio_high": None, "undecided": True}
     value = float(ours / theirs)
-    low, high = (None, None) if drawn is None else _interval(value, drawn)
+    # As drawn: moved onto the value, an interval would leave out a 1 that the resamples hold.
+    low, high = (None, None) if drawn is None else _bounds(drawn)
     undecided = low is None or high is None or low <= 1 <= high
     return {"ours_over_this": value, "ratio_low": low, "ratio_high": high, "undecided": undecided}
+
+
+def _bounds(drawn: Float[np.ndarray, " r"]) -> tuple[float, float] | tuple[None, None]:
+    """Quantiles of what was drawn, not interpolated, as some may be infinite; None if the upper one is."""
+    low, high = np.quantile(drawn, [TAIL, 1 - TAIL], method="inverted_cdf")
+    return (float(low), float(high)) if np.isfinite(high) else (None, None)
 
 
 def _interval(value: float, drawn: Float[np.ndarray, " r"]) -> tuple[float, float]:
@@ -186,11 +196,14 @@ class Halves:
     def ratios(self, ours: str, theirs: str) -> Float[np.ndarray, " r"] | None:
         """Excess of one over the floor as a share of another's, of each draw.
 
-        None where the other has none in so many draws that the ratio has no bounds.
+        Infinite in a draw in which the other has none; None where that is so often that the ratio has no
+        bounds.
         """
         floor = self.half[REAL]
         excess = self.half[theirs] - floor
-        return (self.half[ours] - floor) / excess if np.quantile(excess, TAIL) > 0 else None
+        if np.quantile(excess, TAIL) <= 0:
+            return None
+        return np.where(excess > 0, (self.half[ours] - floor) / np.where(excess > 0, excess, 1), np.inf)
 
 
 def by_halves(

@@ -1,59 +1,91 @@
-"""One fit of the street benchmark: a representation on a case, its views, and how good they are."""
+"""One fit of the street benchmark: a representation on a case, what it costs, and its scene on disk."""
 
-import json
+import shutil
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
-from _street_case import VIEWS, Case, Start, to_scene, true_cameras, true_frames, world_of
-from jaxtyping import Float, UInt8
+from _street_case import Start
+from _street_keep import is_current, load, save
+from _workers import threads
 
+from dreamdrive import __version__
 from dreamdrive.decompose import cast, error_maps, group, score
-from dreamdrive.evaluate.decomposition import evaluate_decomposition
-from dreamdrive.evaluate.extractors import Extractor
-from dreamdrive.evaluate.truth import Truth
-from dreamdrive.evaluate.video import windows
+from dreamdrive.decompose.group import Grouping
 from dreamdrive.fit import Parts, Representation, fit
-from dreamdrive.held_out import likeness
 from dreamdrive.options import Quality
-from dreamdrive.scene.atomic import new_file
+from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
-from dreamdrive.scene.similarity import fit_similarity
-from dreamdrive.splat.scene_view import render_scene
-from dreamdrive.stages import Progress, stage_seed
+from dreamdrive.stages import stage_seed
 
-WINDOW, STRIDE = 16, 2
-Features = dict[str, Float[np.ndarray, "n d"]]
-"""Of each network and view, by ``NETWORK/VIEW``."""
+PROBE_STEPS = 30
+Vote = Callable[[Start, torch.Tensor, Quality], Grouping]
+"""From the scores of the seeds to what of them is dynamic, and in which thing."""
+Scale = Callable[[np.ndarray, Quality], np.ndarray]
+"""From error maps (F, H, W) to those that the scores are trained on."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a fit cost beyond the static one, which all share.
+
+    Seconds are the processor's, summed over threads: what else runs on the machine counts little, and with a
+    core for each worker they are those of a clock.
+
+    Attributes:
+        steps: Steps of the joint fit.
+        seconds: Of decomposition and joint fit.
+        step_s: A step, without what is done once.
+        threads: On how many it was measured.
+    """
+
+    steps: int
+    seconds: float
+    step_s: float
+    threads: int
+
+    def of_steps(self, steps: int) -> float:
+        """Seconds that another number of steps would take."""
+        return self.seconds + (steps - self.steps) * self.step_s
+
+    def steps_in(self, seconds: float) -> int:
+        """Steps that take so many seconds, what is done once included; at least one."""
+        return max(1, self.steps + round((seconds - self.seconds) / self.step_s))
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A scene and what it cost beyond the static fit.
-
-    Attributes:
-        scene: The result.
-        steps: Steps of the joint fit.
-        seconds: Of decomposition and joint fit. They are the processor's, summed over threads: what else runs
-            on the machine does not count, and with a core for each worker they are those of a clock.
-        step_s: Of the joint fit, a step.
-    """
+    """A scene and what it cost."""
 
     scene: Scene
-    steps: int
-    seconds: float
-    step_s: float
+    cost: Cost
 
 
-def fit_case(begin: Start, representation: Representation, quality: Quality, tell: Progress) -> Fitted:
+def own_vote(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+    """Hybrid's grouping."""
+    return group(begin.clip, begin.geometry, begin.seeds, scores, quality.group)
+
+
+def own_scale(errors: np.ndarray, quality: Quality) -> np.ndarray:
+    """Hybrid's errors: absolute."""
+    return errors
+
+
+def fit_case(
+    begin: Start,
+    representation: Representation,
+    quality: Quality,
+    vote: Vote = own_vote,
+    scale: Scale = own_scale,
+) -> Fitted:
     """Decompose, if the representation does, and fit."""
     at = time.process_time()
-    parts = _parts(begin, representation, quality)
-    from_here = time.process_time()
+    parts = _parts(begin, representation, quality, vote, scale)
+    steps_at: list[float] = []
     scene = fit(
         begin.clip,
         begin.geometry,
@@ -63,13 +95,14 @@ def fit_case(begin: Start, representation: Representation, quality: Quality, tel
         quality.motion(representation),
         quality.densify,
         stage_seed(0, "fit"),
-        tell,
+        lambda *_: steps_at.append(time.process_time()),
     )
     end = time.process_time()
-    return Fitted(scene, quality.fit.steps, end - at, (end - from_here) / quality.fit.steps)
+    step_s = (steps_at[-1] - steps_at[0]) / max(len(steps_at) - 1, 1)
+    return Fitted(scene, Cost(quality.fit.steps, end - at, step_s, threads()))
 
 
-def _parts(begin: Start, representation: Representation, quality: Quality) -> Parts:
+def _parts(begin: Start, representation: Representation, quality: Quality, vote: Vote, scale: Scale) -> Parts:
     fitted, nothing = begin.static.gaussians, torch.zeros(0, dtype=torch.int64)
     if representation == "static":
         return Parts(fitted, fitted.select(nothing), None, ())
@@ -77,98 +110,62 @@ def _parts(begin: Start, representation: Representation, quality: Quality) -> Pa
         return Parts(begin.seeds.select(nothing), fitted, None, ())
     clip, geometry, seeds = begin.clip, begin.geometry, begin.seeds
     sky, exposure = begin.static.sky, begin.static.exposure
-    errors = error_maps(clip, geometry, fitted, sky, exposure, quality.score.error)
+    errors = scale(error_maps(clip, geometry, fitted, sky, exposure, quality.score.error), quality)
     scores = score(clip, geometry, seeds, errors, quality.score, stage_seed(0, "score"), lambda *_: None)
-    grouping = group(clip, geometry, seeds, scores, quality.group)
+    grouping = vote(begin, scores, quality)
     moving = cast(clip, geometry, seeds, grouping, quality.cast)
     return Parts(fitted.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)
 
 
-def frames_of(scene: Scene, seed: int, view: str) -> UInt8[np.ndarray, "f h w 3"]:
-    """What a scene shows where a view's true cameras are; of held-out frames from its own cameras."""
-    similarity = fit_similarity(scene.cameras, world_of(seed).cameras)
-    pictures: list[np.ndarray] = []
-    for own, camera, t_s in zip(scene.cameras, true_cameras(seed, view), scene.times_s, strict=True):
-        # The focal length is the scene's own: with another one the same pixels would show other things.
-        wanted = own if view == "held_out" else own.at(to_scene(camera, similarity).world_from_camera)
-        colour = render_scene(scene, wanted, float(t_s)).colour
-        pictures.append((colour.clamp(0, 1) * 255).round().to(torch.uint8).numpy())
-    return np.stack(pictures)
+def equal_time(begin: Start, representation: Representation, quality: Quality) -> dict[str, Any]:
+    """Steps of a representation in the time of hybrid, both timed now, one after the other.
+
+    A fit of ``PROBE_STEPS`` steps passes through all phases of a long one; what is done once, such as the
+    decomposition, is counted once.
+
+    Returns:
+        ``steps``, and ``hybrid_s``, the seconds of hybrid's whole fit that they follow from.
+    """
+    short = with_steps(quality, PROBE_STEPS)
+    fit_case(begin, "static", with_steps(quality, 2))  # what a process does once is in neither
+    hybrid_s = fit_case(begin, "hybrid", short).cost.of_steps(quality.fit.steps)
+    return {"steps": fit_case(begin, representation, short).cost.steps_in(hybrid_s), "hybrid_s": hybrid_s}
 
 
-def measure(
-    fitted: Fitted, case: Case, extractors: list[Extractor], folder: Path
-) -> tuple[dict[str, Any], Features, UInt8[np.ndarray, "h w 3"]]:
-    """Figures of each view against the clean truth, the features of the novel ones, and a picture."""
-    views: dict[str, Any] = {}
-    features: Features = {}
-    middle = np.zeros((1, 1, 3), dtype=np.uint8)
-    whole = np.ones(world_of(case.seed).depth_m.shape[1:], dtype=bool)
-    for view in VIEWS:
-        truth, shown = true_frames(case.seed, view, folder), frames_of(fitted.scene, case.seed, view)
-        chosen = np.flatnonzero(fitted.scene.held_out) if view == "held_out" else np.arange(len(truth))
-        found = [likeness(shown[k].astype(np.float32) / 255, truth[k], whole) for k in chosen]
-        views[view] = {
-            "psnr": float(np.mean([f.psnr for f in found])),
-            "ssim": float(np.mean([f.ssim for f in found])),
-        }
-        if view != "held_out":
-            features |= {f"{name}/{view}": rows for name, rows in features_of(shown, extractors).items()}
-        if view == "shift_2":
-            middle = shown[len(shown) // 2]
-    return views, features, middle
+def options_of(quality: Quality, representation: Representation) -> dict[str, Any]:
+    """All options that a fit of a representation depends on, for a digest."""
+    names = ["static", "fit", "seeds", "densify"]
+    names += ["score", "group", "cast"] if representation == "hybrid" else []
+    used = {name: asdict(getattr(quality, name)) for name in names}
+    return {**used, "motion": asdict(quality.motion(representation)), "version": __version__}
 
 
-def features_of(frames: UInt8[np.ndarray, "f h w 3"], extractors: list[Extractor]) -> Features:
-    """By the name of the Fréchet distance: a row a frame, or a row a window."""
-    found: Features = {}
-    for extractor in extractors:
-        if extractor.window:
-            rows = [extractor.features(part) for part in windows(torch.from_numpy(frames), WINDOW, STRIDE)]
-            found[extractor.frechet] = np.concatenate(rows)
-        else:
-            found[extractor.frechet] = extractor.features(torch.from_numpy(frames))
-    return found
+def kept_fit(folder: Path, key: str, make: Callable[[], Fitted]) -> Fitted:
+    """The scene in a folder if it is of this key, else a new one, which is kept there.
+
+    Either way it is the one read from the disk, so that what is measured does not depend on when.
+    """
+    about = folder.with_name(f"{folder.name}.json")
+    if not (is_current(about, key) and folder.exists()):
+        about.unlink(missing_ok=True)
+        made = make()
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        save_scene(made.scene, folder, replace=True)
+        save(about, key, asdict(made.cost))
+    found = load(about)
+    assert found is not None
+    del found["key"]
+    return Fitted(load_scene(folder), Cost(**found))
+
+
+def forget_fit(folder: Path) -> None:
+    """Remove a scene that was kept, so that it is fitted again."""
+    folder.with_name(f"{folder.name}.json").unlink(missing_ok=True)
+    if folder.exists():
+        shutil.rmtree(folder)
 
 
 def with_steps(quality: Quality, steps: int, static_steps: int | None = None) -> Quality:
     """The same with other numbers of steps."""
     static = quality.static if static_steps is None else replace(quality.static, steps=static_steps)
     return replace(quality, fit=replace(quality.fit, steps=steps), static=static)
-
-
-def told_apart(fitted: Fitted, case: Case) -> dict[str, Any]:
-    """How well static and moving are told apart, and how much the static street moves."""
-    found = evaluate_decomposition(fitted.scene, Truth.of(world_of(case.seed)))
-    return {
-        "mask_iou": found.mask.iou,
-        "label_iou": found.labels.iou,
-        "fake_m": None if found.fake is None else found.fake.mean_m,
-        "path_rms_m": found.path_rms_m,
-        "scale": found.scale,
-    }
-
-
-def keep_picture(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
-    """For the grid."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
-
-
-def save(path: Path, record: dict[str, Any], features: Features) -> None:
-    """The record as JSON and the features beside it; the JSON last, as it says that all is there."""
-    with new_file(path.with_suffix(".npz")) as partial:
-        np.savez_compressed(partial, **features)
-    with new_file(path) as partial:
-        partial.write_text(json.dumps(record, indent=1) + "\n")
-
-
-def load(path: Path) -> dict[str, Any] | None:
-    """The record, if the fit is finished."""
-    return json.loads(path.read_text()) if path.exists() else None
-
-
-def load_features(path: Path) -> Features:
-    """The features of a finished fit."""
-    with np.load(path.with_suffix(".npz")) as kept:
-        return {name: kept[name] for name in kept.files}

@@ -1,31 +1,32 @@
 """Which fits the street benchmark makes, in which order, and one of them."""
 
 import argparse
-import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from _street_case import NOVEL, Case, Poses, References, start, true_frames
+from _street_case import Case, Poses, References, case_digest, start
 from _street_consistency import consistency_of
 from _street_fit import (
-    Features,
-    features_of,
+    PROBE_STEPS,
+    Fitted,
+    equal_time,
     fit_case,
-    keep_picture,
-    load,
-    load_features,
-    measure,
-    save,
-    told_apart,
+    forget_fit,
+    kept_fit,
+    options_of,
     with_steps,
 )
+from _street_keep import kept, save
+from _street_measure import keep_picture, measure, networks_key, told_apart, truth_features
 from _street_recording import Recorded, recording
-from _workers import threads
+from _street_views import views_digest
 
 from dreamdrive.evaluate.extractors import Toolbox
 from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES
+from dreamdrive.stages import digest
 
 SEEDS = tuple(range(8))
 REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
@@ -43,7 +44,7 @@ PLAN: tuple[tuple[str, Poses, References], ...] = (
     ("equal_time", "true", "clean"),
     ("five_times", "true", "corrupted"),
 )
-"""Budget, poses and references of each table, the most telling first; equal time follows from equal steps."""
+"""Budget, poses and references of each table, the most telling first."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,39 @@ class Job:
         return self.runs / "fits" / f"{self.name}.json"
 
     @property
+    def scene(self) -> Path:
+        """Where its scene is kept, which a changed measurement takes again."""
+        return self.runs / "scenes" / self.name
+
+    @property
+    def plan(self) -> Path:
+        """Where the steps at equal time are kept, so that a fit that was interrupted takes the same."""
+        return self.runs / "scenes" / f"{self.name}.plan.json"
+
+    @property
     def has_distances(self) -> bool:
         """Whether its views count in distances between sets: these are for the main tables, and take long."""
         return self.budget == "equal_steps" and self.case.geometry != "unknown_focal"
 
-    def with_equal_steps(self, representation: Representation) -> "Job":
-        """The fit of the same case by steps."""
-        return Job(self.case, representation, "equal_steps", self.runs)
+    @property
+    def fit_key(self) -> str:
+        """Of everything the scene follows from: world, corruption, options, and the rule for its steps."""
+        rule: list[object] = [steps_of(self.budget)]
+        if self.budget == "equal_time":
+            rule = [self.budget, PROBE_STEPS, options_of(QUALITY, "hybrid")]
+        options = options_of(QUALITY, self.representation)
+        return digest([case_digest(self.case), self.representation, rule, options])
+
+    def key(self, toolbox: Toolbox) -> str:
+        """Of everything its figures follow from."""
+        networks = networks_key(toolbox) if self.has_distances else []
+        return digest([self.fit_key, views_digest(self.case.seed), networks])
+
+    def forget(self) -> None:
+        """Remove all that is kept of it."""
+        for path in (self.result, self.plan):
+            path.unlink(missing_ok=True)
+        forget_fit(self.scene)
 
 
 def jobs(options: argparse.Namespace) -> Iterator[Job]:
@@ -110,60 +137,48 @@ def in_order(street: list[Job], clips: list[Recorded]) -> list[Job | Recorded]:
     return [*first, *clips, *(job for job in street if job.budget != "equal_steps")]
 
 
-def steps_of(job: Job) -> int:
-    """Steps of the joint fit."""
+def steps_of(budget: str) -> int:
+    """Steps of the joint fit, where they do not follow from its time."""
     base = QUALITY.fit.steps
-    if job.budget == "equal_steps":
-        return base
-    if job.budget == "five_times":
-        return TIMES * (QUALITY.static.steps + base) - QUALITY.static.steps
-    ours = load(job.with_equal_steps("hybrid").result)
-    theirs = load(job.with_equal_steps(job.representation).result)
-    if ours is None or theirs is None:
-        raise FileNotFoundError(f"{job.name}: steps at equal time follow from both fits at equal steps")
-    if ours["threads"] != theirs["threads"]:
-        raise ValueError(f"{job.name}: its fits at equal steps were timed on different numbers of threads")
-    return max(1, round(ours["seconds"] / theirs["step_s"]))
+    return base if budget == "equal_steps" else TIMES * (QUALITY.static.steps + base) - QUALITY.static.steps
+
+
+def fitted(job: Job) -> tuple[Fitted, dict[str, Any]]:
+    """The scene, from the disk if it is there, and how its number of steps was found."""
+    case, representation = job.case, job.representation
+
+    def begin():
+        return start(case, QUALITY, job.runs / "cases")
+
+    plan: dict[str, Any] = {"steps": 0 if job.budget == "equal_time" else steps_of(job.budget)}
+    if job.budget == "equal_time":
+        plan = kept(job.plan, job.fit_key, lambda: equal_time(begin(), representation, QUALITY))
+    quality = with_steps(QUALITY, plan["steps"])
+    return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin(), representation, quality)), plan
 
 
 def run(job: Job, toolbox: Toolbox) -> None:
-    """Fit, measure and keep."""
-    steps = steps_of(job)
-    begin = start(job.case, QUALITY, job.runs / "cases")
-    fitted = fit_case(begin, job.representation, with_steps(QUALITY, steps), lambda *_: None)
+    """Fit, unless the scene is there, measure and keep."""
+    case = job.case
+    found, plan = fitted(job)
+    scene = found.scene
     extractors = toolbox.extractors if job.has_distances else []
-    views, features, middle = measure(fitted, job.case, extractors, job.runs / "truth")
-    truth_features(job.case.seed, job.runs, toolbox)
+    views, features, middle = measure(scene, case, extractors, job.runs / "truth")
+    truth_features(case.seed, job.runs, toolbox)
     record = {
-        "seed": job.case.seed,
-        "geometry": job.case.geometry,
-        "references": job.case.references,
+        "seed": case.seed,
+        "geometry": case.geometry,
+        "references": case.references,
         "representation": job.representation,
         "budget": job.budget,
         "static_steps": QUALITY.static.steps,
-        "steps": steps,
-        "seconds": fitted.seconds,
-        "step_s": fitted.step_s,
-        "threads": threads(),
-        "gaussians": {"static": len(fitted.scene.static), "dynamic": len(fitted.scene.dynamic)},
+        **plan,
+        **asdict(found.cost),
+        "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
         "views": views,
-        **told_apart(fitted, job.case),
+        **told_apart(scene, case.seed),
     }
-    if job.representation == "hybrid" and job.case.references == "corrupted":
-        record["consistency"] = consistency_of(fitted.scene, job.case, job.runs)
+    if job.representation == "hybrid" and case.references == "corrupted":
+        record["consistency"] = consistency_of(scene, case, job.runs)
     keep_picture(job.runs / "shown" / f"{job.name}.png", middle)
-    save(job.result, record, features)
-
-
-def truth_features(seed: int, runs: Path, toolbox: Toolbox) -> Features:
-    """Features of the true novel views of a world, kept."""
-    path = runs / "truth" / f"features-{seed}.json"
-    wanted = {extractor.frechet for extractor in toolbox.extractors}
-    if path.exists() and set(json.loads(path.read_text())["networks"]) == wanted:
-        return load_features(path)
-    found: Features = {}
-    for view in NOVEL:
-        rows = features_of(true_frames(seed, view, runs / "truth"), toolbox.extractors)
-        found |= {f"{name}/{view}": values for name, values in rows.items()}
-    save(path, {"networks": sorted(wanted)}, found)
-    return found
+    save(job.result, job.key(toolbox), record, features)

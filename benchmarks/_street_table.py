@@ -2,32 +2,39 @@
 
 import json
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from _markdown import table as table_of
-from _street_case import NOVEL, SIZE, VIEWS, Case, true_frames
-from _street_consistency import KINDS, MEASURES
+from _street_case import FRAMES, NOVEL, VIEWS, Case
+from _street_consistency import FOUND_BY, KINDS, MEASURES
 from _street_distances import COMPONENTS, SAMPLES_EACH, Basis, Worlds, bases_of, compared, distance_rows
-from _street_fit import Features
+from _street_keep import Features
 from _street_recording import CLIP
-from jaxtyping import UInt8
+from _street_renderer import ASKED
+from _street_views import NEAR_M
 
 CAPTION = """\
+Frames whose true camera is inside a box, or nearer than {near} m to one, do not count; beside each table
+stands how many do. `s` are seconds of the processor for decomposition and joint fit, without the static
+fit that all share.
+
 Fréchet distance in the first {most} principal components of the truth (kept: {counts}; at most one for
-{each} samples): features centred and projected, not whitened, one basis for all rows; FID and FVD, where
-their weights are given, in all dimensions as well. Samples are frames of image networks and windows of 16
-frames, each 2 after the last, of video networks, of shifted, raised and turned views of all worlds together.
-An excess is a distance of halves less the floor, which is that of two halves of the truth; intervals are
-drawn over worlds, and a ratio whose interval holds 1 is undecided.
+{each} samples): features centred and projected, not whitened, one basis for all rows; in all dimensions as
+well, without intervals. Samples are frames of image networks and windows of 16 frames, each 2 after the
+last and without a frame that does not count, of video networks, of shifted, raised and turned views of all
+worlds together ({samples}). An excess is a distance of halves less the floor, which is that of two halves
+of the truth. Intervals are drawn over worlds. Those of distances are moved so that their middle is the
+value, as duplicates raise a distance; those of ratios are the quantiles as drawn, and a ratio whose
+interval holds 1 is undecided.
 """
 OURS = "hybrid"
-COLUMNS = (OURS, "vibration", "hexplane", "deformable", "static")
-SHOWN = "true-corrupted-{}-equal_steps"
-MARGIN, HEAD = 70, 22
 RESAMPLES = 2000
+LIMITS_S = {"equal_steps": 60.0, "five_times": 300.0}
+"""Seconds that a fit was to take at most."""
+SAME_TIME = 0.1
+"""Share by which equal time may be missed before the table says so."""
+WORLD_TABLES = (("clean", "true"), ("clean", "estimated"), ("corrupted", "true"), ("corrupted", "estimated"))
 Key = tuple[str, str, str]  # geometry, references, budget
 AllFeatures = dict[tuple[Case, str, str], Features]
 
@@ -58,7 +65,44 @@ def summary(records: list[dict[str, Any]], features: AllFeatures, truth: Worlds)
                 "distances_compared": compared(distances),
             }
         )
-    return {"components": {name: basis.axes.shape[1] for name, basis in bases.items()}, "tables": tables}
+    return {
+        "components": {name: basis.axes.shape[1] for name, basis in bases.items()},
+        "samples": samples_of(truth),
+        "tables": tables,
+        "mask_iou_by_world": mask_iou_by_world(records),
+        "seconds": seconds_of(records),
+    }
+
+
+def samples_of(truth: Worlds) -> dict[str, dict[str, int]]:
+    """By network and novel view the number of true samples; 0 where no frame or window counts."""
+    names = sorted({key.split("/")[0] for found in truth.values() for key in found})
+    return {
+        name: {view: sum(len(found.get(f"{name}/{view}", ())) for found in truth.values()) for view in NOVEL}
+        for name in names
+    }
+
+
+def mask_iou_by_world(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A row a world, of ours at equal steps: a world in which nothing is found pulls the mean."""
+    rows: dict[int, dict[str, Any]] = {}
+    for record in records:
+        about = record["references"], record["geometry"]
+        if record["representation"] == OURS and record["budget"] == "equal_steps" and about in WORLD_TABLES:
+            rows.setdefault(record["seed"], {"seed": record["seed"]})["-".join(about)] = record["mask_iou"]
+    return [rows[seed] for seed in sorted(rows)]
+
+
+def seconds_of(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Mean and most seconds of the fits of each representation, by budget."""
+    groups: dict[tuple[str, str], list[float]] = defaultdict(list)
+    for record in records:
+        if record["budget"] in LIMITS_S:
+            groups[record["representation"], record["budget"]].append(record["seconds"])
+    return [
+        {"representation": name, "budget": budget, "mean": float(np.mean(found)), "most": max(found)}
+        for (name, budget), found in groups.items()
+    ]
 
 
 def _seeds(found: list[dict[str, Any]]) -> dict[str, dict[int, dict[str, Any]]]:
@@ -76,26 +120,34 @@ def _means(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
             row[key] = float(np.mean([record[key] for record in worlds.values()]))
         for view in VIEWS:
             for figure in ("psnr", "ssim"):
-                row[f"{view}_{figure}"] = float(np.mean([r["views"][view][figure] for r in worlds.values()]))
+                row[f"{view}_{figure}"] = _mean([r["views"][view][figure] for r in worlds.values()])
+        row["frames"] = {view: sum(r["views"][view]["frames"] for r in worlds.values()) for view in VIEWS}
         for figure in ("mask_iou", "fake_m"):
-            known = [r[figure] for r in worlds.values() if r[figure] is not None]
-            row[figure] = float(np.mean(known)) if known else None
+            row[figure] = _mean([r[figure] for r in worlds.values()])
+        timed = [r["seconds"] / r["hybrid_s"] for r in worlds.values() if "hybrid_s" in r]
+        row |= {"of_hybrid": _mean(timed), "of_hybrid_by_world": timed} if timed else {}
         rows.append(row)
     return rows
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
     """PSNR of ours less that of the best other, world by world, with a bootstrap interval over worlds.
 
     The best other of a view is the one with the highest mean over worlds. ``novel`` is the mean over all
-    views but the withheld frames.
+    views but the withheld frames. A world without a frame that counts in a view is left out of it.
     """
     by, result = _seeds(found), {}
     rng = np.random.default_rng(0)
     for view in (*VIEWS, "novel"):
         shown = NOVEL if view == "novel" else (view,)
-        worlds = (
-            sorted(set.intersection(*(set(w) for w in by.values()))) if OURS in by and len(by) > 1 else []
+        common = set.intersection(*(set(w) for w in by.values())) if OURS in by and len(by) > 1 else set()
+        worlds = sorted(
+            seed for seed in common if all(by[OURS][seed]["views"][v]["psnr"] is not None for v in shown)
         )
         if not worlds:
             continue
@@ -135,6 +187,12 @@ def markdown(report: dict[str, Any]) -> str:
     """The tables as text."""
     parts = [part for table in report["tables"] for part in _table_lines(table)]
     parts += _captions(report)
+    if report.get("mask_iou_by_world"):
+        parts.append(_world_lines(report["mask_iou_by_world"]))
+    if report.get("renderer"):
+        parts.append(_renderer_line(report["renderer"]))
+    if report.get("seconds"):
+        parts.append(_seconds_lines(report["seconds"]))
     parts += [_consistency_lines(table) for table in report.get("consistency", [])]
     if report.get("recording"):
         parts.append(_recording_lines(report["recording"]))
@@ -157,6 +215,11 @@ def _consistency_lines(table: dict[str, Any]) -> str:
         f"{halved} of {len(table['rows'])} errors are at most half of the references'. A blurred video "
         f"changes less along its motion; mean change of grey from a pixel to the next: {sharp}.\n"
     )
+    ways = "; ".join(
+        f"{kind}: {', '.join(f'{way} in {count}' for way, count in table[FOUND_BY][kind].items())}"
+        for kind in KINDS
+    )
+    count += f"Worlds by what found the path, which is compared where it is the same in all three: {ways}.\n"
     title = f"## Consistency of hybrid's drive along the recorded path, {table['geometry']} geometry\n"
     return "\n".join([title, grid(lines), count])
 
@@ -180,25 +243,48 @@ def _recording_lines(rows: list[dict[str, Any]]) -> str:
     return f"## {CLIP}, {rows[0]['frames']} frames of {width}x{height}\n\n" + grid(lines)
 
 
+def _world_lines(rows: list[dict[str, Any]]) -> str:
+    names = ["-".join(about) for about in WORLD_TABLES]
+    lines = [["world", *(f"{references}, {poses} poses" for references, poses in WORLD_TABLES)]]
+    lines += [[str(row["seed"]), *(number(row.get(name), ".2f") for name in names)] for row in rows]
+    means = [_mean([row.get(name) for row in rows]) for name in names]
+    lines.append(["mean", *(number(mean, ".2f") for mean in means)])
+    return "## IoU of hybrid's moving mask, world by world\n\n" + grid(lines)
+
+
+def _renderer_line(found: dict[str, Any]) -> str:
+    width, height = found["size"]
+    rates = ", ".join(
+        f"{name} {found[name]:.1f} (asked: {asked:.0f} on two cores)" for name, asked in ASKED.items()
+    )
+    return f"Frames a second of the world's renderer at {width}x{height}, all truth included: {rates}.\n"
+
+
+def _seconds_lines(rows: list[dict[str, Any]]) -> str:
+    lines = [["representation", "budget", "mean s", "most s", "limit s", "within"]]
+    for row in sorted(rows, key=lambda r: (list(LIMITS_S).index(r["budget"]), r["mean"])):
+        limit = LIMITS_S[row["budget"]]
+        cells = [f"{row['mean']:.1f}", f"{row['most']:.1f}", f"{limit:.0f}"]
+        lines.append([row["representation"], row["budget"], *cells, "yes" if row["most"] <= limit else "no"])
+    return "## Seconds of a fit beside what it was to take\n\n" + grid(lines)
+
+
 def _table_lines(table: dict[str, Any]) -> list[str]:
     parts = [f"## {table['geometry']} geometry, {table['references']} references, {table['budget']}\n"]
     cores = " or ".join(str(count) for count in table["threads"])
-    head = [
-        "representation",
-        "worlds",
-        "steps",
-        f"s on {cores} threads",
-        *VIEWS,
-        "mask IoU",
-        "fake motion, m",
-    ]
-    lines = [head]
+    timed = ["s over hybrid's beside it"] if table["budget"] == "equal_time" else []
+    head = ["representation", "worlds", "steps", f"s on {cores} threads", *timed, *VIEWS]
+    lines = [[*head, "mask IoU", "fake motion, m"]]
     for row in sorted(table["means"], key=lambda r: -r["held_out_psnr"]):
-        cells = [f"{row[f'{view}_psnr']:.2f} / {row[f'{view}_ssim']:.3f}" for view in VIEWS]
+        cells = [
+            f"{number(row[f'{view}_psnr'], '.2f')} / {number(row[f'{view}_ssim'], '.3f')}" for view in VIEWS
+        ]
         cells += [number(row["mask_iou"], ".2f"), number(row["fake_m"], ".3f")]
         counts = [str(row["worlds"]), f"{row['steps']:.0f}", f"{row['seconds']:.1f}"]
+        counts += [_same_time(row)] if timed else []
         lines.append([row["representation"], *counts, *cells])
     parts.append(grid(lines))
+    parts += [_frames_line(table["means"][0])] if table["means"] else []
     gains = [
         f"{view} {gain['db']:+.2f} dB ({gain['low']:+.2f} to {gain['high']:+.2f}), {gain['best_other']}"
         for view, gain in table["against_best_other"].items()
@@ -212,11 +298,32 @@ def _table_lines(table: dict[str, Any]) -> list[str]:
     return parts
 
 
+def _same_time(row: dict[str, Any]) -> str:
+    """Seconds over those of hybrid, timed beside it: mean and range over worlds."""
+    if "of_hybrid" not in row:
+        return "-"
+    low, high = min(row["of_hybrid_by_world"]), max(row["of_hybrid_by_world"])
+    text = f"{row['of_hybrid']:.2f} ({low:.2f} to {high:.2f})"
+    missed = max(abs(low - 1), abs(high - 1)) > SAME_TIME
+    return text + (f", off by more than {100 * SAME_TIME:.0f} %" if missed else "")
+
+
+def _frames_line(row: dict[str, Any]) -> str:
+    """Of how many frames the figures of each view are."""
+    whole = row["worlds"] * FRAMES
+    parts = [f"{view} {count}" for view, count in row["frames"].items()]
+    return f"Frames that count, of {whole} a view but the withheld ones: {', '.join(parts)}.\n"
+
+
 def _captions(report: dict[str, Any]) -> list[str]:
     counts = ", ".join(f"{count} of {name}" for name, count in report.get("components", {}).items())
     if not counts:
         return []
-    return [CAPTION.format(most=COMPONENTS, each=SAMPLES_EACH, counts=counts)]
+    samples = "; ".join(
+        f"{name}: {', '.join(f'{view} {count}' for view, count in views.items())}"
+        for name, views in report.get("samples", {}).items()
+    )
+    return [CAPTION.format(near=NEAR_M, most=COMPONENTS, each=SAMPLES_EACH, counts=counts, samples=samples)]
 
 
 def _compared_lines(rows: list[dict[str, Any]]) -> str:
@@ -280,29 +387,3 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_rounded(item) for item in value]
     return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
-def picture(path: Path, seeds: list[int], runs: Path) -> None:
-    """A grid with a head: a row a world, the truth of a shifted view beside each representation's."""
-    kept = {name: [runs / "shown" / f"{seed}-{SHOWN.format(name)}.png" for seed in seeds] for name in COLUMNS}
-    names = [name for name, files in kept.items() if any(file.exists() for file in files)]
-    rows = [_strip(["", "truth", *names])]
-    for number, seed in enumerate(seeds):
-        cells = [true_frames(seed, "shift_2", runs / "truth")[12][..., ::-1]]
-        blank = np.zeros_like(cells[0])
-        files = [kept[name][number] for name in names]
-        cells += [cv2.imread(str(file)) if file.exists() else blank for file in files]
-        rows.append(np.hstack([_label(f"world {seed}", (MARGIN, blank.shape[0])), *cells]))
-    cv2.imwrite(str(path), np.vstack(rows))
-
-
-def _strip(names: list[str]) -> UInt8[np.ndarray, "h w 3"]:
-    widths = [MARGIN] + [SIZE[0]] * (len(names) - 1)
-    return np.hstack([_label(name, (width, HEAD)) for name, width in zip(names, widths, strict=True)])
-
-
-def _label(text: str, size: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"]:
-    """Dark letters on white."""
-    image = np.full((size[1], size[0], 3), 255, dtype=np.uint8)
-    place = (6, size[1] // 2 + 5)
-    return cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, (40, 40, 40), 1, cv2.LINE_AA)

@@ -12,22 +12,29 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 from _ablation_features import with_efficientnet
-from _street_case import NOVEL, Case, References, Start, start
-from _street_fit import fit_case, load, measure, save, told_apart, with_steps
+from _ablation_groups import by_density, by_voxels, scaled_by_frame
+from _street_case import NOVEL, Case, References, Start, case_digest, start
+from _street_fit import Scale, Vote, fit_case, own_scale, own_vote, with_steps
+from _street_fit import options_of as fit_options
 from _street_jobs import QUALITY
+from _street_keep import is_current, load, save
+from _street_measure import measure, told_apart
 from _street_table import as_text, grid, number
-from _workers import threads, work_off
+from _street_views import views_digest
+from _workers import work_off
 
 from dreamdrive.fit import Representation
 from dreamdrive.options import Quality
 from dreamdrive.scene.features import OF_GEOMETRY
 from dreamdrive.splat import native_info
+from dreamdrive.stages import digest
 
 SEEDS = (0, 1, 2, 3)
 FIGURES = ("held_out_psnr", "novel_psnr", "mask_iou", "label_iou", "fake_m")
@@ -42,12 +49,16 @@ class Variant:
         change: Of the options.
         features: What F_score sees as Z_ref: appearance, nothing, or a network's features.
         representation: What is fitted.
+        vote: How scores become things.
+        scale: What the error maps are brought to before the scores are trained on them.
     """
 
     about: str
     change: Callable[[Quality], Quality] = lambda quality: quality
     features: Literal["appearance", "none", "efficientnet"] = "appearance"
     representation: Representation = "hybrid"
+    vote: Vote = own_vote
+    scale: Scale = own_scale
 
 
 def scored(**changes: Any) -> Callable[[Quality], Quality]:
@@ -70,6 +81,11 @@ def fitted_with(**changes: Any) -> Callable[[Quality], Quality]:
     return lambda quality: replace(quality, fit=replace(quality.fit, **changes))
 
 
+def grown(**changes: Any) -> Callable[[Quality], Quality]:
+    """Other options of densification."""
+    return lambda quality: replace(quality, densify=replace(quality.densify, **changes))
+
+
 def prefit(steps: int) -> Callable[[Quality], Quality]:
     """Another length of the static fit."""
     return lambda quality: with_steps(quality, quality.fit.steps, steps)
@@ -90,7 +106,17 @@ VARIANTS = {
     "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
     "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
     "all-frames": Variant("scores splatted into all frames, as the paper", scored(window=None)),
-    "paper": Variant("both of the above, as the paper", scored(target="error", window=None)),
+    "paper": Variant(
+        "error-alone and all-frames together, as the paper", scored(target="error", window=None)
+    ),
+    "error-scale-0.1": Variant("an error of 0.1 counts as 1, not of 0.2", scored(error_scale=0.1)),
+    "error-scale-0.4": Variant("an error of 0.4 counts as 1", scored(error_scale=0.4)),
+    "error-by-frame": Variant(
+        "errors over the 98th percentile of their frame",
+        scale=lambda errors, quality: scaled_by_frame(errors, quality.score.error_scale),
+    ),
+    "hdbscan": Variant("clusters of HDBSCAN over space, time and score", vote=by_density),
+    "voxels": Variant("clusters of touching voxels of 1 m and 0.1 s", vote=by_voxels),
     "tau-0.20": Variant("tau = 0.20", grouped(threshold=0.20)),
     "tau-0.50": Variant("tau = 0.50", grouped(threshold=0.50)),
     "tau-0.65": Variant("tau = 0.65", grouped(threshold=0.65)),
@@ -100,6 +126,7 @@ VARIANTS = {
     "paper-loss": Variant("L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
     "no-depth": Variant("no term on depth", fitted_with(depth_weight=0.0)),
     "no-shape": Variant("no term on elongation", fitted_with(shape_weight=0.0)),
+    "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),
     "prefit-50": Variant("static fit of 50 steps", prefit(50)),
     "prefit-400": Variant("static fit of 400 steps", prefit(400)),
     "static": Variant("nothing moves", representation="static"),
@@ -135,6 +162,15 @@ class Cut:
         """Where its figures are kept."""
         return self.runs / "ablation" / f"{self.name}.json"
 
+    @property
+    def key(self) -> str:
+        """Of everything its figures follow from."""
+        variant = VARIANTS[self.variant]
+        options = fit_options(variant.change(QUALITY), variant.representation)
+        others = [self.variant, variant.features, variant.representation]
+        case = case_digest(Case(self.seed, "true", self.references))
+        return digest([case, options, others, views_digest(self.seed)])
+
 
 def begun(begin: Start, variant: Variant, quality: Quality) -> Start:
     """What the variant is fitted to."""
@@ -156,22 +192,22 @@ def make(cut: Cut) -> None:
     steps = quality.static.steps
     cases = cut.runs / ("cases" if steps == QUALITY.static.steps else f"cases-{steps}")
     begin = begun(start(case, quality, cases), variant, quality)
-    fitted = fit_case(begin, variant.representation, quality, lambda *_: None)
-    views, _, _ = measure(fitted, case, [], cut.runs / "truth")
+    fitted = fit_case(begin, variant.representation, quality, variant.vote, variant.scale)
+    scene = fitted.scene
+    views, _, _ = measure(scene, case, [], cut.runs / "truth")
+    novel = [views[view]["psnr"] for view in NOVEL if views[view]["psnr"] is not None]
     record = {
         "seed": cut.seed,
         "references": cut.references,
         "variant": cut.variant,
-        "steps": fitted.steps,
-        "seconds": fitted.seconds,
-        "threads": threads(),
-        "gaussians": {"static": len(fitted.scene.static), "dynamic": len(fitted.scene.dynamic)},
+        **asdict(fitted.cost),
+        "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
         "held_out_psnr": views["held_out"]["psnr"],
-        "novel_psnr": float(np.mean([views[view]["psnr"] for view in NOVEL])),
+        "novel_psnr": float(np.mean(novel)),
         "views": views,
-        **told_apart(fitted, case),
+        **told_apart(scene, cut.seed),
     }
-    save(cut.result, record, {})
+    save(cut.result, cut.key, record)
 
 
 def tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -254,9 +290,12 @@ def main() -> int:
     """Fit what is not there yet and print the tables."""
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     options = options_of()
+    if "hdbscan" in options.variants and find_spec("sklearn") is None:
+        print("not measured: hdbscan: pip install scikit-learn", file=sys.stderr)
+        options.variants.remove("hdbscan")
     wanted = cuts(options)
-    if not options.resume:
-        for cut in wanted:
+    for cut in wanted:
+        if not (options.resume and is_current(cut.result, cut.key)):
             cut.result.unlink(missing_ok=True)
     failed = work_off([cut for cut in wanted if not cut.result.exists()], make, options.workers)
     records = [record for cut in wanted if (record := load(cut.result)) is not None]

@@ -16,8 +16,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pandaset_truth import camera_path, moving_masks, path_error
+from pandaset_truth import camera_path, moving_masks
 
+from dreamdrive.evaluate.paths import compare_paths
+from dreamdrive.evaluate.retrieval import retrieval
 from dreamdrive.scene.folder import load_scene
 from dreamdrive.splat.scene_view import render_scene
 
@@ -126,11 +128,12 @@ def measure(name: str, run: Run, out: Path) -> dict:
     return row
 
 
-def compare_paths(scene, truth: np.ndarray) -> dict:
+def path_figures(scene, truth: np.ndarray) -> dict:
     """Position RMSE over the length of the true path, after similarity alignment."""
     estimated = np.stack([camera.world_from_camera for camera in scene.cameras])
-    rmse_m, length_m = path_error(estimated, truth)
-    return {"path_rmse_m": rmse_m, "path_m": length_m, "path_error": rmse_m / length_m}
+    error = compare_paths(estimated, truth)
+    length_m = float(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1).sum())
+    return {"path_rmse_m": error.ate_m, "path_m": length_m, "path_error": error.ate_percent / 100}
 
 
 def compare_with_boxes(scene, clip_dir: Path, report: dict, out: Path) -> dict:
@@ -138,22 +141,22 @@ def compare_with_boxes(scene, clip_dir: Path, report: dict, out: Path) -> dict:
     frames = report["frames"]["source_index"]
     size = tuple(report["frames"]["size"])
     truth = moving_masks(clip_dir, frames, size)
-    both = either = squared = count = 0
+    shares, squared, count = [], 0, 0
     for i, (camera, t_s) in enumerate(zip(scene.cameras, scene.times_s.tolist(), strict=True)):
         view = render_scene(scene, camera, t_s)
-        mask = view.dynamic.numpy()
-        both += (mask & truth[i]).sum()
-        either += (mask | truth[i]).sum()
+        shares.append(view.dynamic_share.numpy())
         if scene.held_out[i]:
             name = clip_dir / "front_camera" / f"{frames[i]:02d}.jpg"
             frame = cv2.resize(cv2.imread(str(name)), size, interpolation=cv2.INTER_AREA)[..., ::-1]
             rendered = cv2.imread(str(out / "held_out" / f"{frames[i]:04d}.png"))[..., ::-1]
-            difference = (rendered.astype(float) - frame)[truth[i]] / 255
+            difference = (rendered.astype(float) - frame)[truth.counted[i]] / 255
             squared += (difference**2).sum()
             count += difference.size
-    paths = compare_paths(scene, camera_path(clip_dir, frames))
+    paths = path_figures(scene, camera_path(clip_dir, frames))
+    judged = ~truth.ignored
+    iou = retrieval(truth.counted[judged], np.stack(shares)[judged]).iou
     hull_psnr = float(-10 * np.log10(squared / count))
-    return {"moving_iou": float(both / either), "moving_psnr": hull_psnr, **paths}
+    return {"moving_iou": iou, "moving_psnr": hull_psnr, **paths}
 
 
 if __name__ == "__main__":

@@ -3,38 +3,44 @@
     python benchmarks/control.py [--quick] [--seeds S ...] [--runs runs/control] [--json FILE]
 
 Every seed gives a street; it is generated once as drawn and once for each change, with the same seed. For a
-moving vehicle (one that the first scene finds, if any) and for a parked one the way from its place in the one
-scene to that in the other is measured along the change: of its dynamic Gaussians, or, parked, of all
-Gaussians that show it. For the road's edge (straight streets: seeds that 3 divides) it is the edge at which a
-clean drawing of the world is most like the changed scene. PSNR compares the renders of both scenes where the
-change is not: outside the vehicle's masks in both worlds and whatever else differs between the worlds' clean
-frames (shadows, the strip beside the edge), widened by 8 px. --geometry true hands exact poses and depth
-over.
+moving vehicle (one that the first scene finds, if any) and for a parked one its Gaussians in the first
+scene (the dynamic ones that show it, or, parked, all that do) are moved along the change until the first
+scene looks most like the second; that nothing else tells where it is now, so that a scene in which it has
+not moved gives 0 m, and one in which it is not there nothing. For the road's edge (straight streets: seeds
+that 3 divides) it is the edge at which a clean drawing of the world is most like the changed scene. PSNR
+compares the renders of both scenes where the change is not: outside the vehicle's masks in both worlds and
+whatever else differs between the worlds' clean frames (shadows, the strip beside the edge), widened by 8
+px. --geometry true hands exact poses and depth over.
 """
 
 import argparse
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+import torch
 from _layout_edits import move_box, widen_road
 from _markdown import columns
+from _street_measure import to_scene
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
-from dreamdrive.evaluate.actor_places import offset_m
+from dreamdrive.evaluate.actor_places import gaussians_of, offset_m
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.pipeline import generate
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.folder import load_scene
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.layout import Layout
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity, fit_similarity
+from dreamdrive.splat import one_torch_thread
+from dreamdrive.splat import render as splat
 from dreamdrive.splat.scene_view import render_scene
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,6 +49,9 @@ MOVE_M, EDGE_M = 2.0, 0.5
 RIM_PX = 8
 DIFFERENT = 2  # grey levels between clean frames from which on a pixel counts as changed
 EDGES_M = np.arange(-0.25, 1.001, 0.125)
+SHIFTS_M = np.arange(-1.5, 4.001, 0.25)
+LOOKS = 6  # frames that a shift is found in
+LIKE = 0.5  # squared error at the shift found over the greatest of all, from which on nothing is found
 
 
 @dataclass(frozen=True)
@@ -66,7 +75,7 @@ class Row:
         wanted_m: How far it was moved.
         shift_m: How far the scene moved it, in the scene's own metres; None where it is not found.
         aligned_m: The same with both scenes brought onto the truth by their cameras.
-        frames: Number of frames in which it is found in both scenes.
+        frames: Number of frames in which it was looked for, or that were compared.
         psnr: Between the renders of both scenes, where the change is not.
         kept: Share of the pixels that this is.
         worlds_psnr: The same between the worlds' clean frames.
@@ -195,25 +204,87 @@ def shift(
     dynamic: bool,
     brought: Callable[[Made], Similarity],
 ) -> tuple[float | None, int]:
-    """How far a box went along the wanted way (median over frames), and in how many frames it is found."""
-    along: list[float] = []
-    length = float(np.linalg.norm(wanted_m))
-    for frame in range(len(before.views)):
-        errors = [
-            offset_m(
-                made.scene,
-                made.views[frame],
-                made.truth,
-                frame,
-                instance,
-                brought(made),
-                moving=dynamic,
-            )
-            for made in (before, after)
-        ]
-        if errors[0] is not None and errors[1] is not None:
-            along.append(length + float((errors[1] - errors[0]) @ wanted_m) / length)
-    return (float(np.median(along)) if along else None), len(along)
+    """How far a box went along the wanted way, and in how many frames it was looked for.
+
+    Its Gaussians of the scene before are moved by each of ``SHIFTS_M``, and the picture is compared with that
+    of the scene after wherever they come to lie at any of them. What they leave uncovered is not known and
+    not compared. A parabola goes through the best shift and its neighbours.
+
+    Returns:
+        The shift in metres, and the number of frames. None where the scene before does not show the box; or
+        where no shift makes its own pixels much more alike than the worst one does, as when it is not there;
+        or where the best one is the first or the last.
+    """
+    along = wanted_m / np.linalg.norm(wanted_m)
+    far, own, looks = np.zeros(len(SHIFTS_M)), np.zeros((len(SHIFTS_M), 2)), 0
+    frames = range(0, len(before.views), max(1, len(before.views) // LOOKS))
+    for frame in frames:
+        found = _agreement(before, after, frame, instance, along, dynamic, brought)
+        if found is not None:
+            far, own, looks = far + found[0], own + found[1], looks + 1
+    best = int(far.argmin())
+    apart = own[:, 0] / np.maximum(own[:, 1], 1)
+    if not looks or best in (0, len(far) - 1) or apart[best] >= LIKE * apart.max():
+        return None, looks
+    a, b, c = far[best - 1 : best + 2]
+    step = float(SHIFTS_M[1] - SHIFTS_M[0])
+    return float(SHIFTS_M[best] + 0.5 * step * (a - c) / max(a - 2 * b + c, 1e-12)), looks
+
+
+def _agreement(
+    before: Made,
+    after: Made,
+    frame: int,
+    instance: int,
+    along: np.ndarray,
+    dynamic: bool,
+    brought: Callable[[Made], Similarity],
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """By shift the squared error where the box may be; and that of its own pixels, with their number."""
+    scene, truth = before.scene, before.truth
+    own = gaussians_of(scene, before.views[frame], truth, frame, instance, moving=dynamic)
+    if own is None:
+        return None
+    here, there = brought(before), brought(after)
+    camera = to_scene(_from_scene(after.views[frame], there), here)
+    camera = before.views[frame].at(camera.world_from_camera)
+    way = here.rotation.T @ along / here.scale
+    shown = scene.at(float(scene.times_s[frame]))
+    pictures, covers = zip(
+        *(_moved_picture(scene, shown, own, m * way, camera) for m in SHIFTS_M), strict=True
+    )
+    target = render_scene(
+        after.scene, after.views[frame], float(after.scene.times_s[frame]), exposure=False
+    ).colour.numpy()
+    cover = np.stack(covers)
+    at_rest = cover[int(np.abs(SHIFTS_M).argmin())]
+    squared = np.square(np.stack(pictures) - target).mean(axis=-1)
+    known = cover.any(axis=0) & (cover | ~at_rest)
+    far = np.where(known, squared, 0).sum(axis=(1, 2))
+    return far, np.stack([(squared * cover).sum(axis=(1, 2)), cover.sum(axis=(1, 2))], axis=1)
+
+
+def _from_scene(camera: Camera, truth_from_scene: Similarity) -> Camera:
+    """A camera of a scene in the world of the truth."""
+    pose = np.eye(4)
+    pose[:3, :3] = truth_from_scene.rotation @ camera.world_from_camera[:3, :3]
+    pose[:3, 3] = truth_from_scene(camera.world_from_camera[:3, 3])
+    return camera.at(pose)
+
+
+@one_torch_thread()
+@torch.no_grad()
+def _moved_picture(
+    scene: Scene, shown: Gaussians, own: np.ndarray, way_m: np.ndarray, camera: Camera
+) -> tuple[np.ndarray, np.ndarray]:
+    """A scene with some of its Gaussians moved (H, W, 3), and the pixels that they fill (H, W)."""
+    chosen = torch.from_numpy(own)
+    means = shown.means + chosen[:, None] * torch.from_numpy(way_m).to(shown.means.dtype)
+    drawn = splat(replace(shown, means=means), camera, channels=chosen[:, None].to(means.dtype))
+    colour = drawn.colour
+    if scene.sky is not None:
+        colour = colour + (1 - drawn.alpha)[..., None] * scene.sky.colour(camera)
+    return colour.clamp(0, 1).numpy(), drawn.channels[..., 0].numpy() >= 0.5
 
 
 def found_in(made: Made) -> set[str]:

@@ -1,12 +1,14 @@
 """Truth of the PandaSet clip: masks of moving vehicles from its labelled boxes, and its camera path."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 MOVING_LABELS = ("Car", "Medium-sized Truck", "Motorcycle")
+UNKNOWN_LABEL = "Pedestrian"
 MAX_RANGE_M = 50.0
 MIN_HEIGHT_PX = 12.0
 
@@ -31,20 +33,33 @@ def pinhole(clip_dir: Path, size: tuple[int, int]) -> np.ndarray:
     )
 
 
-def moving_masks(clip_dir: Path, frames: list[int], size: tuple[int, int]) -> np.ndarray:
-    """Hulls (F, H, W) of the boxes that move, less the hulls of all nearer boxes.
+@dataclass(frozen=True)
+class Movers:
+    """What moves in the frames, by hulls of boxes, each less the hulls of all nearer boxes.
 
-    Counted: cars, medium-sized trucks and motorcycles that are ``Moving``, within 50 m, at least 12 px high.
+    Attributes:
+        counted: Of cars, medium-sized trucks and motorcycles that are ``Moving``, within 50 m, at least 12 px
+            high (F, H, W).
+        ignored: Of what else may move, and is neither right nor wrong to be found (F, H, W): movers that are
+            farther, smaller or of another kind, and pedestrians, whose motion is not labelled.
     """
+
+    counted: np.ndarray
+    ignored: np.ndarray
+
+
+def moving_masks(clip_dir: Path, frames: list[int], size: tuple[int, int]) -> Movers:
+    """The truth of what moves in some frames."""
     boxes = json.loads((clip_dir / "cuboids.json").read_text())["frames"]
     poses = camera_path(clip_dir, frames)
     matrix = pinhole(clip_dir, size)
-    return np.stack([_mask(boxes[i], pose, matrix, size) for i, pose in zip(frames, poses, strict=True)])
+    masks = [_masks(boxes[i], pose, matrix, size) for i, pose in zip(frames, poses, strict=True)]
+    return Movers(*(np.stack(found) for found in zip(*masks, strict=True)))
 
 
-def _mask(
+def _masks(
     boxes: list[dict], world_from_camera: np.ndarray, matrix: np.ndarray, size: tuple[int, int]
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     camera_from_world = np.linalg.inv(world_from_camera)
     seen = []
     for box in boxes:
@@ -53,15 +68,17 @@ def _mask(
         if hull is not None:
             seen.append((float(np.linalg.norm(centre)), box, hull))
     seen.sort(key=lambda entry: entry[0])
-    mask = np.zeros((size[1], size[0]), np.uint8)
-    nearer = np.zeros_like(mask)
+    counted, ignored, nearer = (np.zeros((size[1], size[0]), np.uint8) for _ in range(3))
     for range_m, box, hull in seen:
-        filled = cv2.fillConvexPoly(np.zeros_like(mask), np.round(hull - 0.5).astype(np.int32), 1)
-        counts = box["label"] in MOVING_LABELS and box["motion"] == "Moving" and range_m <= MAX_RANGE_M
-        if counts and np.ptp(hull[:, 1]) >= MIN_HEIGHT_PX:
-            mask |= filled & (1 - nearer)
+        filled = cv2.fillConvexPoly(np.zeros_like(nearer), np.round(hull - 0.5).astype(np.int32), 1)
+        moves = box["motion"] == "Moving"
+        near = range_m <= MAX_RANGE_M and np.ptp(hull[:, 1]) >= MIN_HEIGHT_PX
+        if moves and near and box["label"] in MOVING_LABELS:
+            counted |= filled & (1 - nearer)
+        elif moves or box["label"].startswith(UNKNOWN_LABEL):
+            ignored |= filled & (1 - nearer)
         nearer |= filled
-    return mask > 0
+    return counted > 0, ignored > 0
 
 
 def _hull(box: dict, camera_from_world: np.ndarray, matrix: np.ndarray) -> np.ndarray | None:
@@ -87,17 +104,3 @@ def _edge_cuts(local: np.ndarray, near: np.ndarray) -> np.ndarray:
         for b in local[~near]:
             cuts.append(a + (b - a) * (a[2] - 0.1) / (a[2] - b[2]))
     return np.array(cuts)
-
-
-def path_error(estimated: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
-    """Position RMSE after similarity alignment, in the truth's metres, and the length of the true path."""
-    a, b = estimated[:, :3, 3], truth[:, :3, 3]
-    a0, b0 = a - a.mean(0), b - b.mean(0)
-    u, s, vt = np.linalg.svd(b0.T @ a0)
-    flip = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
-    rotation = u @ flip @ vt
-    scale = (s * np.diag(flip)).sum() / (a0**2).sum()
-    residual = b0 - scale * a0 @ rotation.T
-    return float(np.sqrt((residual**2).sum(1).mean())), float(
-        np.linalg.norm(np.diff(b, axis=0), axis=1).sum()
-    )

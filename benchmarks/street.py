@@ -7,43 +7,39 @@
 Seeded worlds of 24 frames are reconstructed with five representations of motion: static (3D-GS), deformable
 (all Gaussians through F_deform, as Deformable-GS and MagicDrive3D), hexplane (as S3Gaussian), vibration (as
 PVG) and hybrid (ours). All take the same optimiser steps from the same points and the same static fit; a
-second table gives all the seconds of hybrid, a third gives the others five times the steps. Depth and motion
-are found by the classical geometry, with true poses, with true intrinsics alone, or with nothing known;
-references are clean, or corrupted as generated video is. Every view is compared with the clean truth. Beside
-them stand how consistent a rendered drive is with itself and its path, against its references, and the same
-five fits of a recorded clip (``DREAMDRIVE_DATA``); at the end, what was asked of hybrid and what it reached.
+second table gives all the seconds of hybrid, timed beside each, a third gives the others five times the
+steps. Depth and motion are found by the classical geometry, with true poses, with true intrinsics alone, or
+with nothing known; references are clean, or corrupted as generated video is. Every view is compared with
+the clean truth. Beside them stand how consistent a rendered drive is with itself and its path, against its
+references, and the same five fits of a recorded clip (``DREAMDRIVE_DATA``); at the end, what was asked of
+hybrid and what it reached.
 
-Each fit is a file below ``--runs``; with ``--resume`` those that are there count. ``--workers`` makes that
-many fits side by side, each on its share of the cores. Seconds are the processor's, so that equal time does
-not depend on what else the machine does. A fit that fails is named at the end, and its reason
-kept beside the others' results.
+Each fit is a scene below ``--runs``, its figures a file; both know the worlds and options they follow from.
+With ``--resume`` those that are there and still follow count; with ``--measure-again`` the scenes alone do,
+and all figures are taken anew. ``--workers`` makes that many fits side by side, each on its share of the
+cores. Seconds are the processor's, so that equal time does not depend on what else the machine does. A fit
+that fails is named at the end, and its reason kept beside the others' results.
 """
 
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from _street_case import FRAMES, Poses, References
+from _street_case import FRAMES, Poses, References, references_digest, world_digest
 from _street_claims import claims
 from _street_consistency import consistency_tables
-from _street_fit import load, load_features
-from _street_jobs import (
-    BUDGETS,
-    QUALITY,
-    REPRESENTATIONS,
-    SEEDS,
-    Job,
-    in_order,
-    jobs,
-    recorded,
-    run,
-    truth_features,
-)
+from _street_jobs import BUDGETS, QUALITY, REPRESENTATIONS, SEEDS, Job, in_order, jobs, recorded, run
+from _street_keep import is_current, kept, load, load_features
+from _street_measure import truth_features
+from _street_picture import picture
 from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
-from _street_table import as_text, markdown, picture, summary
+from _street_renderer import frames_a_second
+from _street_table import as_text, markdown, summary
+from _street_views import views_digest
 from _workers import work_off
 
 from dreamdrive.cli.machine import use_all_cores
@@ -61,19 +57,45 @@ def make(job: Job | Recorded, weights: WeightFiles) -> None:
         run(job, toolbox_of(weights))
 
 
+def is_done(job: Job | Recorded, toolbox: Toolbox) -> bool:
+    """Whether its figures are there, of these worlds, views, options and networks."""
+    key = job.key(QUALITY) if isinstance(job, Recorded) else job.key(toolbox)
+    return is_current(job.result, key)
+
+
+def clear(everything: Sequence[Job | Recorded], options: argparse.Namespace, toolbox: Toolbox) -> None:
+    """Remove what does not count."""
+    for job in everything:
+        if not (options.resume or options.measure_again):
+            job.forget()
+        elif options.measure_again or not is_done(job, toolbox):
+            job.result.unlink(missing_ok=True)
+
+
+def draw_all(options: argparse.Namespace) -> None:
+    """World by world what all keys are made from, as few worlds are held at a time."""
+    for seed in options.seeds:
+        for references in options.references:
+            references_digest(seed, references)
+        views_digest(seed)
+
+
 def report_of(
     wanted: list[Job], clips: list[Recorded], toolbox: Toolbox, seeds: list[int], runs: Path
 ) -> dict[str, Any]:
     """Tables and a row for each fit."""
-    there = [job for job in wanted if job.result.exists()]
+    there = [job for job in wanted if is_done(job, toolbox)]
+    clips = [job for job in clips if is_done(job, toolbox)]
     records = [record for job in there if (record := load(job.result)) is not None]
     features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
     truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
+    renderer = kept(runs / "renderer.json", world_digest(seeds[0]), lambda: frames_a_second(seeds[0]))
     report = {
         "frames": FRAMES,
         "machine": native_info(),
         "weights": toolbox.weights,
         "missing": toolbox.missing,
+        "renderer": renderer,
         "rows": records,
         "recording": [record for job in clips if (record := load(job.result)) is not None],
         "consistency": consistency_tables(records),
@@ -96,6 +118,7 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--no-recording", action="store_true", help="leave the recorded clip out")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="fits side by side")
     parser.add_argument("--resume", action="store_true", help="keep fits that are finished")
+    parser.add_argument("--measure-again", action="store_true", help="keep scenes alone, measure all anew")
     parser.add_argument("--table-only", action="store_true", help="fit nothing, show what is there")
     parser.add_argument("--runs", type=Path, default=Path("runs/street"), metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE")
@@ -127,9 +150,9 @@ def main() -> int:
     if recording() is None and not options.no_recording:
         print(f"not measured: {CLIP}: {DATA} has no such clip, set DREAMDRIVE_DATA", file=sys.stderr)
     everything = in_order(wanted, clips)
-    if not options.resume and not options.table_only:
-        for job in everything:
-            job.result.unlink(missing_ok=True)
+    draw_all(options)
+    if not options.table_only:
+        clear(everything, options, toolbox)
     todo = [] if options.table_only else [job for job in everything if not job.result.exists()]
     failed = work_off(todo, partial(make, weights=weights), options.workers)
     use_all_cores()

@@ -2,14 +2,16 @@
 
 import argparse
 import importlib.util
-import json
+import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import cv2
 import numpy as np
 import pytest
+from tests.scene.scenes import make_scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -56,21 +58,105 @@ def test_a_full_run_has_every_row_once_the_most_telling_first(street: ModuleType
     assert all(job.representation != "hybrid" for job in wanted if job.budget != "equal_steps")
 
 
-def test_steps_at_equal_time_follow_from_measured_seconds(street: ModuleType, tmp_path: Path) -> None:
-    arguments = ("--runs", str(tmp_path))
-    job = next(job for job in street.jobs(options(street, *arguments)) if job.budget == "equal_time")
+def test_steps_at_equal_time_follow_from_both_timed_now(
+    street: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fits, jobs_of = sys.modules["_street_fit"], sys.modules["_street_jobs"]
+    quality = jobs_of.QUALITY
+    asked: list[tuple[str, int]] = []
+    costs = {"hybrid": fits.Cost(30, 5.0, 0.1, 1), "hexplane": fits.Cost(30, 8.0, 0.25, 1)}
+
+    def timed(begin: None, representation: str, given) -> object:
+        asked.append((representation, given.fit.steps))
+        return fits.Fitted(None, costs.get(representation))
+
+    monkeypatch.setattr(fits, "fit_case", timed)
+    plan = fits.equal_time(None, "hexplane", quality)
+    # Hybrid: 2 s once and 0.1 s a step; hexplane: half a second once and 0.25 s a step.
+    whole = 2 + 0.1 * quality.fit.steps
+    assert asked[1:] == [("hybrid", fits.PROBE_STEPS), ("hexplane", fits.PROBE_STEPS)]
+    assert plan["hybrid_s"] == pytest.approx(whole)
+    assert plan["steps"] == pytest.approx((whole - 0.5) / 0.25, abs=0.5)
+    assert costs["hexplane"].of_steps(plan["steps"]) == pytest.approx(whole, rel=0.01)
+
+
+@pytest.fixture
+def keys(street: ModuleType, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Jobs of worlds that are not drawn."""
     jobs_of = sys.modules["_street_jobs"]
-    with pytest.raises(FileNotFoundError, match="equal steps"):
-        jobs_of.steps_of(job)
-    for name, figures in ("hybrid", {"seconds": 12.0}), (job.representation, {"step_s": 0.1}):
-        path = job.with_equal_steps(name).result
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({**figures, "threads": 1}))
-    assert jobs_of.steps_of(job) == 120
+    monkeypatch.setattr(jobs_of, "case_digest", lambda case: case.name)
+    monkeypatch.setattr(jobs_of, "views_digest", lambda seed: str(seed))
+    return jobs_of
+
+
+def test_a_fit_of_other_options_counts_as_not_there(
+    street: ModuleType, keys: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    given = options(street, "--runs", str(tmp_path), "--resume")
+    toolbox, keep = street.Toolbox(), sys.modules["_street_keep"]
+    wanted = {
+        (job.representation, job.budget): job for job in street.jobs(given) if job.case.name == "0-true-clean"
+    }
+    for job in wanted.values():
+        keep.save(job.result, job.key(toolbox), {}, {})
+    assert all(street.is_done(job, toolbox) for job in wanted.values())
+    score = replace(keys.QUALITY.score, steps=7)
+    monkeypatch.setattr(keys, "QUALITY", replace(keys.QUALITY, score=score))
+    street.clear(list(wanted.values()), given, toolbox)
+    # Scores are hybrid's alone, and of what is fitted in the time of hybrid.
+    left = {name for name, job in wanted.items() if job.result.exists()}
+    assert left == {(name, "equal_steps") for name in street.REPRESENTATIONS if name != "hybrid"}
+    monkeypatch.setattr(keys, "QUALITY", replace(keys.QUALITY, fit=replace(keys.QUALITY.fit, steps=7)))
+    street.clear(list(wanted.values()), given, toolbox)
+    assert not any(job.result.exists() for job in wanted.values())
+
+
+def test_other_views_are_measured_again_and_not_fitted_again(
+    street: ModuleType, keys: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = next(iter(street.jobs(options(street))))
+    before = job.fit_key, job.key(street.Toolbox())
+    monkeypatch.setattr(keys, "views_digest", lambda seed: f"other {seed}")
+    assert job.fit_key == before[0]
+    assert job.key(street.Toolbox()) != before[1]
+
+
+def test_measuring_again_keeps_scenes_and_starting_anew_does_not(
+    street: ModuleType, keys: ModuleType, tmp_path: Path
+) -> None:
+    job = next(job for job in street.jobs(options(street, "--runs", str(tmp_path))))
+    keep = sys.modules["_street_keep"]
+    about = job.scene.with_name(f"{job.scene.name}.json")
+    for argument, scene_stays in (("--measure-again", True), ("--quick", False)):
+        job.scene.mkdir(parents=True, exist_ok=True)
+        keep.save(about, job.fit_key, {})
+        keep.save(job.result, job.key(street.Toolbox()), {}, {})
+        street.clear([job], options(street, argument), street.Toolbox())
+        assert not job.result.exists()
+        assert (about.exists(), job.scene.exists()) == (scene_stays, scene_stays)
+
+
+def test_a_fit_is_made_once(street: ModuleType, tmp_path: Path) -> None:
+    fits = sys.modules["_street_fit"]
+    made: list[int] = []
+
+    def make() -> object:
+        made.append(1)
+        return fits.Fitted(make_scene(), fits.Cost(3, 1.0, 0.1, 1))
+
+    first, again = (fits.kept_fit(tmp_path / "a", "key", make) for _ in range(2))
+    assert len(made) == 1
+    assert first.cost == again.cost == fits.Cost(3, 1.0, 0.1, 1)
+    assert len(again.scene.static) == len(make_scene().static)
+    fits.kept_fit(tmp_path / "a", "other key", make)
+    assert len(made) == 2
+    shutil.rmtree(tmp_path / "a")
+    fits.kept_fit(tmp_path / "a", "other key", make)
+    assert len(made) == 3
 
 
 def record(seed: int, name: str, psnr: float, street: ModuleType) -> dict[str, object]:
-    views = {view: {"psnr": psnr, "ssim": 0.9} for view in sys.modules["_street_case"].VIEWS}
+    views = {view: {"psnr": psnr, "ssim": 0.9, "frames": 24} for view in sys.modules["_street_case"].VIEWS}
     about = {"seed": seed, "geometry": "true", "references": "clean", "representation": name}
     return {
         **about,
@@ -120,7 +206,8 @@ def test_consistency_is_compared_with_the_references_and_the_truth(street: Modul
     consistency = sys.modules["_street_consistency"]
 
     def figures(value: float | None) -> dict[str, float | None]:
-        return {**dict.fromkeys(consistency.MEASURES, value), consistency.SHARPNESS: 7.0}
+        found = {consistency.SHARPNESS: 7.0, consistency.FOUND_BY: "structure from motion"}
+        return {**dict.fromkeys(consistency.MEASURES, value), **found}
 
     found = [
         {
@@ -137,6 +224,13 @@ def test_consistency_is_compared_with_the_references_and_the_truth(street: Modul
     assert rows["warp_4"]["excess_ratio"] == pytest.approx(0.5 / 3)
     assert rows["ate_percent"]["worlds"] == 2
     assert len(table["at_most_half"]) == len(consistency.MEASURES)
+    found[1]["consistency"]["references"][consistency.FOUND_BY] = "odometry"  # rougher: no like for like
+    (other,) = consistency.consistency_tables(found)
+    worlds = {row["measure"]: row["worlds"] for row in other["rows"]}
+    assert worlds["ate_percent"] == 1
+    assert worlds["translation_percent"] == 2
+    assert worlds["warp_1"] == worlds["epipolar_miss_8"] == 3
+    assert "odometry in 1" in street.markdown({"tables": [], "consistency": [other]})
     text = street.markdown({"tables": [], "consistency": [table]})
     assert "9 of 9 errors are at most half" in text
     assert "rendered 7.00" in text
@@ -160,7 +254,7 @@ def test_the_recording_has_a_table(street: ModuleType) -> None:
 def test_the_grid_has_a_head_and_a_column_for_each_representation_there_is(
     street: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tables = sys.modules["_street_table"]
+    tables = sys.modules["_street_picture"]
     width, height = tables.SIZE
     frames = np.zeros((13, height, width, 3), np.uint8)
     monkeypatch.setattr(tables, "true_frames", lambda *_: frames)
@@ -215,11 +309,57 @@ def test_a_gain_has_to_be_sure(street: ModuleType, low: float, holds: bool) -> N
 
 
 def test_an_undecided_ratio_is_neither_kept_nor_broken(street: ModuleType) -> None:
-    ratio = {"network": "fid", "against": "best other", "ours_over_this": 0.8, "ratio_low": 0.6}
+    ratio = {
+        "network": "fid",
+        "projected": True,
+        "against": "best other",
+        "ours_over_this": 0.8,
+        "ratio_low": 0.6,
+    }
     row = {**ratio, "ratio_high": 1.1, "undecided": True}
     about = {"geometry": "true", "references": "corrupted", "budget": "equal_steps"}
+    alone = {**row, "ours_over_this": None, "ratio_low": None, "ratio_high": None}
+    bare = {**about, "distances_compared": [alone], "means": [], "against_best_other": {}}
+    (claim,) = street.claims({"tables": [bare]})
+    assert (claim["holds"], claim["measured"]) == (None, "the other has no excess")
     table = {**about, "distances_compared": [row], "means": [], "against_best_other": {}}
     (claim,) = street.claims({"tables": [table]})
     assert claim["holds"] is None
     text = street.markdown({"tables": [], "claims": [claim]})
     assert "| at most 0.85 | 0.80 (0.60 to 1.10) | undecided |" in text
+
+
+def test_tables_tell_frames_time_and_worlds(street: ModuleType) -> None:
+    records = [record(s, name, 20.0, street) for s in range(2) for name in ("hybrid", "static")]
+    for row in records:
+        row["mask_iou"], row["seconds"] = 0.25 + row["seed"] / 2, 50.0 + 20 * row["seed"]
+        row["views"]["shift_3"] = {"psnr": 12.0, "ssim": 0.5, "frames": 13}
+    late = [{**row, "budget": "equal_time", "hybrid_s": 50.0} for row in records[1::2]]
+    text = street.markdown(street.summary([*records, *late], {}, {}))
+    assert "of 48 a view but the withheld ones: held_out 48, shift_1 48, shift_2 48, shift_3 26" in text
+    assert "| static | 2 | 1 | 60.0 | 1.20 (1.00 to 1.40), off by more than 10 % |" in text
+    assert "| 0 | - | - | - | - |" not in text
+    assert "| 1 | 0.75 | - | - | - |" in text
+    assert "| mean | 0.50 | - | - | - |" in text
+    assert "| hybrid | equal_steps | 60.0 | 70.0 | 60 | no |" in text
+
+
+def test_the_renderer_has_its_line(street: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = sys.modules["_street_renderer"]
+    monkeypatch.setattr(renderer, "FRAMES", 2)
+    monkeypatch.setattr(renderer, "SIZE", (32, 20))
+    found = renderer.frames_a_second(0)
+    assert min(found["antialiased"], found["one_ray"]) > 0
+    text = street.markdown({"tables": [], "renderer": {**found, "antialiased": 12.34}})
+    assert "at 32x20, all truth included: antialiased 12.3 (asked: 10 on two cores), one_ray" in text
+
+
+def test_a_view_without_frames_leaves_its_world_out(street: ModuleType) -> None:
+    records = [record(s, "hybrid", 21.0, street) for s in range(3)]
+    records += [record(s, "static", 20.0, street) for s in range(3)]
+    for row in records[::3]:
+        row["views"]["shift_3"] = {"psnr": None, "ssim": None, "frames": 0}
+    (table,) = street.summary(records, {}, {})["tables"]
+    assert table["against_best_other"]["shift_3"]["worlds"] == 2
+    assert table["against_best_other"]["shift_2"]["worlds"] == 3
+    assert table["means"][0]["shift_3_psnr"] == 21.0

@@ -45,6 +45,48 @@ def test_a_given_layout_is_drawn_by_all_cameras(run: Run, tmp_path: Path) -> Non
     assert "exists already" in again.err
 
 
+def test_corrupted_frames_have_a_clean_truth(run: Run, tmp_path: Path) -> None:
+    made = ["world", "make", "--seed", 4, "--frames", 2, "--size", "96x64", "--one-ray"]
+    for name, options in (("clean", []), ("bad", ["--corrupt", "generated,flicker=1"])):
+        result = run(*made, *options, "-o", tmp_path / name)
+        assert result.code == 0, result
+    clean, bad = tmp_path / "clean", tmp_path / "bad"
+    first, second = (cv2.imread(str(folder / "frames" / "0001.png")) for folder in (clean, bad))
+    assert (first != second).mean() > 0.5
+    for name in ("depth.npz", "flow.npz", "boxes.json", "poses.json", "layout.json", "moving/0001.png"):
+        assert (clean / name).read_bytes() == (bad / name).read_bytes()
+    meta = json.loads((bad / "meta.json").read_text())
+    assert meta["corruption"] == {
+        "warp": 0.5,
+        "shimmer": 0.5,
+        "flicker": 1.0,
+        "drift": 0.5,
+        "far": 0.5,
+        "seed": 4,
+    }
+    assert "corruption" not in json.loads((clean / "meta.json").read_text())
+    wrong = run(*made, "--corrupt", "rain=1", "-o", tmp_path / "wrong")
+    assert wrong.code == 2
+    assert "'rain=1': expected warp=STRENGTH" in wrong.err
+
+
+def test_a_layout_of_too_many_boxes_is_told_before_it_is_drawn(run: Run, tmp_path: Path) -> None:
+    write_layout(draw_street(1), tmp_path / "street.json")
+    layout = json.loads((tmp_path / "street.json").read_text())
+    layout["boxes"] = [{**layout["boxes"][0], "id": f"{i}"} for i in range(256)]
+    (tmp_path / "street.json").write_text(json.dumps(layout))
+    result = run("world", "make", "--layout", tmp_path / "street.json", "-o", tmp_path / "w")
+    assert result.code == 2
+    assert "$.boxes: 256 boxes" in result.err
+    assert not (tmp_path / "w").exists()
+
+
+def test_a_drive_beyond_what_a_street_holds_is_told(run: Run, tmp_path: Path) -> None:
+    result = run("world", "make", "--frames", 700, "-o", tmp_path / "w")
+    assert result.code == 2
+    assert "at most 60 s" in result.err
+
+
 def test_mistakes_are_told(run: Run, tmp_path: Path) -> None:
     for wrong in (["--frames", 0], ["--fps", "-1"], ["--size", "8x8"], ["--seed", "-3"]):
         result = run("world", "make", *wrong, "-o", tmp_path / "w")

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -33,6 +34,17 @@ def test_drawn_layouts_are_valid_and_come_back_equal(tmp_path: Path, seed: int) 
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
+def square(x: float, y: float, side: float) -> list[list[float]]:
+    return [[x, y], [x + side, y], [x + side, y + side], [x, y + side]]
+
+
+def test_holes_apart_are_fine(tmp_path: Path) -> None:
+    path = tmp_path / "street.json"
+    holes = [square(0, 0, 2), square(3, 0, 2)]
+    layout = read_layout(spoil(path, lambda v: v["areas"][0].update(holes=holes)))
+    assert len(layout.areas[0].holes) == 2
+
+
 def spoil(path: Path, change: Callable[[dict[str, Any]], None]) -> Path:
     write_layout(small(), path)
     values = json.loads(path.read_text())
@@ -58,6 +70,22 @@ def spoil(path: Path, change: Callable[[dict[str, Any]], None]) -> Path:
             lambda v: v["areas"][0].update(polygon=[[0, 0], [1, 1], [1, 0], [0, 1]]),
             r"\$.areas\[0\].polygon: Self-intersection",
         ),
+        (
+            lambda v: v["areas"][0].update(holes=[square(0, 0, 2), [[5, 0], [7, 2], [7, 0], [5, 2]]]),
+            r"\$.areas\[0\].holes\[1\]: Self-intersection",
+        ),
+        (
+            lambda v: v["areas"][0].update(holes=[square(0, 0, 2), square(0, 4, 4)]),
+            r"\$.areas\[0\].holes\[1\]: reaches out of the polygon",
+        ),
+        (
+            lambda v: v["areas"][0].update(holes=[square(0, 0, 2), square(1, 1, 2)]),
+            r"\$.areas\[0\].holes\[1\]: overlaps an earlier hole",
+        ),
+        (
+            lambda v: v.update(boxes=[{**v["boxes"][0], "id": str(i)} for i in range(256)]),
+            r"\$.boxes: 256 boxes; expected at most 255",
+        ),
     ],
 )
 def test_the_wrong_field_is_named(
@@ -81,10 +109,30 @@ def test_the_published_schema_is_the_one_that_is_checked() -> None:
 
 
 def test_the_drawing_shows_the_boxes_where_they_are() -> None:
-    picture = draw_layout(small(), 2.0)
-    empty = draw_layout(Layout(small().ego, areas=small().areas), 2.0)
-    assert picture.shape == empty.shape
-    rows, columns = np.nonzero((picture != empty).any(axis=-1))
-    assert 0 < len(rows) < 0.05 * picture[..., 0].size
-    scale = picture.shape[1] / np.ptp([p[0] for p in ((-38, 0), (82, 0))])
-    assert columns.max() - columns.min() > 4 * scale
+    """A box that stands is a filled outline: of its size, and moved by as much as it is moved."""
+
+    def drawn(x_m: float, y_m: float, size_m: tuple[float, float, float]) -> np.ndarray:
+        box = Box("", "car", size_m, [TrackPoint(0, x_m, y_m, 0)])
+        picture = draw_layout(msgspec.structs.replace(small(), boxes=[box]), 2.0)
+        empty = draw_layout(msgspec.structs.replace(small(), boxes=[]), 2.0)
+        return (picture != empty).any(axis=-1)
+
+    def middle(mask: np.ndarray) -> np.ndarray:
+        return np.argwhere(mask).mean(axis=0)
+
+    here, ahead, left = drawn(20, 0, (4, 2, 1.5)), drawn(30, 0, (4, 2, 1.5)), drawn(20, 4, (4, 2, 1.5))
+    px_per_m = (middle(ahead) - middle(here))[1] / 10
+    assert px_per_m > 1
+    np.testing.assert_allclose((middle(ahead) - middle(here))[0], 0, atol=0.5)
+    np.testing.assert_allclose(middle(left) - middle(here), [-4 * px_per_m, 0], atol=0.7)
+    extent = np.ptp(np.argwhere(here), axis=0) + 1
+    np.testing.assert_allclose(extent, [2 * px_per_m, 4 * px_per_m], atol=5)  # smooth edges add some
+    longer = np.ptp(np.argwhere(drawn(20, 0, (8, 2, 1.5))), axis=0) + 1
+    np.testing.assert_allclose(longer - extent, [0, 4 * px_per_m], atol=1.5)
+
+
+def test_the_drawing_shows_the_way_of_a_box() -> None:
+    standing = msgspec.structs.replace(small().boxes[0], track=small().boxes[0].track[:1])
+    moving = draw_layout(small(), 2.0)
+    still = draw_layout(msgspec.structs.replace(small(), boxes=[standing]), 2.0)
+    assert (moving != still).any(axis=-1).sum() > 50

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.bootstrap import frechet_ratio, frechet_with_interval, mean_with_interval
+from dreamdrive.evaluate.bootstrap import frechet_with_interval, mean_with_interval
 from dreamdrive.evaluate.frechet import frechet_distance
 
 Clips = Sequence[np.ndarray]
@@ -67,36 +67,6 @@ def test_the_floor_is_what_a_perfect_set_gets() -> None:
     assert (figure.low, figure.high) == (None, None)
 
 
-def test_a_ratio_compares_what_exceeds_the_floor() -> None:
-    real = places(0)
-    good, bad = disturbed(real, 0.2, seed=1), disturbed(real, 0.4, seed=2)
-    figure = frechet_ratio(real, good, bad, resamples=50)
-    # Shifts of 0.2 and 0.4 give squared distances of 1 to 4.
-    assert figure.value == pytest.approx(0.25, abs=0.05)
-    assert figure.low is not None
-    assert figure.high is not None
-    assert figure.low < figure.value < figure.high < 1
-    assert figure.value == pytest.approx((figure.a - figure.floor) / (figure.b - figure.floor))
-    assert frechet_ratio(real, bad, bad, resamples=0).value == 1
-
-
-def test_a_ratio_of_all_samples_is_of_the_plain_distances() -> None:
-    real = places(0)
-    good, bad = disturbed(real, 0.2, seed=1), disturbed(real, 0.4, seed=2)
-    figure = frechet_ratio(real, good, bad, match_counts=False, resamples=0)
-    assert figure.a == frechet_distance(np.concatenate(real), np.concatenate(good))
-    assert figure.low is None
-
-
-def test_few_samples_make_a_floor_that_only_halves_can_be_compared_with() -> None:
-    rng = np.random.default_rng(0)
-    real = [rng.normal(size=(6, 64)) for _ in range(4)]
-    good, bad = disturbed(real, 0.1), disturbed(real, 0.4)
-    plain = frechet_ratio(real, good, bad, match_counts=False, resamples=0)
-    assert plain.a < plain.floor
-    assert frechet_ratio(real, good, bad, resamples=0).a > plain.floor
-
-
 def test_sets_too_small_for_a_floor() -> None:
     with pytest.raises(InputError, match="a set has 3 samples"):
         frechet_with_interval([np.eye(5)], [np.eye(3, 5)])
@@ -106,8 +76,6 @@ def test_sets_that_do_not_pair() -> None:
     real = places(0)
     with pytest.raises(InputError, match="got 12 real and 11 fake"):
         frechet_with_interval(real, real[:11], paired=True)
-    with pytest.raises(InputError, match="got 12 real and 11 fake"):
-        frechet_ratio(real, real, real[:11])
 
 
 def test_a_mean_is_over_frames_and_its_interval_over_clips() -> None:

@@ -1,6 +1,7 @@
 """``dreamdrive world``: streets with exact truth."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,6 +23,7 @@ def make(
     fps: Annotated[float, arg(metavar="F")] = 10.0,
     size: Annotated[str, arg(metavar="WxH")] = "320x192",
     cameras: Literal["front", "surround"] = "front",
+    corrupt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     one_ray: bool = False,
     force: bool = False,
 ) -> None:
@@ -35,10 +37,13 @@ def make(
         fps: Frames a second.
         size: Size of the frames.
         cameras: front is one camera; surround six, each in a folder of its own.
+        corrupt: Draw the frames as a video model might have, such as generated or warp=0.5,flicker=1, see
+            docs/consistency.md; the truth stays that of the clean street.
         one_ray: One ray a pixel, twice as fast, with rough edges.
         force: Replace a world that is there already.
     """
     use_all_cores()
+    from dreamdrive.data import corruption
     from dreamdrive.data.layout_file import read_layout
     from dreamdrive.data.world import MOUNTS, Drive, Mount, StreetOptions, World, draw_street, drive
     from dreamdrive.data.world.files import write_world
@@ -50,6 +55,7 @@ def make(
             "positive rate, a seed of 0 or more and at least 16x16 pixels"
         )
     street = draw_street(seed, StreetOptions(seconds=frames / fps)) if layout is None else read_layout(layout)
+    wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
     console = Console()
     start = time.perf_counter()
@@ -68,7 +74,12 @@ def make(
             for mount in (MOUNTS if cameras == "surround" else MOUNTS[:1])
         }
     seconds = time.perf_counter() - start
-    write_world(drives, out, replace=force)
+    if wrong is not None:
+        drives = {
+            mount: replace(made, frames=corruption.corrupt(made.frames, wrong, made.depth_m))
+            for mount, made in drives.items()
+        }
+    write_world(drives, out, corruption=wrong, replace=force)
     count = frames * len(drives)
     console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s", soft_wrap=True)
 

@@ -72,6 +72,27 @@ def offset_m(
     Returns:
         The offset (3,), or None where it fills too little of the picture, or less than half of it is shown.
     """
+    found = _fills(scene, camera, truth, frame, instance, moving=moving)
+    if found is None:
+        return None
+    shown, own, fills = found
+    centres = truth_from_scene(shown.means.numpy()[own].astype(np.float64))
+    surface = truth.points_m(frame, truth.instance[frame] == instance)
+    return _middle(centres, fills[own]) - _middle(surface, np.ones(len(surface)))
+
+
+def gaussians_of(
+    scene: Scene, camera: Camera, truth: Truth, frame: int, instance: int, *, moving: bool = True
+) -> Bool[np.ndarray, " n"] | None:
+    """Which Gaussians of ``scene.at`` show a road user (N,); see ``offset_m`` for which do, and for None."""
+    found = _fills(scene, camera, truth, frame, instance, moving=moving)
+    return None if found is None else found[1]
+
+
+def _fills(
+    scene: Scene, camera: Camera, truth: Truth, frame: int, instance: int, *, moving: bool
+) -> tuple[Gaussians, Bool[np.ndarray, " n"], Float[np.ndarray, " n"]] | None:
+    """The Gaussians in a frame, those that show a road user, and how many pixels each fills."""
     mask = truth.instance[frame] == instance
     if mask.mean() < LEAST_SHARE:
         return None
@@ -83,10 +104,7 @@ def offset_m(
     inside, near, everywhere = fills.T
     if inside.sum() < _FOUND * mask.sum():
         return None
-    own = (everywhere > 0) & (near > _FOUND * everywhere)
-    centres = truth_from_scene(shown.means.numpy()[own].astype(np.float64))
-    surface = truth.points_m(frame, mask)
-    return _middle(centres, everywhere[own]) - _middle(surface, np.ones(len(surface)))
+    return shown, (everywhere > 0) & (near > _FOUND * everywhere), everywhere
 
 
 @one_torch_thread()

@@ -52,31 +52,6 @@ class DistanceFigure:
     fake_clips: int
 
 
-@dataclass(frozen=True)
-class RatioFigure:
-    """Excess of one distance over the floor as a share of another's.
-
-    Attributes:
-        value: (a - floor) / (b - floor).
-        low: Lower end of its 95 % interval over clips; ``None`` with one clip only.
-        high: Upper end.
-        a: Distance of the first set.
-        b: Distance of the second set, which the first is measured by.
-        floor: Distance of two halves of the real set.
-        samples: Number of real feature vectors.
-        clips: Number of clips.
-    """
-
-    value: float
-    low: float | None
-    high: float | None
-    a: float
-    b: float
-    floor: float
-    samples: int
-    clips: int
-
-
 def frechet_with_interval(
     real: Features,
     fake: Features,
@@ -122,7 +97,7 @@ def distance_with_interval(
     rng = np.random.default_rng(seed)
     all_real, all_fake = np.concatenate(real), np.concatenate(fake)
     value = distance(all_real, all_fake)
-    floor, (half,) = _half_distances(all_real, (all_fake,), distance, rng)
+    floor, (half,) = half_distances(all_real, (all_fake,), distance, rng)
 
     def resampled(chosen: Int[np.ndarray, " c"]) -> float:
         other = chosen if paired else rng.integers(0, len(fake), len(fake))
@@ -132,59 +107,6 @@ def distance_with_interval(
     low, high = _interval(value, len(real) if enough else 1, resampled, rng, resamples)
     counts = (len(all_real), len(all_fake), len(real), len(fake))
     return DistanceFigure(value, low, high, floor, half, *counts)
-
-
-def frechet_ratio(
-    real: Features,
-    a: Features,
-    b: Features,
-    *,
-    covariance: Covariance = "sample",
-    match_counts: bool = True,
-    seed: int = 0,
-    resamples: int = RESAMPLES,
-    splits: int = SPLITS,
-) -> RatioFigure:
-    """How far set ``a`` is above the floor as a share of how far set ``b`` is: below 1, ``a`` is better.
-
-    Clip i of all three sets shows the same place; a resample takes the same clips of each, with new halves,
-    so that what the clips have in common cancels.
-
-    Args:
-        real: Features (samples, d) of each real clip.
-        a: Features of the fake clips to judge.
-        b: Features of the fake clips to compare with.
-        covariance: The normaliser.
-        match_counts: Measure ``a`` and ``b`` by halves too, as the floor is. Otherwise they are measured by
-            all samples; with few of them the floor of halves may then exceed both, and the ratio means
-            nothing.
-        seed: Of halves and resamples.
-        resamples: How many; 0 leaves the interval out.
-        splits: Random halvings behind the value and behind each resample.
-
-    Raises:
-        InputError: Too few samples, or sets of different numbers of clips.
-    """
-    _check_paired(real, a)
-    _check_paired(real, b)
-    rng = np.random.default_rng(seed)
-    distance = partial(frechet_distance, covariance=covariance)
-
-    def terms(chosen: Int[np.ndarray, " c"]) -> tuple[float, float, float]:
-        truth, first, second = (_gathered(features, chosen) for features in (real, a, b))
-        floor, halves = _half_distances(truth, (first, second), distance, rng, splits)
-        if match_counts:
-            return halves[0], halves[1], floor
-        return distance(truth, first), distance(truth, second), floor
-
-    def ratio(chosen: Int[np.ndarray, " c"]) -> float:
-        of_a, of_b, floor = terms(chosen)
-        return (of_a - floor) / (of_b - floor)
-
-    of_a, of_b, floor = terms(np.arange(len(real)))
-    value = (of_a - floor) / (of_b - floor)
-    low, high = _interval(value, len(real), ratio, rng, resamples)
-    return RatioFigure(value, low, high, of_a, of_b, floor, sum(map(len, real)), len(real))
 
 
 def mean_with_interval(
@@ -207,7 +129,7 @@ def mean_with_interval(
     return mean, *_interval(mean, len(values), resampled, rng, resamples)
 
 
-def _half_distances(
+def half_distances(
     real: Float[np.ndarray, "n d"],
     fakes: tuple[Float[np.ndarray, "_ d"], ...],
     distance: Distance,
@@ -217,6 +139,19 @@ def _half_distances(
     """Mean distances of a random half of the real samples to the other half, and to a half of each fake set.
 
     Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
+
+    Args:
+        real: Real feature vectors (N, d).
+        fakes: The fake sets (M, d).
+        distance: Of two arrays of features.
+        rng: Draws the halves.
+        splits: How many halvings.
+
+    Returns:
+        The floor, and the distance of each fake set.
+
+    Raises:
+        InputError: A set is too small to be halved.
     """
     for features in (real, *fakes):
         if len(features) < MIN_SAMPLES:

@@ -12,6 +12,7 @@ from tests.conftest import ROOT
 from tests.evaluate.golden import relative
 from torch import Tensor
 
+from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks import packaged
 from dreamdrive.evaluate.networks.efficientnet_lite import (
     EfficientNetLite0,
@@ -90,3 +91,12 @@ def test_a_package_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(packaged.metadata, "distribution", absent)
     with pytest.raises(MissingWeightsError, match="stlpips-pytorch is not installed: pip install"):
         FILES["alex"].locate()
+
+
+def test_weights_of_a_figure_that_are_given_are_checked_too(tmp_path: Path) -> None:
+    other = tmp_path / "weights.pth"
+    other.write_bytes(b"something else")
+    with pytest.raises(InputError, match=r"has SHA-256 .* but the figure is defined by"):
+        load_transnet(other)
+    with pytest.raises(InputError, match=r"none\.pth"):
+        load_transnet(tmp_path / "none.pth")

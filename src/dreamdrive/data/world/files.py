@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -9,7 +10,8 @@ from zipfile import BadZipFile
 import cv2
 import numpy as np
 
-from dreamdrive.data.layout_file import read_layout, write_layout
+from dreamdrive.data.corruption import Corruption
+from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
@@ -20,7 +22,9 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Layout
 
 
-def write_world(drives: Mapping[Mount, Drive], path: Path, *, replace: bool = False) -> None:
+def write_world(
+    drives: Mapping[Mount, Drive], path: Path, *, corruption: Corruption | None = None, replace: bool = False
+) -> None:
     """Write a world folder; it appears whole or not at all.
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
@@ -34,13 +38,14 @@ def write_world(drives: Mapping[Mount, Drive], path: Path, *, replace: bool = Fa
     Args:
         drives: One for each camera, by its mount.
         path: The folder.
+        corruption: What was done to the frames, noted in ``meta.json``.
         replace: Whether an existing world folder may be replaced.
 
     Raises:
         InputError: Something else is at ``path``, or it cannot be written; what was there stays.
     """
     first = next(iter(drives.values()))
-    if len(first.boxes) > 255:
+    if len(first.boxes) > MOST_BOXES:
         raise ValueError(f"world: {len(first.boxes)} boxes do not fit 8-bit labels")
     with new_folder(path, replace=replace, mark="layout.json") as folder:
         write_layout(first.layout, folder / "layout.json")
@@ -52,7 +57,7 @@ def write_world(drives: Mapping[Mount, Drive], path: Path, *, replace: bool = Fa
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)
-            _write_camera(drive, place)
+            _write_camera(drive, place, corruption)
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:
@@ -136,7 +141,7 @@ def _box(values: dict[str, Any], frames: int) -> WorldBox:
     return WorldBox(values["instance"], values["id"], values["kind"], values["moving"], size_m, poses)
 
 
-def _write_camera(drive: Drive, folder: Path) -> None:
+def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> None:
     for name, images in (
         ("frames", drive.frames[..., ::-1]),
         ("instances", drive.instance.astype(np.uint8)),
@@ -149,7 +154,8 @@ def _write_camera(drive: Drive, folder: Path) -> None:
             _write_png(folder / name / f"{i:04d}.png", image)
     np.savez_compressed(folder / "depth.npz", depth_m=drive.depth_m)
     np.savez_compressed(folder / "flow.npz", flow_px=drive.flow_px)
-    _write_json(folder / "meta.json", _calibration(drive))
+    made = {} if corruption is None else {"corruption": asdict(corruption)}
+    _write_json(folder / "meta.json", {**_calibration(drive), **made})
     path = drive.trajectory
     _write_json(
         folder / "poses.json",

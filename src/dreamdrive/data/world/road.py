@@ -13,7 +13,13 @@ from dreamdrive.scene.layout import Area, AreaKind, Line, LineKind
 LANE_M, PARKING_M, SIDEWALK_M = 3.4, 2.2, 3.2
 _STEP_M = 1.0
 _CORNER_M = 4.0
-_BEHIND_M, _AHEAD_M = 45.0, 190.0
+_BEHIND_M, _AHEAD_M, _BESIDE_M = 45.0, 190.0, 90.0
+_SIGHT_M = 90.0
+_CHANGE_S = 4.0
+MOST_M_S = 16.0
+"""Speed that no vehicle comes to go beyond."""
+_OTHERS_SHARE = 10 / 16
+"""Speed of what comes or crosses, at most, as a share of that."""
 
 
 @dataclass(frozen=True)
@@ -69,24 +75,29 @@ class Road:
         return shapely.LineString(self.at(stations, left_m)[:, :2])
 
 
-def bent_road(bend_per_m: float, bend_from_m: float, lanes: int) -> Road:
-    """Through the map's origin along x at station 0; from ``bend_from_m`` on it gradually turns."""
-    stations = np.arange(-_BEHIND_M, _AHEAD_M, _STEP_M)
+def bent_road(bend_per_m: float, bend_from_m: float, lanes: int, way_m: float) -> Road:
+    """Through the map's origin along x at station 0; from ``bend_from_m`` on it gradually turns.
+
+    It is long enough for what goes ``way_m`` ahead and for what is seen from there, and for what comes.
+    """
+    behind = np.ceil(max(_BEHIND_M, _OTHERS_SHARE * way_m))
+    stations = np.arange(-behind, np.ceil(max(_AHEAD_M, way_m + _SIGHT_M)), _STEP_M)
     bend = bend_per_m * np.clip((stations - bend_from_m) / 15.0, 0, 1)
     # Nothing turns by more than a right angle within sight.
     heading = np.clip(np.cumsum(bend) * _STEP_M, -1.5, 1.5)
     steps = _STEP_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     points = np.cumsum(steps, axis=0)
-    return Road(points - points[int(_BEHIND_M)], heading, -_BEHIND_M, lanes)
+    return Road(points - points[int(behind)], heading, -float(behind), lanes)
 
 
-def crossing_road(main: Road, station_m: float, angle_rad: float, lanes: int) -> Road:
+def crossing_road(main: Road, station_m: float, angle_rad: float, lanes: int, way_m: float) -> Road:
     """A straight road across the main one, leading to the left; its station 0 is where they cross."""
     x, y, heading = main.at(np.array([station_m]))[0]
     heading += angle_rad
-    stations = np.arange(-90.0, 91.0, _STEP_M)
+    beside = float(np.ceil(max(_BESIDE_M, _OTHERS_SHARE * way_m)))
+    stations = np.arange(-beside, beside + 1, _STEP_M)
     points = np.array([x, y]) + stations[:, None] * [np.cos(heading), np.sin(heading)]
-    return Road(points, np.full(len(stations), heading), -90.0, lanes)
+    return Road(points, np.full(len(stations), heading), -beside, lanes)
 
 
 @dataclass(frozen=True)
@@ -168,6 +179,23 @@ def _lines(kind: LineKind, line: shapely.LineString, outside: BaseGeometry) -> l
         for part in shapely.get_parts(rest)
         if part.length > 1
     ]
+
+
+def travelled_m(
+    times_s: Float[np.ndarray, " t"], speed_m_s: float, change_m_s2: float, least_m_s: float = 0.0
+) -> Float[np.ndarray, " t"]:
+    """Way gone by times (T,) since 0 at a pace that changes for a while and then stays.
+
+    The change lasts four seconds at most, and ends where the speed comes to its lowest or ``MOST_M_S``.
+    """
+    way = speed_m_s * times_s + 0.5 * change_m_s2 * times_s**2
+    if change_m_s2 == 0:
+        return way
+    bound = least_m_s if change_m_s2 < 0 else MOST_M_S
+    lasts_s = min(_CHANGE_S, max((bound - speed_m_s) / change_m_s2, 0.0))
+    then = speed_m_s * lasts_s + 0.5 * change_m_s2 * lasts_s**2
+    pace = speed_m_s + change_m_s2 * lasts_s
+    return np.where(times_s <= lasts_s, way, then + pace * (times_s - lasts_s))
 
 
 def rectangle_around(polygon: shapely.Polygon) -> Float[np.ndarray, "5 2"]:

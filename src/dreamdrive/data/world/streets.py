@@ -5,11 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from dreamdrive.data.world.road import LANE_M, SIDEWALK_M, Road, RoadNet, bent_road, crossing_road
+from dreamdrive.data.world.road import (
+    LANE_M,
+    MOST_M_S,
+    SIDEWALK_M,
+    Road,
+    RoadNet,
+    bent_road,
+    crossing_road,
+    travelled_m,
+)
 from dreamdrive.data.world.traffic import Traffic, to_track
+from dreamdrive.errors import InputError
 from dreamdrive.scene.layout import Building, Ego, Layout, Light, Prop
 
 _EGO_STEP_S = 0.1
+_LEAST_EGO_M_S = 1.0
+MOST_SECONDS = 60.0
+"""Longest drive that is drawn: a street of a kilometre."""
+_AFTER_S = 1.2  # for which traffic goes on behind the end
 
 
 @dataclass(frozen=True)
@@ -36,6 +50,9 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
 
     Of three streets one is straight, one bends and one crosses another. In those of an even seed some parked
     vehicles look the same as moving ones.
+
+    Raises:
+        InputError: The drive is longer than ``MOST_SECONDS``.
     """
     if (
         options.seconds <= 0
@@ -43,8 +60,13 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
         or min(options.movers or 0, options.parked or 0) < 0
     ):
         raise ValueError(f"street: cannot draw {options}")
+    if options.seconds > MOST_SECONDS:
+        raise InputError(
+            f"a drive of {options.seconds:g} s: streets are drawn for at most {MOST_SECONDS:g} s; ask for "
+            "fewer frames, or give a layout of your own"
+        )
     rng = np.random.default_rng(seed)
-    net = _roads(rng, seed)
+    net = _roads(rng, seed, max(MOST_M_S, options.speed_m_s or 0) * (options.seconds + _AFTER_S))
     speed = float(rng.uniform(6, 10)) if options.speed_m_s is None else options.speed_m_s
     ego = _ego(rng, net.roads[0], speed, options)
     zebras = _zebras(rng, net)
@@ -64,15 +86,16 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
     )
 
 
-def _roads(rng: np.random.Generator, seed: int) -> RoadNet:
+def _roads(rng: np.random.Generator, seed: int, way_m: float) -> RoadNet:
     kind = ("straight", "bend", "crossing")[seed % 3]
     lanes = int(rng.integers(1, 3))
     bend = float(rng.choice([-1, 1]) / rng.uniform(45, 110)) if kind == "bend" else 0.0
-    main = bent_road(bend, float(rng.uniform(0, 12)), lanes)
+    main = bent_road(bend, float(rng.uniform(0, 12)), lanes, way_m)
     if kind != "crossing":
         return RoadNet.of((main,), None)
     station = float(rng.uniform(26, 40))
-    other = crossing_road(main, station, np.pi / 2 + float(rng.uniform(-0.2, 0.2)), int(rng.integers(1, 3)))
+    angle = np.pi / 2 + float(rng.uniform(-0.2, 0.2))
+    other = crossing_road(main, station, angle, int(rng.integers(1, 3)), way_m)
     return RoadNet.of((main, other), station)
 
 
@@ -82,7 +105,7 @@ def _ego(rng: np.random.Generator, road: Road, speed_m_s: float, options: Street
     lane = -(road.lanes - 0.5) * LANE_M
     sway, phase, rate = 0.2, float(rng.uniform(0, 2 * np.pi)), 1.1
     change = float(rng.uniform(-0.8, 0.8)) if speed_m_s > 3 else 0.0
-    stations = speed_m_s * times + 0.5 * change * times**2
+    stations = travelled_m(times, speed_m_s, change, _LEAST_EGO_M_S)
     if speed_m_s > 0:
         sway *= np.minimum(1.0, stations / 2)
     left = lane + sway * np.sin(rate * times + phase) * (speed_m_s > 0)

@@ -3,7 +3,15 @@
 import numpy as np
 import shapely
 
-from dreamdrive.data.world.road import LANE_M, PARKING_M, SIDEWALK_M, Road, RoadNet, rectangle_around
+from dreamdrive.data.world.road import (
+    LANE_M,
+    PARKING_M,
+    SIDEWALK_M,
+    Road,
+    RoadNet,
+    rectangle_around,
+    travelled_m,
+)
 from dreamdrive.scene.layout import Box, BoxKind, Ego, TrackPoint, track_function
 
 _STEP_S = 0.2
@@ -54,7 +62,7 @@ class Traffic:
         before = len(self.boxes)
         for number in range(_MOST_TRIES):
             if len(self.boxes) - before >= wanted:
-                return
+                break
             station = float(rng.uniform(2, 18 + 3.0 * wanted + 0.2 * number))
             side = int(rng.choice([-1, 1]))
             left = side * (main.half_m - 0.5 * PARKING_M + float(rng.uniform(-0.08, 0.08)))
@@ -70,6 +78,21 @@ class Traffic:
             if self._net.junction.buffer(3.0).contains(shapely.Point(x, y)):
                 continue
             self._add(kind, size, place, look)
+        looks = {(box.kind, box.look) for box in self.boxes[:before]}
+        if alike and wanted and not any((box.kind, box.look) in looks for box in self.boxes[before:]):
+            self._park_one_alike(models or [box for box in self.boxes[:before] if box.kind == "truck"])
+
+    def _park_one_alike(self, models: list[Box]) -> None:
+        """At the first kerb with room for what looks like a moving one."""
+        main = self._net.roads[0]
+        for station in np.arange(4.0, 80.0) if models else ():
+            for side, model in ((side, model) for side in (-1, 1) for model in models):
+                x, y, yaw = main.at(np.array([station]), side * (main.half_m - 0.5 * PARKING_M))[0]
+                turned = _round(yaw + (np.pi if side > 0 else 0.0), 4)
+                clear = not self._net.junction.buffer(3.0).contains(shapely.Point(x, y))
+                place = [TrackPoint(0.0, _round(x), _round(y), turned)]
+                if clear and self._add(model.kind, model.size_m, place, model.look):
+                    return
 
     def _add(
         self, kind: BoxKind, size_m: tuple[float, float, float], track: list[TrackPoint], look: int
@@ -109,7 +132,7 @@ class Traffic:
     ) -> None:
         """Along a road; against its direction if the speed is negative."""
         t = self._times
-        stations = start_m + speed_m_s * t + 0.5 * change_m_s2 * t**2
+        stations = start_m + travelled_m(t, speed_m_s, change_m_s2)
         way = road.at(stations, left_m)
         if speed_m_s < 0:
             way[:, 2] += np.pi

