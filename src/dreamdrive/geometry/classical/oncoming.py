@@ -3,8 +3,8 @@
 What drives straight towards a camera that drives straight moves in the pictures like a standing thing at
 another distance: with equal speeds at half of it. A standing thing meets the road at its own distance, an
 oncoming one farther away. Single pixels of dark paint and glass do not tell at which distance they seem to
-be. So whole stretches are swept: a column as wide as half a metre, above and below each row in which the thing
-might meet the road.
+be. So whole stretches are swept: a column half a metre wide, above and below each row in which a thing might
+meet the road.
 """
 
 from collections.abc import Sequence
