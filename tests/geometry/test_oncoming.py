@@ -47,3 +47,10 @@ def test_without_a_road_nothing_is_found() -> None:
     view = seen(toy.drive([toy.Box(17, -3.5, -STEP_M)], step_m=STEP_M))
     flat = replace(view, plane_inverse=np.zeros_like(view.plane_inverse))
     assert not any(mask.any() for mask in oncoming(flat).values())
+
+
+def test_a_road_that_leaves_the_picture_is_no_trouble() -> None:
+    view = seen(toy.drive([toy.Box(17, -3.5, -STEP_M)], step_m=STEP_M))
+    plane = view.plane_inverse.copy()
+    plane[:, :, :40] = 0
+    assert oncoming(replace(view, plane_inverse=plane))[3].any()

@@ -122,12 +122,13 @@ def _things(view: View, frame: int) -> list[_Thing]:
     things: list[_Thing] = []
     if not plane.any():
         return things
-    misfits, px_per_m = _misfits(view, frame), view.cameras[frame].fy_px * plane
-    found = _columns(misfits, plane, px_per_m)
+    fy_px = view.cameras[frame].fy_px
+    misfits, px_per_m = _misfits(view, frame), fy_px * plane
+    found = _columns(misfits, plane, fy_px)
     for columns in _stretches(found, misfits.inverse, px_per_m):
         row, label = int(np.median(found.row[columns])), int(np.median(found.label[columns]))
         contact = plane[row, int(np.median(columns))]
-        one_m = float(view.cameras[frame].fy_px * contact)
+        one_m = float(fy_px * contact)
         wide_m = (columns[-1] + 1 - columns[0]) / one_m
         comes = _RATIO[0] <= misfits.inverse[label] / contact <= _RATIO[1]
         if comes and contact >= _LEAST_CONTACT and wide_m >= _LEAST_WIDTH_M:
@@ -167,20 +168,17 @@ def _misfit(
     return np.where(count > 0, total / np.maximum(count, 1), np.float32(_MOST_LEVELS))
 
 
-def _columns(
-    misfits: _Misfits, plane: Float[np.ndarray, "h w"], px_per_m: Float[np.ndarray, "h w"]
-) -> _Columns:
+def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -> _Columns:
     """For each column the distance and the row with which thing above and road below gain most."""
     height, width = plane.shape
     rows, columns = np.mgrid[:height, :width]
-    above_px = np.clip((_ABOVE_M * px_per_m).astype(int), 3, height)
+    above_px = np.clip((_ABOVE_M * fy_px * plane).astype(int), 3, height)
     top = np.maximum(rows - above_px, 0)
     possible = (rows > above_px) & (plane > 0) & (rows < height - 3)
-    px_per_unit = float(px_per_m[-1, 0] / plane[-1, 0])
     best, label, row = np.zeros(width), np.zeros(width, np.intp), np.zeros(width, np.intp)
     for number in range(len(_BACKGROUND), len(misfits.inverse)):
         inverse = float(misfits.inverse[number])
-        window = (max(3, int(_WIDTH_M * px_per_unit * inverse / 2)) | 1, 1)
+        window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
         thing, road = cv2.blur(misfits.upright[number], window), cv2.blur(misfits.road, window)
         gain = np.cumsum(np.where(plane > 0, road - thing, 0), axis=0)
         cost = np.cumsum(thing, axis=0)
