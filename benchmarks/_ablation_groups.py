@@ -50,7 +50,7 @@ def density_labels(
     if len(places_m) < smallest:
         return np.full(len(places_m), -1)
     values = np.column_stack([places_m, METRES_PER_S * times_s, METRES_PER_SCORE * scores])
-    return HDBSCAN(min_cluster_size=smallest).fit_predict(values)
+    return HDBSCAN(min_cluster_size=smallest, copy=True).fit_predict(values)
 
 
 def voxel_labels(
