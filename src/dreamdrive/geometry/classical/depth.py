@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.geometry.classical import smoothing, sweep
-from dreamdrive.geometry.classical.view import THREADS, View, parallel
+from dreamdrive.geometry.classical.view import THREADS, View, by_frame
 
 _PLANE_BONUS = 0.20
 _PLANE_MATCH_BONUS = 0.35
@@ -47,7 +47,7 @@ def sweep_frames(view: View, sky: Bool[np.ndarray, "f h w"]) -> dict[int, Swept 
         finally:
             free.put(work)
 
-    return dict(zip(view.frames, parallel(one, view.frames), strict=True))
+    return by_frame(view, one)
 
 
 def _sweep_frame(

@@ -12,7 +12,7 @@ from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.classical.oncoming import oncoming
 from dreamdrive.geometry.classical.outline import outline
 from dreamdrive.geometry.classical.sweep import sample
-from dreamdrive.geometry.classical.view import View, parallel
+from dreamdrive.geometry.classical.view import View, by_frame
 
 FLAGGED = 0.5  # evidence from which a pixel counts as moving
 _EXCESS_PX = 1.0
@@ -56,13 +56,13 @@ def moving_evidence(
     def judged(frame: int) -> contest.Verdict:
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
 
-    verdicts = dict(zip(view.frames, parallel(judged, view.frames), strict=True))
+    verdicts = by_frame(view, judged)
     likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
 
     def decided(frame: int) -> np.ndarray:
         return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
 
-    found = dict(zip(view.frames, parallel(decided, view.frames), strict=True))
+    found = by_frame(view, decided)
     coming: dict[int, np.ndarray] = {}
     if not known_depth:
         floats = _floating(view, flows, inverse_depth, confidence, sky)
@@ -76,7 +76,7 @@ def moving_evidence(
         def whole(frame: int, parts: Mapping[int, np.ndarray] = flagged) -> np.ndarray:
             return outline(view, frame, flows[frame], inverse_depth[frame], parts[frame], sky[frame])
 
-        flagged = dict(zip(view.frames, parallel(whole, view.frames), strict=True))
+        flagged = by_frame(view, whole)
     # The flow of what is taken for standing is poor: an outline may lose it.
     flagged |= {frame: flagged[frame] | mask for frame, mask in coming.items()}
     evidence = np.zeros(inverse_depth.shape, np.float32)
@@ -98,7 +98,7 @@ def _floating(
     def seen(frame: int) -> Floating:
         return floating(view, frame, flows[frame], inverse_depth[frame], confidence[frame], sky[frame])
 
-    things = dict(zip(view.frames, parallel(seen, view.frames), strict=True))
+    things = by_frame(view, seen)
     likely = {frame: thing.likely.astype(np.float32) for frame, thing in things.items()}
     return {
         frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame]) >= FLAGGED

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.geometry.classical.sweep import Warp, inside, on_plane, sample
-from dreamdrive.geometry.classical.view import View, parallel
+from dreamdrive.geometry.classical.view import View, by_frame
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
 _BACKGROUND = (0.0, 0.012, 0.024)  # 1/m; what is behind it, beside the road
@@ -91,10 +91,10 @@ def oncoming(view: View) -> dict[int, Bool[np.ndarray, "h w"]]:
     Args:
         view: The posed frames; without a road plane nothing is found.
     """
-    found = dict(zip(view.frames, parallel(lambda frame: _things(view, frame), view.frames), strict=True))
+    found = by_frame(view, lambda frame: _things(view, frame))
 
-    def agreed(at: int) -> Bool[np.ndarray, "h w"]:
-        frame, votes = view.frames[at], np.zeros(view.grey[0].shape, np.int64)
+    def agreed(frame: int) -> Bool[np.ndarray, "h w"]:
+        at, votes = view.frames.index(frame), np.zeros(view.grey[0].shape, np.int64)
         for other in view.frames[max(0, at - _VOTERS) : at + _VOTERS + 1]:
             seen = np.zeros(votes.shape, bool)
             for thing in found[other]:
@@ -102,7 +102,7 @@ def oncoming(view: View) -> dict[int, Bool[np.ndarray, "h w"]]:
             votes += seen
         return (votes >= _VOTES) & view.usable[frame]
 
-    return dict(zip(view.frames, parallel(agreed, range(len(view.frames))), strict=True))
+    return by_frame(view, agreed)
 
 
 def _carried(view: View, thing: _Thing, frame: int, to: int) -> Bool[np.ndarray, "h w"]:

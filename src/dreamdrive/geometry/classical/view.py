@@ -82,3 +82,8 @@ def parallel(function: Callable[[A], B], items: Iterable[A]) -> list[B]:
     """``function`` of each item, in order, two at a time; the result does not depend on the threads."""
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(function, items))
+
+
+def by_frame(view: View, function: Callable[[int], B]) -> dict[int, B]:
+    """``function`` of the index of each used frame, by that index."""
+    return dict(zip(view.frames, parallel(function, view.frames), strict=True))
