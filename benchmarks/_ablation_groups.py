@@ -16,51 +16,52 @@ from dreamdrive.decompose.covered import covered
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.options import Quality
 
-METRES_PER_S = 10.0
-"""A second counts as so many metres: what a car of a city street goes."""
+METRES_PER_FRAME = 1.0
+"""A training frame counts as so many metres: a car of a city street goes them at 10 Hz."""
 METRES_PER_SCORE = 2.0
+METRES_PER_FEATURE = 0.5
+"""For a standard deviation of a feature."""
 VOXEL_M = 1.0
+REACH_M = 1.5
+"""Clusters of HDBSCAN that are no farther apart are one: else each frame of a near car is one of its own."""
 FULL_PERCENTILE = 98.0
 """Of a frame's errors, which counts as 1 where they are scaled frame by frame."""
-Labels = Callable[[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]], np.ndarray]
-"""From places in metres, times in seconds and scores to one label each, -1 for noise."""
+Labels = Callable[[Float[np.ndarray, "m d"]], Int[np.ndarray, " m"]]
+"""From what ``space_time`` gives to one label each, -1 for noise."""
 
 
 def by_density(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
     """HDBSCAN over space, time and score."""
-    return _grouped(begin, scores, quality, lambda *of: density_labels(*of, quality.group.smallest))
+    return _grouped(begin, scores, quality, lambda of: density_labels(of[:, :5], quality.group.smallest))
+
+
+def by_density_and_features(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+    """HDBSCAN over space, time, score and Z_ref."""
+    return _grouped(begin, scores, quality, lambda of: density_labels(of, quality.group.smallest))
 
 
 def by_voxels(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
-    """Candidates that hang together by voxels of a metre and as much time as a car needs for it."""
-    return _grouped(begin, scores, quality, voxel_labels)
+    """Candidates that hang together by voxels of a metre and a training frame."""
+    return _grouped(begin, scores, quality, lambda of: voxel_labels(of[:, :4]))
 
 
-def density_labels(
-    places_m: Float[np.ndarray, "m 3"],
-    times_s: Float[np.ndarray, " m"],
-    scores: Float[np.ndarray, " m"],
-    smallest: int,
-) -> Int[np.ndarray, " m"]:
+def density_labels(values: Float[np.ndarray, "m d"], smallest: int) -> Int[np.ndarray, " m"]:
     """Labels of HDBSCAN, -1 for noise."""
     try:
         from sklearn.cluster import HDBSCAN  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise RuntimeError("the variant hdbscan needs scikit-learn: pip install scikit-learn") from error
-    if len(places_m) < smallest:
-        return np.full(len(places_m), -1)
-    values = np.column_stack([places_m, METRES_PER_S * times_s, METRES_PER_SCORE * scores])
-    return HDBSCAN(min_cluster_size=smallest, copy=True).fit_predict(values)
+    if len(values) < smallest:
+        return np.full(len(values), -1)
+    found = HDBSCAN(min_cluster_size=smallest, cluster_selection_epsilon=REACH_M, copy=True)
+    return found.fit_predict(values)
 
 
-def voxel_labels(
-    places_m: Float[np.ndarray, "m 3"], times_s: Float[np.ndarray, " m"], scores: Float[np.ndarray, " m"]
-) -> Int[np.ndarray, " m"]:
-    """One label for all voxels that touch, in space-time; scores do not count."""
-    del scores
-    if not len(places_m):
+def voxel_labels(places: Float[np.ndarray, "m 4"]) -> Int[np.ndarray, " m"]:
+    """One label for all voxels that touch, in space-time."""
+    if not len(places):
         return np.zeros(0, dtype=np.int64)
-    cells = np.floor(np.column_stack([places_m, METRES_PER_S * times_s]) / VOXEL_M).astype(np.int64)
+    cells = np.floor(places / VOXEL_M).astype(np.int64)
     filled, which = np.unique(cells, axis=0, return_inverse=True)
     pairs = KDTree(filled).query_pairs(1.5, p=math.inf, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(filled),) * 2)
@@ -89,14 +90,33 @@ def scaled_by_frame(errors: Float[np.ndarray, "f h w"], full: float) -> Float[np
     return (full * errors / np.maximum(top, 1e-6)).astype(errors.dtype)
 
 
+def space_time(
+    begin: Start, value: Float[np.ndarray, " n"], index: Int[np.ndarray, " m"]
+) -> Float[np.ndarray, "m d"]:
+    """Place, training frame, score and Z_ref of some seeds, all as metres.
+
+    Withheld frames are not counted: no cluster ends at them.
+    """
+    seeds = begin.seeds
+    assert seeds.features is not None
+    features = seeds.features.numpy()
+    number = np.cumsum(~begin.clip.held_out) - 1
+    columns = [
+        seeds.means.detach().numpy(),
+        METRES_PER_FRAME * number[seeds.source_frame.numpy()],
+        METRES_PER_SCORE * value,
+        METRES_PER_FEATURE * features / np.maximum(features.std(axis=0), 1e-3),
+    ]
+    return np.column_stack(columns).astype(np.float64)[index]
+
+
 def _grouped(begin: Start, scores: torch.Tensor, quality: Quality, labels: Labels) -> Grouping:
     clip, geometry, seeds, options = begin.clip, begin.geometry, begin.seeds, quality.group
     value = scores.detach().numpy()
     index = np.flatnonzero(value > options.candidate)
-    places_m = seeds.means.detach().numpy()[index].astype(np.float64)
-    times_s = clip.times_s[seeds.source_frame.numpy()[index]]
+    found = labels(space_time(begin, value, index))
     cluster = np.full(len(seeds), -1, dtype=np.int64)
-    cluster[index] = majority(labels(places_m, times_s, value[index]), value[index], options)
+    cluster[index] = majority(found, value[index], options)
     dynamic = torch.from_numpy(cluster >= 0)
     pixels = source_pixels(geometry, seeds, np.arange(len(seeds)))
     hidden = covered(clip, geometry, seeds, dynamic, pixels, math.ceil(options.reach_px / 1.5))

@@ -123,6 +123,7 @@ def told_apart(scene: Scene, seed: int) -> dict[str, Any]:
     found = evaluate_decomposition(scene, Truth.of(world_of(seed)))
     return {
         "mask_iou": found.mask.iou,
+        "mask_precision": found.mask.precision,
         "label_iou": found.labels.iou,
         "fake_m": None if found.fake is None else found.fake.mean_m,
         "path_rms_m": found.path_rms_m,

@@ -11,125 +11,38 @@ those that vary it, and use what that has prepared in the same ``--runs``.
 import argparse
 import os
 import sys
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
+import torch
 from _ablation_features import with_efficientnet
-from _ablation_groups import by_density, by_voxels, scaled_by_frame
+from _ablation_variants import VARIANTS, Variant
 from _street_case import NOVEL, Case, References, Start, case_digest, start
-from _street_fit import Scale, Vote, fit_case, own_scale, own_vote, with_steps
+from _street_fit import fit_case
 from _street_fit import options_of as fit_options
 from _street_jobs import QUALITY
-from _street_keep import is_current, load, save
+from _street_keep import is_current, load, save, write
 from _street_measure import measure, told_apart
 from _street_table import as_text, grid, number
 from _street_views import views_digest
 from _workers import work_off
 
-from dreamdrive.fit import Representation
 from dreamdrive.options import Quality
 from dreamdrive.scene.features import OF_GEOMETRY
 from dreamdrive.splat import native_info
 from dreamdrive.stages import digest
 
 SEEDS = (0, 1, 2, 3)
-FIGURES = ("held_out_psnr", "novel_psnr", "mask_iou", "label_iou", "fake_m")
-
-
-@dataclass(frozen=True)
-class Variant:
-    """Hybrid with one thing changed.
-
-    Attributes:
-        about: For the table.
-        change: Of the options.
-        features: What F_score sees as Z_ref: appearance, nothing, or a network's features.
-        representation: What is fitted.
-        vote: How scores become things.
-        scale: What the error maps are brought to before the scores are trained on them.
-    """
-
-    about: str
-    change: Callable[[Quality], Quality] = lambda quality: quality
-    features: Literal["appearance", "none", "efficientnet"] = "appearance"
-    representation: Representation = "hybrid"
-    vote: Vote = own_vote
-    scale: Scale = own_scale
-
-
-def scored(**changes: Any) -> Callable[[Quality], Quality]:
-    """Other options of the scores."""
-    return lambda quality: replace(quality, score=replace(quality.score, **changes))
-
-
-def grouped(**changes: Any) -> Callable[[Quality], Quality]:
-    """Other options of the grouping."""
-    return lambda quality: replace(quality, group=replace(quality.group, **changes))
-
-
-def played(**changes: Any) -> Callable[[Quality], Quality]:
-    """Other options of the actors."""
-    return lambda quality: replace(quality, cast=replace(quality.cast, **changes))
-
-
-def fitted_with(**changes: Any) -> Callable[[Quality], Quality]:
-    """Other options of the joint fit."""
-    return lambda quality: replace(quality, fit=replace(quality.fit, **changes))
-
-
-def grown(**changes: Any) -> Callable[[Quality], Quality]:
-    """Other options of densification."""
-    return lambda quality: replace(quality, densify=replace(quality.densify, **changes))
-
-
-def prefit(steps: int) -> Callable[[Quality], Quality]:
-    """Another length of the static fit."""
-    return lambda quality: with_steps(quality, quality.fit.steps, steps)
-
-
-def ungrouped(quality: Quality) -> Quality:
-    """No clusters, hence no things that could have tracks."""
-    cut = grouped(clustering=False)(quality)
-    return replace(cut, cast=replace(cut.cast, least_frames=10**6))
-
-
-VARIANTS = {
-    "hybrid": Variant("all parts"),
-    "no-grouping": Variant("each Gaussian's own score against tau, no tracks", ungrouped),
-    "no-features": Variant("F_score without Z_ref", features="none"),
-    "efficientnet": Variant("features of EfficientNet-Lite0 as Z_ref", features="efficientnet"),
-    "error-alone": Variant("the colour error alone as target (eq. 6)", scored(target="error")),
-    "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
-    "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
-    "all-frames": Variant("scores splatted into all frames, as the paper", scored(window=None)),
-    "paper": Variant(
-        "error-alone and all-frames together, as the paper", scored(target="error", window=None)
-    ),
-    "error-scale-0.1": Variant("an error of 0.1 counts as 1, not of 0.2", scored(error_scale=0.1)),
-    "error-scale-0.4": Variant("an error of 0.4 counts as 1", scored(error_scale=0.4)),
-    "error-by-frame": Variant(
-        "errors over the 98th percentile of their frame",
-        scale=lambda errors, quality: scaled_by_frame(errors, quality.score.error_scale),
-    ),
-    "hdbscan": Variant("clusters of HDBSCAN over space, time and score", vote=by_density),
-    "voxels": Variant("clusters of touching voxels of 1 m and 0.1 s", vote=by_voxels),
-    "tau-0.20": Variant("tau = 0.20", grouped(threshold=0.20)),
-    "tau-0.50": Variant("tau = 0.50", grouped(threshold=0.50)),
-    "tau-0.65": Variant("tau = 0.65", grouped(threshold=0.65)),
-    "no-tracks": Variant("F_deform alone moves things (eq. 11)", played(least_frames=10**6)),
-    "short-lives": Variant("what no other frame sees lives no longer", played(lasting=False)),
-    "long-lives": Variant("all copies live three times as long", played(lifespan_frames=3.75)),
-    "paper-loss": Variant("L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
-    "no-depth": Variant("no term on depth", fitted_with(depth_weight=0.0)),
-    "no-shape": Variant("no term on elongation", fitted_with(shape_weight=0.0)),
-    "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),
-    "prefit-50": Variant("static fit of 50 steps", prefit(50)),
-    "prefit-400": Variant("static fit of 400 steps", prefit(400)),
-    "static": Variant("nothing moves", representation="static"),
+FIGURES = {
+    "held_out_psnr": ("withheld, dB", ".2f"),
+    "novel_psnr": ("novel, dB", ".2f"),
+    "mask_iou": ("mask IoU", ".3f"),
+    "mask_precision": ("mask precision", ".2f"),
+    "label_iou": ("label IoU", ".3f"),
+    "fake_m": ("fake motion, m", ".4f"),
 }
 
 
@@ -174,15 +87,18 @@ class Cut:
 
 def begun(begin: Start, variant: Variant, quality: Quality) -> Start:
     """What the variant is fitted to."""
-    if variant.features == "appearance":
+    if variant.features == "all":
         return begin
     if variant.features == "efficientnet":
         return with_efficientnet(begin, quality)
     features = begin.seeds.features
     assert features is not None
-    bare = features.clone()
-    bare[:, OF_GEOMETRY:] = 0
-    return replace(begin, seeds=replace(begin.seeds, features=bare))
+    seen = torch.zeros_like(features)
+    if variant.features == "evidence":
+        seen[:, :OF_GEOMETRY] = features[:, :OF_GEOMETRY]
+    if variant.features == "appearance":
+        seen[:, OF_GEOMETRY:] = features[:, OF_GEOMETRY:]
+    return replace(begin, seeds=replace(begin.seeds, features=seen))
 
 
 def make(cut: Cut) -> None:
@@ -211,51 +127,62 @@ def make(cut: Cut) -> None:
 
 
 def tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Means over worlds, and what each variant changes against all parts, world by world."""
+    """Means over the worlds that all variants have, and what each changes against all parts."""
     found: list[dict[str, Any]] = []
     for references in dict.fromkeys(record["references"] for record in records):
         here = [record for record in records if record["references"] == references]
-        whole = {record["seed"]: record for record in here if record["variant"] == "hybrid"}
-        rows = [
-            _row(variant, [record for record in here if record["variant"] == variant], whole)
-            for variant in dict.fromkeys(record["variant"] for record in here)
-        ]
-        found.append({"references": references, "rows": rows})
+        worlds = common_worlds(here)
+        by_variant: dict[str, dict[int, dict[str, Any]]] = {}
+        for record in here:
+            if record["seed"] in worlds:
+                by_variant.setdefault(record["variant"], {})[record["seed"]] = record
+        whole = by_variant.get("hybrid", {})
+        rows = [_row(variant, rows, whole) for variant, rows in by_variant.items()]
+        found.append({"references": references, "worlds": worlds, "rows": rows})
     return found
 
 
-def _row(variant: str, found: list[dict[str, Any]], whole: dict[int, dict[str, Any]]) -> dict[str, Any]:
-    row: dict[str, Any] = {"variant": variant, "worlds": len(found)}
+def common_worlds(records: list[dict[str, Any]]) -> list[int]:
+    """Seeds that every variant was measured on: means over different worlds cannot be compared."""
+    seeds: dict[str, set[int]] = {}
+    for record in records:
+        seeds.setdefault(record["variant"], set()).add(record["seed"])
+    return sorted(set.intersection(*seeds.values())) if seeds else []
+
+
+def _row(variant: str, found: dict[int, dict[str, Any]], whole: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    row: dict[str, Any] = {"variant": variant}
     for figure in FIGURES:
-        row[figure] = _mean([record[figure] for record in found])
-        pairs = [
-            (record[figure], whole[record["seed"]][figure]) for record in found if record["seed"] in whole
-        ]
-        row[f"{figure}_change"] = _mean([a - b for a, b in pairs if a is not None and b is not None])
+        known = [record[figure] for record in found.values() if record[figure] is not None]
+        pairs = [(record[figure], whole[seed][figure]) for seed, record in found.items() if seed in whole]
+        changes = [a - b for a, b in pairs if a is not None and b is not None]
+        row[figure] = float(np.mean(known)) if known else None
+        row[f"{figure}_change"] = float(np.mean(changes)) if changes else None
+        row[f"{figure}_range"] = [min(changes), max(changes)] if changes else None
     return row
 
 
-def _mean(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
-
-
 def markdown(found: list[dict[str, Any]]) -> str:
-    """The tables as text; in brackets the change against all parts."""
+    """The tables as text; in brackets the change against all parts, its mean and its range over worlds."""
     parts: list[str] = []
-    heads = ["withheld, dB", "novel, dB", "mask IoU", "label IoU", "fake motion, m"]
-    forms = (".2f", ".2f", ".3f", ".3f", ".4f")
     for table in found:
-        lines = [["variant", "", "worlds", *heads]]
-        for row in table["rows"]:
-            cells = [
-                f"{number(row[figure], form)} ({number(row[figure + '_change'], '+' + form)})"
-                for figure, form in zip(FIGURES, forms, strict=True)
-            ]
-            about = VARIANTS[row["variant"]].about
-            lines.append([row["variant"], about, str(row["worlds"]), *cells])
-        parts += [f"## {table['references']} references, true poses\n", grid(lines)]
+        lines = [["variant", "", *(head for head, _ in FIGURES.values())]]
+        lines += [
+            [row["variant"], VARIANTS[row["variant"]].about, *(_cell(row, figure) for figure in FIGURES)]
+            for row in table["rows"]
+        ]
+        worlds = ", ".join(map(str, table["worlds"]))
+        parts += [f"## {table['references']} references, true poses, worlds {worlds}\n", grid(lines)]
     return "\n".join(parts)
+
+
+def _cell(row: dict[str, Any], figure: str) -> str:
+    form = FIGURES[figure][1]
+    mean = number(row[figure], form)
+    if row[f"{figure}_range"] is None or row["variant"] == "hybrid":
+        return mean
+    low, high = (format(value, "+" + form) for value in row[f"{figure}_range"])
+    return f"{mean} ({number(row[f'{figure}_change'], '+' + form)}; {low} to {high})"
 
 
 def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -302,10 +229,8 @@ def main() -> int:
     report = {"machine": native_info(), "rows": records, "tables": tables(records)}
     text = markdown(report["tables"])
     print(text)
-    if options.json:
-        options.json.write_text(as_text(report))
-    if options.markdown:
-        options.markdown.write_text(text)
+    write(options.json, as_text(report))
+    write(options.markdown, text)
     for cut in failed:
         print(f"failed: {cut.name}", file=sys.stderr)
     return 1 if failed else 0

@@ -1,14 +1,16 @@
 """Real clips through ``dreamdrive generate``: held-out quality, moving masks, camera path, seconds, memory.
 
-    python benchmarks/clips.py [NAME ...] [--runs runs/clips] [--json FILE]
+    python benchmarks/clips.py [NAME ...] [--resume] [--runs runs/clips] [--json FILE]
 
-Each run is a folder below ``--runs`` that is reused when it is finished, so an interrupted benchmark goes on.
-The clips are found through ``DREAMDRIVE_DATA`` (default ``../shared/data``). Truth is used to measure only.
+Each run is a folder below ``--runs``; with ``--resume`` those that are finished count, whatever code made
+them, so that an interrupted benchmark goes on. A run that fails is named at the end. The clips are found
+through ``DREAMDRIVE_DATA`` (default ``../shared/data``). Truth is used to measure only.
 """
 
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -78,25 +80,36 @@ for _name in ("kitti_odom04_follow_van", "kitti_odom06_avenue", "kitti_odom07_le
     RUNS[_short + "-intrinsics"] = Run(_name, "frames", [*KITTI, *with_lens(_name)], "kitti")
 
 
-def main() -> None:
-    """Run, measure, print one table and write it as JSON."""
+def main() -> int:
+    """Run, measure, print each row and write all as JSON; 1 if a run failed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", help=f"which of {', '.join(RUNS)}; all unless given")
+    parser.add_argument("--resume", action="store_true", help="keep runs that are finished")
     parser.add_argument("--runs", type=Path, default=ROOT / "runs" / "clips")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     unknown = set(args.names) - set(RUNS)
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}; known: {', '.join(RUNS)}")
-    rows = []
+    rows, failed = [], []
     for name in args.names or RUNS:
-        rows.append(measure(name, RUNS[name], args.runs / name))
+        if not args.resume and (args.runs / name).exists():
+            shutil.rmtree(args.runs / name)
+        try:
+            rows.append(measure(name, RUNS[name], args.runs / name))
+        except (subprocess.CalledProcessError, OSError, ValueError) as error:
+            failed.append(name)
+            print(f"{name}: {error}", file=sys.stderr, flush=True)
+            continue
         print(json.dumps(rows[-1]), flush=True)
         if args.json:
             args.json.parent.mkdir(parents=True, exist_ok=True)
             args.json.write_text(json.dumps({"rows": rows}, indent=1) + "\n")
+    for name in failed:
+        print(f"failed: {name}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 def measure(name: str, run: Run, out: Path) -> dict:
@@ -123,8 +136,9 @@ def measure(name: str, run: Run, out: Path) -> dict:
     if run.truth == "pandaset":
         row |= compare_with_boxes(scene, DATA / "clips" / run.clip, report, out)
     elif run.truth == "kitti":
-        poses = np.loadtxt(DATA / "clips" / run.clip / "poses.txt").reshape(-1, 3, 4)
-        row |= compare_paths(scene, poses[report["frames"]["source_index"]])
+        rows = np.loadtxt(DATA / "clips" / run.clip / "poses.txt").reshape(-1, 3, 4)
+        poses = np.concatenate([rows, np.broadcast_to([0.0, 0, 0, 1], (len(rows), 1, 4))], axis=1)
+        row |= path_figures(scene, poses[report["frames"]["source_index"]])
     return row
 
 
@@ -160,4 +174,4 @@ def compare_with_boxes(scene, clip_dir: Path, report: dict, out: Path) -> dict:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -73,7 +73,7 @@ class Row:
         change: ``moving``, ``parked`` or ``edge``.
         what: The box and the way it goes.
         wanted_m: How far it was moved.
-        shift_m: How far the scene moved it, in the scene's own metres; None where it is not found.
+        shift_m: How far the scene moved it, in the scene's own metres; None where that is not found.
         aligned_m: The same with both scenes brought onto the truth by their cameras.
         frames: Number of frames in which it was looked for, or that were compared.
         psnr: Between the renders of both scenes, where the change is not.
@@ -150,7 +150,8 @@ def measure(seed: int, options: argparse.Namespace) -> list[Row]:
         rows.append(Row(seed, change, what, MOVE_M, shifts[0][0], shifts[1][0], shifts[0][1], *row))
     if seed % 3 == 0:
         wide = make(widen_road(layout, EDGE_M), f"{seed}-edge", seed, options)
-        moved = edge_of(wide, layout) - edge_of(before, layout)
+        edges = edge_of(wide, layout), edge_of(before, layout)
+        moved = None if None in edges else edges[0] - edges[1]
         row = compare(before, wide, None)
         rows.append(Row(seed, "edge", "right edge out", EDGE_M, moved, None, len(wide.views), *row))
     return rows
@@ -224,11 +225,9 @@ def shift(
             far, own, looks = far + found[0], own + found[1], looks + 1
     best = int(far.argmin())
     apart = own[:, 0] / np.maximum(own[:, 1], 1)
-    if not looks or best in (0, len(far) - 1) or apart[best] >= LIKE * apart.max():
+    if not looks or apart[best] >= LIKE * apart.max():
         return None, looks
-    a, b, c = far[best - 1 : best + 2]
-    step = float(SHIFTS_M[1] - SHIFTS_M[0])
-    return float(SHIFTS_M[best] + 0.5 * step * (a - c) / max(a - 2 * b + c, 1e-12)), looks
+    return lowest(SHIFTS_M, far), looks
 
 
 def _agreement(
@@ -329,11 +328,11 @@ def psnr(squared: float, count: int) -> float:
     return float(min(99.0, -10 * np.log10(max(squared, 1e-12) / count)))
 
 
-def edge_of(made: Made, layout: Layout) -> float:
+def edge_of(made: Made, layout: Layout) -> float | None:
     """By how much the road of a layout has to be widened to look most like a scene, in metres.
 
     Every trial is a clean drawing; they are compared where any two of them differ, and a parabola goes
-    through the best and its neighbours.
+    through the best and its neighbours. None where the best is the first or the last.
     """
     count, size = len(made.views), made.truth.size
     chosen = range(0, count, max(1, count // 4))
@@ -341,10 +340,17 @@ def edge_of(made: Made, layout: Layout) -> float:
     differs = np.ptp(trials, axis=0).max(axis=-1) >= DIFFERENT
     shown = np.stack([render(made, frame) for frame in chosen])
     errors = np.array([np.square(trial / 255 - shown)[differs].mean() for trial in trials])
-    best = int(np.clip(errors.argmin(), 1, len(errors) - 2))
+    return lowest(EDGES_M, errors)
+
+
+def lowest(places: np.ndarray, errors: np.ndarray) -> float | None:
+    """Where a parabola through the least error and its neighbours is lowest; None at either end."""
+    best = int(errors.argmin())
+    if best in (0, len(errors) - 1):
+        return None
     a, b, c = errors[best - 1 : best + 2]
-    step = float(EDGES_M[1] - EDGES_M[0])
-    return float(EDGES_M[best] + 0.5 * step * (a - c) / max(a - 2 * b + c, 1e-12))
+    step = float(places[1] - places[0])
+    return float(places[best] + 0.5 * step * (a - c) / max(a - 2 * b + c, 1e-12))
 
 
 def table(rows: list[Row]) -> str:

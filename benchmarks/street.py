@@ -33,7 +33,7 @@ from _street_case import FRAMES, Poses, References, references_digest, world_dig
 from _street_claims import claims
 from _street_consistency import consistency_tables
 from _street_jobs import BUDGETS, QUALITY, REPRESENTATIONS, SEEDS, Job, in_order, jobs, recorded, run
-from _street_keep import is_current, kept, load, load_features
+from _street_keep import is_current, kept, load, load_features, write
 from _street_measure import truth_features
 from _street_picture import picture
 from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
@@ -159,10 +159,8 @@ def main() -> int:
     report = report_of(wanted, clips, toolbox, options.seeds, options.runs)
     text = markdown(report)
     print(text)
-    if options.json:
-        options.json.write_text(as_text(report))
-    if options.markdown:
-        options.markdown.write_text(text)
+    write(options.json, as_text(report))
+    write(options.markdown, text)
     if options.picture:
         picture(options.picture, options.seeds[:4], options.runs)
     for job in failed:

@@ -1,16 +1,28 @@
 """The ablation: what its variants change, and means against all parts."""
 
 import importlib
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 
 from dreamdrive.decompose import GroupOptions
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+PARTS = ("features", "representation", "vote", "scale")
+
+
+@dataclass(frozen=True)
+class SimpleSeeds:
+    features: torch.Tensor
+
+
+@dataclass(frozen=True)
+class SimpleStart:
+    seeds: SimpleSeeds
 
 
 @pytest.fixture
@@ -19,13 +31,26 @@ def ablation(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("ablation")
 
 
-def test_each_variant_changes_something_and_hybrid_nothing(ablation: ModuleType) -> None:
+@pytest.fixture
+def variants(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(FOLDER))
+    return importlib.import_module("_ablation_variants")
+
+
+def test_each_variant_changes_something_of_its_own_and_hybrid_nothing(
+    ablation: ModuleType, variants: ModuleType
+) -> None:
     def same(variant) -> bool:
         options = asdict(variant.change(ablation.QUALITY)) == asdict(ablation.QUALITY)
-        options &= variant.vote is ablation.own_vote and variant.scale is ablation.own_scale
-        return options and variant.features == "appearance" and variant.representation == "hybrid"
+        options &= variant.vote is variants.own_vote and variant.scale is variants.own_scale
+        return options and variant.features == "all" and variant.representation == "hybrid"
 
     assert [name for name, variant in ablation.VARIANTS.items() if same(variant)] == ["hybrid"]
+    everything = [
+        (asdict(variant.change(ablation.QUALITY)), *(getattr(variant, name) for name in PARTS))
+        for variant in ablation.VARIANTS.values()
+    ]
+    assert all(everything.count(one) == 1 for one in everything)
 
 
 def test_all_steps_are_equal(ablation: ModuleType) -> None:
@@ -44,13 +69,30 @@ def test_changes_are_world_by_world(ablation: ModuleType) -> None:
         return {"seed": seed, "references": "clean", "variant": variant, **figures, "fake_m": fake}
 
     records = [record(seed, "hybrid", 10.0 * seed) for seed in range(3)]
-    records += [record(seed, "static", 10.0 * seed - 1, None) for seed in range(1, 3)]
+    records += [record(seed, "static", 11.0 * seed - 1, None) for seed in range(1, 3)]
     (table,) = ablation.tables(records)
-    row = table["rows"][1]
-    assert row["worlds"] == 2
-    assert row["novel_psnr_change"] == pytest.approx(-1)
-    assert row["fake_m"] is None
-    assert "(-1.00)" in ablation.markdown([table])
+    hybrid, static = table["rows"]
+    # World 0 lacks static: it counts in neither mean.
+    assert table["worlds"] == [1, 2]
+    assert hybrid["novel_psnr"] == pytest.approx(15)
+    assert static["novel_psnr_change"] == pytest.approx(0.5)
+    assert static["novel_psnr_range"] == pytest.approx([0, 1])
+    assert static["fake_m"] is None
+    assert "(+0.50; +0.00 to +1.00)" in ablation.markdown([table])
+
+
+def test_features_are_cut_as_each_variant_says(ablation: ModuleType, variants: ModuleType) -> None:
+    features = torch.arange(1.0, 13).reshape(2, 6)
+    begin = SimpleStart(SimpleSeeds(features))
+    seen = {
+        name: ablation.begun(begin, variants.Variant("", features=name), None).seeds.features
+        for name in ("all", "evidence", "appearance", "none")
+    }
+    assert (seen["all"] == features).all()
+    assert (seen["evidence"] + seen["appearance"] == features).all()
+    assert (seen["evidence"][:, 2:] == 0).all()
+    assert (seen["evidence"][:, :2] != 0).all()
+    assert (seen["none"] == 0).all()
 
 
 @pytest.fixture
@@ -59,31 +101,43 @@ def groups(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("_ablation_groups")
 
 
-def two_cars(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Places and times of two cars, 40 points in each of 10 frames, one at 10 m/s and one 8 m beside it."""
-    times_s = np.repeat(np.arange(10) / 10, 80)
-    places_m = rng.uniform(-0.8, 0.8, (800, 3))
-    places_m[:, 2] += 10 * times_s
-    places_m[np.arange(800) % 80 >= 40, 0] += 8.0
-    return places_m, times_s
+def two_cars(rng: np.random.Generator, per_frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """Two cars of 4 m, 8 m apart, at 10 m/s in 21 training frames of 24: space-time, and whose it is."""
+    frames = np.flatnonzero(np.arange(24) % 8 != 7)
+    first = np.arange(len(frames) * 2 * per_frame) % (2 * per_frame) < per_frame
+    number = np.repeat(np.arange(len(frames)), 2 * per_frame)
+    places = rng.uniform([-0.9, -0.7, -2], [0.9, 0.7, 2], (len(number), 3))
+    places[:, 2] += frames[number]  # of 0.1 s
+    places[~first, 0] += 8.0
+    return np.column_stack([places, number]), first
 
 
-def test_voxels_tell_two_cars_apart_and_keep_each_together(groups: ModuleType) -> None:
-    places_m, times_s = two_cars(np.random.default_rng(0))
-    labels = groups.voxel_labels(places_m, times_s, np.ones(800))
-    first = np.arange(800) % 80 < 40
-    assert len(set(labels[first].tolist())) == len(set(labels[~first].tolist())) == 1
-    assert labels[0] != labels[-1]
-    assert groups.voxel_labels(places_m[:0], times_s[:0], times_s[:0]).shape == (0,)
+@pytest.mark.parametrize("per_frame", [40, 150])
+def test_voxels_and_clusters_of_density_give_each_car_one_label(groups: ModuleType, per_frame: int) -> None:
+    places, first = two_cars(np.random.default_rng(0), per_frame)
+    score = np.full(len(places), groups.METRES_PER_SCORE)
+    for labels in (
+        groups.voxel_labels(places),
+        groups.density_labels(np.column_stack([places, score]), 24),
+    ):
+        found = [np.bincount(labels[rows] + 1)[1:] for rows in (first, ~first)]
+        assert found[0].argmax() != found[1].argmax()
+        assert all(counts.max() > 0.97 * counts.sum() > 0.9 * first.sum() for counts in found)
 
 
-def test_clusters_of_density_do_so_too(groups: ModuleType) -> None:
-    pytest.importorskip("sklearn", reason="HDBSCAN comes with scikit-learn, which is not installed")
-    places_m, times_s = two_cars(np.random.default_rng(0))
-    labels = groups.density_labels(places_m, times_s, np.ones(800), 24)
-    first = np.arange(800) % 80 < 40
-    most = [np.bincount(labels[rows][labels[rows] >= 0]).argmax() for rows in (first, ~first)]
-    assert most[0] != most[1]
+def test_no_candidates_have_no_labels(groups: ModuleType) -> None:
+    assert groups.voxel_labels(np.zeros((0, 4))).shape == (0,)
+    assert (groups.density_labels(np.zeros((3, 5)), 24) == -1).all()
+
+
+def test_space_time_does_not_count_withheld_frames(groups: ModuleType) -> None:
+    seeds = SimpleNamespace(
+        means=torch.zeros(3, 3), source_frame=torch.tensor([0, 2, 3]), features=torch.ones(3, 2)
+    )
+    begin = SimpleNamespace(seeds=seeds, clip=SimpleNamespace(held_out=np.array([False, True, False, False])))
+    found = groups.space_time(begin, np.array([0.1, 0.5, 0.9]), np.array([0, 1, 2]))
+    np.testing.assert_allclose(found[:, 3], [0, 1, 2])
+    np.testing.assert_allclose(found[:, 4], [0.2, 1.0, 1.8])
 
 
 def test_the_vote_is_that_of_eq_10(groups: ModuleType) -> None:

@@ -178,3 +178,10 @@ def test_the_edge_is_where_the_drawing_is_most_alike(
     for metres in (0.0, 0.5, 0.3):
         monkeypatch.setattr(control, "render", lambda made, frame, m=metres: drawn(m).frames[frame] / 255)
         assert control.edge_of(shown, None) == pytest.approx(metres, abs=0.06)
+
+
+def test_the_lowest_place_is_that_of_a_parabola_and_none_at_an_end(control: ModuleType) -> None:
+    places = np.arange(-1.0, 2.01, 0.25)
+    assert control.lowest(places, (places - 0.4) ** 2) == pytest.approx(0.4)
+    assert control.lowest(places, places) is None
+    assert control.lowest(places, -places) is None

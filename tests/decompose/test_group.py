@@ -64,6 +64,32 @@ def test_copies_of_one_car_lie_on_top_of_each_other():
     assert spread < 0.2 * trail.std(dim=0).max()
 
 
+def test_another_canonical_time_puts_all_copies_at_the_same_places_in_the_world():
+    _, clip, geometry, seeds = scene()
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
+    middle, first = (
+        cast(clip, geometry, seeds, grouping, ActorOptions(canonical=time)) for time in ("middle", "first")
+    )
+    apart = first.gaussians.means - middle.gaussians.means
+    assert apart.norm(dim=1).min() > 0.5
+    for key in range(len(middle.tracks.times_s)):
+        track = middle.tracks.translation_m[0, key] - first.tracks.translation_m[0, key]
+        np.testing.assert_allclose(apart.numpy(), np.broadcast_to(track, apart.shape), atol=1e-4)
+
+
+def test_what_has_no_track_lives_as_long_as_is_asked():
+    _, clip, geometry, seeds = scene()
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
+    options = ActorOptions(least_frames=100, untracked_frames=2.0)
+    whole = cast(clip, geometry, seeds, grouping, options)
+    interval_s = float(np.median(np.diff(clip.times_s[~clip.held_out])))
+    assert whole.tracks is None
+    torch.testing.assert_close(whole.gaussians.means, seeds.select(grouping.dynamic).means)
+    torch.testing.assert_close(
+        whole.gaussians.lifespan[:, 1], torch.full((len(whole.gaussians),), 2 * interval_s)
+    )
+
+
 def test_nothing_dynamic_gives_an_empty_cast():
     _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, torch.zeros(len(seeds)), GroupOptions())
