@@ -50,7 +50,7 @@ def density_labels(values: Float[np.ndarray, "m d"], smallest: int) -> Int[np.nd
     try:
         from sklearn.cluster import HDBSCAN  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        raise RuntimeError("the variant hdbscan needs scikit-learn: pip install scikit-learn") from error
+        raise RuntimeError("clusters of HDBSCAN need scikit-learn: pip install scikit-learn") from error
     if len(values) < smallest:
         return np.full(len(values), -1)
     found = HDBSCAN(min_cluster_size=smallest, cluster_selection_epsilon=REACH_M, copy=True)

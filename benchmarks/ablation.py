@@ -217,9 +217,10 @@ def main() -> int:
     """Fit what is not there yet and print the tables."""
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     options = options_of()
-    if "hdbscan" in options.variants and find_spec("sklearn") is None:
-        print("not measured: hdbscan: pip install scikit-learn", file=sys.stderr)
-        options.variants.remove("hdbscan")
+    for name in {"hdbscan", "hdbscan-features"}.intersection(options.variants):
+        if find_spec("sklearn") is None:
+            print(f"not measured: {name}: pip install scikit-learn", file=sys.stderr)
+            options.variants.remove(name)
     wanted = cuts(options)
     for cut in wanted:
         if not (options.resume and is_current(cut.result, cut.key)):
