@@ -26,7 +26,11 @@ def test_figures_are_shown_and_written(
 ) -> None:
     file = tmp_path / "new" / "figures.json"
     consistency(
-        world / "frames", trajectory=world / "poses.json", intrinsics=world / "meta.json", fps=10, json=file
+        world / "frames",
+        trajectory=world / "poses.json",
+        intrinsics=world / "cameras.json",
+        fps=10,
+        json=file,
     )
     said = " ".join(capsys.readouterr().out.split())
     assert "5 frames, 160 px wide" in said

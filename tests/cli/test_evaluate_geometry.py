@@ -64,7 +64,7 @@ def _record(street: Drive, folder: Path) -> None:
     (folder / "lidar_depth").mkdir(parents=True)
     rows = [" ".join(map(repr, c.world_from_camera[:3].ravel().tolist())) for c in street.cameras]
     (folder / "poses.txt").write_text("\n".join(rows))
-    shutil.copy(folder.parent / "world" / "meta.json", folder)
+    shutil.copy(folder.parent / "world" / "cameras.json", folder / "meta.json")
     for frame, depth_m in enumerate(street.depth_m):
         v, u = np.nonzero(depth_m)
         np.savez(folder / "lidar_depth" / f"{frame:04d}.npz", u=u, v=v, depth=depth_m[v, u])

@@ -22,9 +22,9 @@ def test_a_world_is_written_with_all_truth(run: Run, tmp_path: Path) -> None:
         assert cv2.imread(str(out / name / "0001.png"), cv2.IMREAD_UNCHANGED).shape[:2] == (64, 96)
     names = {path.name for path in out.iterdir()}
     assert {
-        "depth.npz",
+        "depth",
         "flow.npz",
-        "meta.json",
+        "cameras.json",
         "poses.json",
         "boxes.json",
         "layout.json",
@@ -53,9 +53,9 @@ def test_corrupted_frames_have_a_clean_truth(run: Run, tmp_path: Path) -> None:
     clean, bad = tmp_path / "clean", tmp_path / "bad"
     first, second = (cv2.imread(str(folder / "frames" / "0001.png")) for folder in (clean, bad))
     assert (first != second).mean() > 0.5
-    for name in ("depth.npz", "flow.npz", "boxes.json", "poses.json", "layout.json", "moving/0001.png"):
+    for name in ("depth/0001.npz", "flow.npz", "boxes.json", "poses.json", "layout.json", "moving/0001.png"):
         assert (clean / name).read_bytes() == (bad / name).read_bytes()
-    meta = json.loads((bad / "meta.json").read_text())
+    meta = json.loads((bad / "cameras.json").read_text())
     assert meta["corruption"] == {
         "warp": 0.5,
         "shimmer": 0.5,
@@ -64,7 +64,7 @@ def test_corrupted_frames_have_a_clean_truth(run: Run, tmp_path: Path) -> None:
         "far": 0.5,
         "seed": 4,
     }
-    assert "corruption" not in json.loads((clean / "meta.json").read_text())
+    assert "corruption" not in json.loads((clean / "cameras.json").read_text())
     wrong = run(*made, "--corrupt", "rain=1", "-o", tmp_path / "wrong")
     assert wrong.code == 2
     assert "'rain=1': expected warp=STRENGTH" in wrong.err

@@ -9,6 +9,7 @@ from dreamdrive.data import read_clip
 from dreamdrive.data.world import Drive, make_street
 from dreamdrive.data.world.files import read_world, write_world
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.files import attach
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +21,7 @@ def test_a_world_folder_is_read_back_as_a_clip(street: Drive, tmp_path: Path) ->
     write_world({"front": street}, tmp_path / "w")
     clip = read_clip(
         tmp_path / "w" / "frames",
-        intrinsics=tmp_path / "w" / "meta.json",
+        intrinsics=tmp_path / "w" / "cameras.json",
         poses=tmp_path / "w" / "poses.json",
         size=(64, 48),
     )
@@ -31,10 +32,18 @@ def test_a_world_folder_is_read_back_as_a_clip(street: Drive, tmp_path: Path) ->
     np.testing.assert_allclose(clip.known.world_from_camera, street.trajectory.world_from_camera, atol=1e-9)
 
 
+def test_a_world_folder_is_geometry_that_can_be_given(street: Drive, tmp_path: Path) -> None:
+    write_world({"front": street}, tmp_path / "w")
+    clip = attach(read_clip(tmp_path / "w" / "frames", size=(64, 48)), tmp_path / "w")
+    assert clip.rig[0].fx_px == pytest.approx(51.2)
+    np.testing.assert_allclose(clip.known.world_from_camera, street.trajectory.world_from_camera, atol=1e-9)
+    assert (clip.known.depth_m == street.depth_m).all()
+
+
 def test_depth_labels_and_boxes_are_all_there(street: Drive, tmp_path: Path) -> None:
     write_world({"front": street}, tmp_path / "w")
-    with np.load(tmp_path / "w" / "depth.npz") as stored:
-        assert (stored["depth_m"] == street.depth_m).all()
+    with np.load(tmp_path / "w" / "depth" / "0003.npz") as stored:
+        assert (stored["depth_m"] == street.depth_m[3]).all()
     label = cv2.imread(str(tmp_path / "w" / "instances" / "0002.png"), cv2.IMREAD_UNCHANGED)
     assert (label == street.instance[2]).all()
     boxes = json.loads((tmp_path / "w" / "boxes.json").read_text())["boxes"]
@@ -89,7 +98,7 @@ def test_a_damaged_world_is_refused(street: Drive, tmp_path: Path) -> None:
     (tmp_path / "w" / "moving" / "0001.png").unlink()
     with pytest.raises(InputError, match="is not a complete world"):
         read_world(tmp_path / "w")
-    (tmp_path / "w" / "depth.npz").write_bytes(b"PK")
+    (tmp_path / "w" / "depth" / "0002.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match="is not a complete world"):
         read_world(tmp_path / "w")
     (tmp_path / "w" / "layout.json").unlink()

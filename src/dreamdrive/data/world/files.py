@@ -28,17 +28,17 @@ def write_world(
     """Write a world folder; it appears whole or not at all.
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
-    itself. Of every camera there are: ``frames/NNNN.png``; ``meta.json`` (calibration for
-    ``--intrinsics``; principal point by integer pixel index, as calibration files count); ``poses.json`` (a
-    trajectory for ``--poses``); ``depth.npz`` (``depth_m``, 0 in the sky); ``flow.npz`` (``flow_px``, to the
-    next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
+    itself. Of every camera there are: ``frames/NNNN.png``; ``cameras.json`` (calibration and poses, principal
+    point by integer pixel index) and ``depth/NNNN.npz`` (``depth_m``, 0 in the sky), which together are what
+    ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``); ``flow.npz`` (``flow_px``, to
+    the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
     ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
     several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``.
 
     Args:
         drives: One for each camera, by its mount.
         path: The folder.
-        corruption: What was done to the frames, noted in ``meta.json``.
+        corruption: What was done to the frames, noted in ``cameras.json``.
         replace: Whether an existing world folder may be replaced.
 
     Raises:
@@ -53,7 +53,7 @@ def write_world(
         _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
         _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
         if len(drives) > 1:
-            write_rig({name: front_from_mount(name) for name in drives}, folder, "meta.json")
+            write_rig({name: front_from_mount(name) for name in drives}, folder, "cameras.json")
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)
@@ -85,7 +85,7 @@ def read_world(path: Path, camera: str = "front") -> Drive:
 
 
 def _read_camera(folder: Path, layout: Layout) -> Drive:
-    pinhole = _pinhole(json.loads((folder / "meta.json").read_text(encoding="utf-8")))
+    pinhole = _pinhole(json.loads((folder / "cameras.json").read_text(encoding="utf-8")))
     path = json.loads((folder / "poses.json").read_text(encoding="utf-8"))
     hulls = json.loads((folder / "boxes.json").read_text(encoding="utf-8"))
     times_s = np.array(path["times_s"], dtype=np.float64)
@@ -95,7 +95,7 @@ def _read_camera(folder: Path, layout: Layout) -> Drive:
         frames=_images(folder / "frames", (*shape, 3))[..., ::-1].copy(),
         times_s=times_s,
         cameras=tuple(pinhole.at(np.array(pose)) for pose in path["world_from_camera"]),
-        depth_m=_array(folder / "depth.npz", "depth_m", shape),
+        depth_m=np.stack([_array(path, "depth_m", shape[1:]) for path in _depth_files(folder, len(times_s))]),
         instance=_images(folder / "instances", shape).astype(np.int32),
         semantic=_images(folder / "semantics", shape),
         moving=_images(folder / "moving", shape) > 0,
@@ -107,9 +107,13 @@ def _read_camera(folder: Path, layout: Layout) -> Drive:
     )
 
 
-def _pinhole(meta: dict[str, Any]) -> Camera:
-    k = meta["intrinsics"]
-    return Camera(k["fx"], k["fy"], k["cx"] + 0.5, k["cy"] + 0.5, meta["width"], meta["height"])
+def _pinhole(record: dict[str, Any]) -> Camera:
+    k = record["intrinsics"]
+    return Camera(k["fx"], k["fy"], k["cx"] + 0.5, k["cy"] + 0.5, record["width"], record["height"])
+
+
+def _depth_files(folder: Path, count: int) -> list[Path]:
+    return [folder / "depth" / f"{i:04d}.npz" for i in range(count)]
 
 
 def _images(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
@@ -152,15 +156,14 @@ def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> 
         (folder / name).mkdir()
         for i, image in enumerate(images):
             _write_png(folder / name / f"{i:04d}.png", image)
-    np.savez_compressed(folder / "depth.npz", depth_m=drive.depth_m)
+    (folder / "depth").mkdir()
+    for place, depth_m in zip(_depth_files(folder, len(drive.depth_m)), drive.depth_m, strict=True):
+        np.savez_compressed(place, depth_m=depth_m)
     np.savez_compressed(folder / "flow.npz", flow_px=drive.flow_px)
     made = {} if corruption is None else {"corruption": asdict(corruption)}
-    _write_json(folder / "meta.json", {**_calibration(drive), **made})
-    path = drive.trajectory
-    _write_json(
-        folder / "poses.json",
-        {"world_from_camera": path.world_from_camera.tolist(), "times_s": path.times_s.tolist()},
-    )
+    poses = {"world_from_camera": drive.trajectory.world_from_camera.tolist()}
+    _write_json(folder / "cameras.json", {**_calibration(drive), **poses, **made})
+    _write_json(folder / "poses.json", {**poses, "times_s": drive.times_s.tolist()})
     _write_json(
         folder / "boxes.json", {"boxes": _boxes(drive), "world_from_map": drive.world_from_map.tolist()}
     )
