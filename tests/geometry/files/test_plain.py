@@ -1,6 +1,7 @@
 """Geometry given as files: what is read, and what is said about bad ones."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -54,6 +55,15 @@ def test_cameras_are_selected_scaled_and_moved_to_the_first_frame(tmp_path):
     poses = clip.known.world_from_camera
     assert poses is not None
     np.testing.assert_allclose(poses[:, 2, 3], [0, 2, 4])
+
+
+def test_a_guessed_focal_length_is_said_to_be_replaced(tmp_path):
+    write(tmp_path, record())
+    (said,) = attach(make_clip(), tmp_path).provenance["notes"]
+    assert said == "The focal length is that of cameras.json, not the one that was taken before."
+    clip = make_clip()
+    known = replace(clip, known=replace(clip.known, intrinsics=True))
+    assert attach(known, tmp_path).provenance["notes"] == []
 
 
 def test_frames_may_be_named(tmp_path):

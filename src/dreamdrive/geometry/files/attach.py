@@ -52,6 +52,8 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
         points=points,
     )
     said = [*clip.provenance.get("notes", []), *given.notes, *notes]
+    if given.cameras and not clip.known.intrinsics:
+        said.append(f"The focal length is that of {place.name}, not the one that was taken before.")
     attached = replace(clip, rig=rig, camera=camera, known=known)
     if not given.metric and depth is not None and given.depth.metric:
         known, note = _scaled_by_depth(attached, given, str(place))
