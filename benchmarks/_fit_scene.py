@@ -1,4 +1,4 @@
-"""A fit in progress on the common street: what a training step works on, made in a second and from a seed."""
+"""A fit in progress on a street of Gaussians: what a training step works on, made in a second from a seed."""
 
 from dataclasses import dataclass
 

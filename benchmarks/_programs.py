@@ -66,7 +66,7 @@ def walk(scene: Scene, lanes: int) -> tuple[dict[str, int], np.ndarray] | None:
 
 
 def common_image(scene: Scene) -> np.ndarray | None:
-    """The scene in float64 by the common bench's program; None without it or a compiler.
+    """The scene in float64 by the program in ``DREAMDRIVE_BENCH``; None without it or a compiler.
 
     It takes minutes for large scenes, so that its images are kept.
     """

@@ -1,4 +1,4 @@
-"""Streets of Gaussians of any size: from the common bench where it is, else from a generator of our own."""
+"""Streets of Gaussians of any size: those in ``DREAMDRIVE_BENCH``, else of a generator of our own."""
 
 import importlib.util
 import os
@@ -12,7 +12,7 @@ COMMON = "street_scene.py"
 
 
 def bench_dir() -> Path | None:
-    """Folder of the common bench (DREAMDRIVE_BENCH, else ../shared/bench), or None if absent."""
+    """Folder of the scenes (DREAMDRIVE_BENCH, else ../shared/bench), or None if absent."""
     default = Path(__file__).resolve().parents[1] / "../shared/bench"
     folder = Path(os.environ.get("DREAMDRIVE_BENCH", default))
     return folder.resolve() if (folder / "street_scene.py").is_file() else None
@@ -71,7 +71,7 @@ def quaternions_to(normals: np.ndarray, roll: np.ndarray) -> np.ndarray:
 
 
 def stand_in(width: int, height: int, count: int) -> dict[str, np.ndarray]:
-    """A street with the statistics of the common scenes: projected sizes, opacities, depth range."""
+    """A street with the statistics of those scenes: projected sizes, opacities, depth range."""
     rng = np.random.default_rng([SEED, count])
     points, normals = surfaces(rng, count)
     normals = normals + rng.normal(0, 0.12, normals.shape)

@@ -1,4 +1,4 @@
-"""Milliseconds of splatting, forward and forward + backward, on the common street scenes.
+"""Milliseconds of splatting, forward and forward + backward, on the scenes in ``DREAMDRIVE_BENCH``.
 
     python benchmarks/splat.py --scenes a b c --json FILE [--markdown docs/performance.md] [--threads N]
 
@@ -7,7 +7,7 @@ degree 0). Times are medians, or the best where it says so. Shown are
 
 - how many times faster we are than OpenSplat's CPU rasteriser (a, b, c), as published and as scaled;
 - how near each stage is to the least time its operations and bytes can take here;
-- the difference of the image from a float64 program: the common bench's, else our own;
+- the difference of the image from a float64 program: that in ``DREAMDRIVE_BENCH``, else our own;
 - OpenSplat itself, measured here, if ``--opensplat`` names a checkout of it (version of November 2025);
 - the project's plain-torch twin on 1,000 Gaussians at 160 x 96: never counted.
 

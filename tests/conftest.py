@@ -29,5 +29,5 @@ def golden_dir() -> Path:
 
 @pytest.fixture(scope="session")
 def bench_dir() -> Path:
-    """The common splatting scenes; the test is skipped where they are absent."""
+    """The scenes in ``DREAMDRIVE_BENCH``; the test is skipped where they are absent."""
     return _shared("DREAMDRIVE_BENCH", "../shared/bench")

@@ -143,7 +143,7 @@ def test_a_missing_input_is_refused(tmp_path):
 def test_one_frame_names_the_priors_that_will_take_it(make_folder, make_video):
     folder = make_folder(3)
     for path, frames in ((folder / "0.png", None), (folder, "1:2"), (make_video(5), "2:3")):
-        with pytest.raises(InputError, match=r"single frame.* vista and svd"):
+        with pytest.raises(InputError, match=r"single frame.* vista, svd, cosmos and diffusers"):
             read_clip(path, frames=frames)
 
 

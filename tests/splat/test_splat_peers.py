@@ -1,4 +1,4 @@
-"""The common street scenes: images of the float64 program, gsplat's torch code in value and gradient."""
+"""Scenes in ``DREAMDRIVE_BENCH``: the float64 program's images, gsplat's torch code in value and gradient."""
 
 import importlib.util
 import subprocess

@@ -83,7 +83,8 @@ def generate(
             a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
-        trajectory: Path that a video model shall drive, or that a replayed video was to drive: JSON or TUM.
+        trajectory: Path that a video model shall drive, JSON or TUM, or that a replayed video was to drive:
+            KITTI or PandaSet as well.
         action: What a video model shall do instead: command=left; speed=8,8,8,8 wheel=0,0,0.1,0.1 (m/s and
             radians, left is positive, at 0.5, 1, 1.5 and 2 s); ahead=4,8,12,16 right=0,0,0,1 (m);
             goal=0.5,0.55 (shares of the photo's width and height).

@@ -32,5 +32,5 @@ def one_frame(path: Path) -> InputError:
     """The error for an input of one picture."""
     return InputError(
         f"{path} gives a single frame, and a recorded clip needs at least two. One photo is taken by the "
-        "priors vista and svd, which need the weights of their networks: --prior vista --weights PATH"
+        "priors vista, svd, cosmos and diffusers, which need weights: --prior vista --weights PATH"
     )

@@ -59,7 +59,7 @@ class GradientDensifier:
 
     The rule of 3DGS with these differences: sizes are measured in units of each Gaussian's seed footprint
     (``Parameters.unit_m``), opacity is never reset (a clip is short: every frame would have to be revisited
-    before the reset heals, see splatting facts on pausing after a reset), and the number is capped.
+    before the reset heals), and the number is capped.
     All constants are in ``DensifySettings``. Children keep source frame, features, life span and actor.
     """
 

@@ -226,5 +226,5 @@ def _renamed(key: str) -> str:
 def _tokenizer(folder: Path) -> CLIPTokenizer:
     try:
         return CLIPTokenizer.from_pretrained(str(folder), local_files_only=True)
-    except Exception as error:  # its library raises nothing narrower
+    except Exception as error:  # the one broad except: tokenizers raises no narrower one
         raise InputError(f"{folder} is no tokenizer of CLIP ({error}); expected {EXPECTED}") from error

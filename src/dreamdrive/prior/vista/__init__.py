@@ -9,9 +9,9 @@ from dreamdrive.scene.control import Control
 
 _TAKES = frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"})
 _MEMORY = (
-    "at 1024x576 about 9 GB for the UNet in half precision (17 GB on a CPU, and hours) and 43 GB for the "
-    "decoder, at 576x320 5 and 14 GB (reckoned, not measured); a run that does not fit is refused before it "
-    "starts"
+    "at 1024x576 8.3 GB for the UNet in half precision (16.5 GB on a CPU, and hours) and 42.9 GB for "
+    "the decoder, at 576x320 4.9 and 13.7 GB (reckoned, not measured); a run that does not fit is refused "
+    "before it starts"
 )
 
 
