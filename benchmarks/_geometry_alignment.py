@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from _geometry_cases import Row, fields_of
 from _geometry_worlds import SEEDS, world_of
 from _simulated_pairs import Noise, Truth, pair_maps, truth_of
 from jaxtyping import Float
@@ -25,8 +26,15 @@ from dreamdrive.splat.torch_threads import one_torch_thread
 
 RATE_HZ = 5.0
 STEPS = 300
+_DRAWS = 10_000  # further apart than the seeds of all cases of one draw
 _FAR_M = BANDS_M[-1][1]  # depth beyond does not count
 
+GRAPH = "swin-3-noncyclic"
+GRAPHS = {
+    48: (GRAPH, "swin-5-noncyclic", "logwin-4-noncyclic", "logwin-5-noncyclic"),
+    24: (GRAPH, "logwin-5-noncyclic", "complete"),
+}
+"""Which pairs are compared, by the number of frames; clips of these lengths are for nothing else."""
 PAPER = "ours, paper's loss"
 EASY = Noise(mistaken=False)
 Method = Literal["ours", "ours, paper's loss", "upstream"]
@@ -44,6 +52,7 @@ class Alignment:
         graph: Which pairs there are.
         noise: What is wrong with them.
         steps: Of Adam, the method ``upstream`` alone; fewer tell the seconds of one step.
+        draw: Which draw of the noise.
         runs: Folder of the results.
     """
 
@@ -51,9 +60,10 @@ class Alignment:
     method: Method
     frames: int = 25
     size: tuple[int, int] = (128, 80)
-    graph: str = "swin-3-noncyclic"
+    graph: str = GRAPH
     noise: Noise = EASY
     steps: int = STEPS
+    draw: int = 0
     runs: Path = Path("runs/geometry")
 
     @property
@@ -64,27 +74,47 @@ class Alignment:
             f"-unseen{self.noise.unseen:g}" if self.noise.unseen != 1 else ""
         )
         steps = f"-{self.steps}" if self.steps != STEPS else ""
-        words = f"{self.world}-{self.method}-{self.frames}-{size}-{self.graph}{noise}{steps}"
+        draw = f"-draw{self.draw}" if self.draw else ""
+        words = f"{self.world}-{self.method}-{self.frames}-{size}-{self.graph}{noise}{steps}{draw}"
         return "align-" + words.replace(" ", "_").replace(",", "").replace("'", "")
 
     @property
-    def result(self) -> Path:
-        """The file."""
-        return self.runs / "cases" / f"{self.name}.json"
+    def case(self) -> Row:
+        """All that is above."""
+        return fields_of(self)
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """The figures; seconds are the processor's, on one thread."""
-        truth = truth_of(world_of(self.world, self.frames, RATE_HZ, self.size))
+        truth = drawn_truth(self.world, self.frames, self.size)
         edges = make_pairs(self.frames, self.graph)
-        maps = pair_maps(truth, edges, self.noise, seed=100 * SEEDS[self.world] + self.frames)
+        seed = _DRAWS * self.draw + 100 * SEEDS[self.world] + self.frames
+        maps = pair_maps(truth, edges, self.noise, seed)
         found = _upstream(maps, self.steps) if self.method == "upstream" else _ours(maps, self.method)
         told = {key: value for key, value in found.items() if key not in ("poses", "focals", "depth")}
-        case = {key: value for key, value in asdict(self).items() if key != "runs"}
         errors = errors_of(found["poses"], found["focals"], found["depth"], truth)
-        return {**case, "edges": len(edges), **errors, **told}
+        return {"edges": len(edges), **errors, **told}
 
 
-def _ours(maps: PairMaps, method: Method) -> dict[str, Any]:
+def drawn_truth(world: str, frames: int, size: tuple[int, int]) -> Truth:
+    """A drive on the rays that alignment takes: through pixel i from the left goes (i - W/2) / f.
+
+    A drawn street has those through the middles of pixels, (i + 1/2 - W/2) / f. An alignment of its pointmaps
+    would turn all cameras by half a pixel, which counts in the relative error of the path. Hence the picture
+    is drawn a column and a row larger, and the last of both are left out: its pixel i has the ray
+    (i + 1/2 - (W + 1)/2) / f.
+
+    Args:
+        world: Name in ``_geometry_worlds.SEEDS``.
+        frames: Number of frames.
+        size: Width and height in pixels.
+    """
+    width, height = size
+    drawn = truth_of(world_of(world, frames, RATE_HZ, (width + 1, height + 1)))
+    labels = None if drawn.instance is None else drawn.instance[:, :height, :width]
+    return replace(drawn, depth=drawn.depth[:, :height, :width], instance=labels, offset_px=0.0)
+
+
+def _ours(maps: PairMaps, method: Method) -> Row:
     options = AlignOptions() if method == "ours" else AlignOptions(objective="distance", focal="each")
     began = time.process_time()
     found = align(maps, options)
@@ -99,7 +129,7 @@ def _ours(maps: PairMaps, method: Method) -> dict[str, Any]:
     }
 
 
-def _upstream(maps: PairMaps, steps: int) -> dict[str, Any]:
+def _upstream(maps: PairMaps, steps: int) -> Row:
     """The authors' initialisation with its defects, their loss, Adam; a focal length for each image."""
     with one_torch_thread():
         began = time.process_time()

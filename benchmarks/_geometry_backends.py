@@ -3,11 +3,12 @@
 import json
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from _geometry_cases import Row
 from _geometry_worlds import world_of
 
 from dreamdrive.data.clip_reader import read_clip
@@ -56,6 +57,9 @@ RECORDINGS = {
         "kitti_odom04_follow_van", "frames", "poses.txt", "0:48:2", (480, 144), 1.65, "meta.json"
     ),
 }
+UNCALIBRATED = "KITTI 04, lens unknown"
+"""A recording whose poses come without a calibration: its ``files`` would lack one."""
+RECORDINGS[UNCALIBRATED] = replace(RECORDINGS["KITTI 04"], intrinsics=None)
 STREETS: dict[str, tuple[str, int | None]] = {
     "street, static": ("straight b", 0),
     "street, traffic": ("straight b", None),
@@ -84,12 +88,17 @@ class BackendRun:
         return f"backend-{self.clip}-{self.way}".replace(" ", "_").replace(",", "")
 
     @property
-    def result(self) -> Path:
-        """The file."""
-        return self.runs / "cases" / f"{self.name}.json"
+    def case(self) -> Row:
+        """The clip, how it is read or drawn, and the way."""
+        if self.clip in RECORDINGS:
+            made = {**asdict(RECORDINGS[self.clip]), "fps": RATE_HZ}
+        else:
+            world, movers = STREETS[self.clip]
+            made = {"world": world, "movers": movers, "frames": FRAMES, "fps": RATE_HZ, "size": SIZE}
+        return {"clip": self.clip, "way": self.way, "settings": made}
 
-    def measure(self) -> dict[str, Any]:
-        """The figures of docs/geometry_evaluation.md, and seconds of the processor."""
+    def measure(self) -> Row:
+        """The figures of docs/geometry_evaluation.md, and seconds of the processor, of all threads."""
         given = self._recorded() if self.clip in RECORDINGS else self._drawn()
         clip = given.clip
         began = time.process_time()
@@ -99,8 +108,8 @@ class BackendRun:
         estimate = Estimate.of(geometry, clip.times_s, index=clip.source_index, source=given.source)
         figures = evaluate_geometry(estimate, truth_of(given.truth, estimate))
         size = f"{clip.size[0]}x{clip.size[1]}"
-        case = {"clip": self.clip, "way": self.way, "frames": len(clip), "size": size}
-        return {**case, "calibrated": attached.known.intrinsics, "seconds": seconds, **figures.to_json()}
+        told = {"size": size, "calibrated": attached.known.intrinsics, "seconds": seconds}
+        return {**told, **figures.to_json()}
 
     def _recorded(self) -> "_Given":
         how = RECORDINGS[self.clip]

@@ -62,6 +62,19 @@ RUNS = {
         [*DRIVE, "--quality", "draft", "--geometry-files", str(DATA / "clips/pandaset_002/cameras.json")],
         "pandaset",
     ),
+    "pandaset-files-refined-draft": Run(
+        "pandaset_002",
+        "front_camera",
+        [
+            *DRIVE,
+            "--quality",
+            "draft",
+            "--refine-poses",
+            "--geometry-files",
+            str(DATA / "clips/pandaset_002/cameras.json"),
+        ],
+        "pandaset",
+    ),
     "pandaset-static": Run(
         "pandaset_002", "front_camera", [*DRIVE, "--representation", "static"], "pandaset"
     ),

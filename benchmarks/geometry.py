@@ -14,16 +14,16 @@
 4. Which pairs of frames are worth their time.
 
 At last memory and seconds against the number of frames, and a recorded clip through ``dreamdrive generate``
-with the true cameras and without. Seconds are those of the processor, on one thread, so that they depend
-little on what else the machine does. Each measurement is a file below ``--runs``; with ``--resume`` those
-that are there count.
+with the true cameras and without. Seconds are those of the processor, so that they depend little on what else
+the machine does: an alignment has one thread, the two of a way of getting geometry are added up. Each
+measurement is a file below ``--runs`` with its date, commit and machine; with ``--resume`` those that are
+there count, if they are of the same case and did not fail. How long each part takes is in the README.
 """
 
 import argparse
 import json
 import os
 import sys
-import time
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
@@ -32,30 +32,12 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
-from _geometry_jobs import Measurement, everything
-from _geometry_report import markdown, plot
-from _machine import describe_machine
+from _geometry_cases import Measurement, Row, forget, load, measure_all
+from _geometry_jobs import everything
+from _geometry_plot import plot
+from _geometry_report import markdown
 
 from dreamdrive.splat import set_threads
-
-
-def measure_all(wanted: Sequence[Measurement]) -> list[Measurement]:
-    """Measure what is not there; returns what failed, which is printed and stops nothing else."""
-    failed: list[Measurement] = []
-    for job in wanted:
-        if job.result.exists():
-            continue
-        began = time.perf_counter()
-        try:
-            row = job.measure()
-        except Exception as error:  # noqa: BLE001  (whatever it is, the others go on)
-            print(f"{job.name} failed: {error!r}", file=sys.stderr, flush=True)
-            failed.append(job)
-            continue
-        job.result.parent.mkdir(parents=True, exist_ok=True)
-        job.result.write_text(json.dumps(row) + "\n")
-        print(f"{job.name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
-    return failed
 
 
 def chosen(wanted: Sequence[Measurement], patterns: Sequence[str] | None) -> list[Measurement]:
@@ -66,13 +48,14 @@ def chosen(wanted: Sequence[Measurement], patterns: Sequence[str] | None) -> lis
 
 
 def report_of(wanted: Sequence[Measurement]) -> dict[str, Any]:
-    """Rows of what is there, by kind."""
-    rows: dict[str, list[dict[str, Any]]] = {}
+    """Rows of what is there, by kind; those that failed are among them."""
+    rows: dict[str, list[Row]] = {}
     for job in wanted:
-        if job.result.exists():
-            rows.setdefault(type(job).__name__, []).append(json.loads(job.result.read_text()))
-    measured = sum(map(len, rows.values()))
-    return {"machine": describe_machine(), "wanted": len(wanted), "measured": measured, "rows": rows}
+        if (row := load(job)) is not None:
+            rows.setdefault(type(job).__name__, []).append(row)
+    found = [row for each in rows.values() for row in each]
+    failed = sum("failed" in row for row in found)
+    return {"wanted": len(wanted), "measured": len(found) - failed, "failed": failed, "rows": rows}
 
 
 def rounded(value: Any) -> Any:
@@ -106,11 +89,12 @@ def main() -> int:
     torch.set_num_threads(1)
     set_threads(1)
     wanted = everything(options.runs, quick=options.quick)
-    todo = chosen(wanted, options.only)
-    if not options.resume and not options.table_only:
-        for job in todo:
-            job.result.unlink(missing_ok=True)
-    failed = [] if options.table_only else measure_all(todo)
+    failed: list[Measurement] = []
+    if not options.table_only:
+        todo = chosen(wanted, options.only)
+        if not options.resume:
+            forget(todo)
+        failed = measure_all(todo)
     report = report_of(wanted)
     text = markdown(report)
     print(text)

@@ -5,7 +5,8 @@
 Both render colour, alpha and depth of the street scene with spherical harmonics of degree 3 from eight places
 along the road, and take the training steps that ``_gpu_training.py`` describes. They run in turn, in blocks
 of ten with the GPU idle before and after. Figures are medians over blocks; the ratio says how many times
-faster ours is. That the first image and the first and last losses of both agree is shown with them.
+faster ours is. Below them stand the difference of the first images and the first and last losses of both:
+where these disagree the two did not do the same work, and the exit code is 1.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from types import ModuleType
+from typing import Any
 
 import torch
 from _gpu_training import gsplat_step, intrinsics, our_step, ssim_of_the_peer
@@ -31,6 +33,12 @@ BLOCK = 10
 VIEWS = 8
 STRIDE_M = 0.25
 COEFFICIENTS = 16
+
+IMAGES_DIFFER = 1e-3
+"""Mean difference of colours from 0 to 1, a quarter of a grey level: both call the same kernels."""
+FIRST_LOSSES_DIFFER, LAST_LOSSES_DIFFER = 0.02, 0.2
+"""Shares of gsplat's loss. fused_ssim leaves the edge of the image out, which ours counts; over hundreds of
+steps that and the order of sums grow."""
 
 
 def size_of(text: str) -> tuple[int, int]:
@@ -128,7 +136,7 @@ def figures(ours_s: list[float], theirs_s: list[float]) -> dict[str, float]:
     }
 
 
-def measure(gsplat: ModuleType, size: tuple[int, int], count: int, seconds: float) -> dict[str, object]:
+def measure(gsplat: ModuleType, size: tuple[int, int], count: int, seconds: float) -> dict[str, Any]:
     """One row of the result."""
     gaussians, camera, poses = scene(*size, count, "cuda")
     ours, theirs = renderings(gsplat, gaussians, camera, poses)
@@ -152,18 +160,39 @@ def measure(gsplat: ModuleType, size: tuple[int, int], count: int, seconds: floa
     }
 
 
-def print_row(row: dict[str, object]) -> None:
-    """What was measured, for people."""
+def disagreements(row: dict[str, Any]) -> list[str]:
+    """By what the two did not do the same work; NaN is a disagreement."""
+    ours, theirs = (row["loss_first_and_last"][name] for name in ("ours", "gsplat"))
+    limits = {"first": FIRST_LOSSES_DIFFER, "last": LAST_LOSSES_DIFFER}
+    found = [
+        f"the {which} losses differ by more than {100 * limit:g} %"
+        for (which, limit), a, b in zip(limits.items(), ours, theirs, strict=True)
+        if not abs(a - b) <= limit * abs(b)
+    ]
+    if not row["mean_abs_difference"] <= IMAGES_DIFFER:
+        found.insert(0, f"the images differ by more than {IMAGES_DIFFER:g}")
+    return found
+
+
+def print_row(row: dict[str, Any]) -> None:
+    """What was measured, for people, and whether it may be compared."""
     for work, unit in (("rendering", "frames/s"), ("training", "steps/s")):
         f = row[work]
         print(
             f"{work:<10}{row['width']:>6}x{row['height']:<6}{row['gaussians']:>10,}"
             f"   ours {f['ours_per_s']:>8.1f}   gsplat {f['gsplat_per_s']:>8.1f} {unit:<9} x{f['ratio']:.2f}"
         )
+    (first, last), (peer_first, peer_last) = (row["loss_first_and_last"][name] for name in ("ours", "gsplat"))
+    print(
+        f"          images differ by {row['mean_abs_difference']:.1e} in the mean; losses, first to last: "
+        f"ours {first:.4f} to {last:.4f}, gsplat {peer_first:.4f} to {peer_last:.4f}"
+    )
+    for trouble in disagreements(row):
+        print(f"          NOT THE SAME WORK: {trouble}")
 
 
-def main() -> None:
-    """Measure all sizes with all numbers of Gaussians."""
+def options_of() -> argparse.Namespace:
+    """The command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -173,11 +202,21 @@ def main() -> None:
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each figure")
     parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Measure all sizes with all numbers of Gaussians; 1 where the two did not do the same work."""
+    options = options_of()
     trouble = why_unusable()
     if trouble is not None:
         sys.exit(f"gpu.py measures a GPU, and none can be used: {trouble}")
     gsplat = load_gsplat()
+    source = ssim_of_the_peer()[0]
+    if source != "fused_ssim":
+        print(
+            f"fused_ssim is not installed: gsplat's steps take SSIM in {source}, and the ratio flatters ours"
+        )
     torch.backends.cudnn.allow_tf32 = False  # SSIM takes differences of squares
     rows = []
     for size in options.sizes:
@@ -190,10 +229,11 @@ def main() -> None:
             "torch": torch.__version__,
             "cuda": torch.version.cuda,
             "gsplat": gsplat.__version__,
-            "ssim_of_the_peer": ssim_of_the_peer()[0],
+            "ssim_of_the_peer": source,
         }
         options.json.write_text(json.dumps({"machine": machine, "rows": rows}, indent=2) + "\n")
+    return 1 if any(map(disagreements, rows)) else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

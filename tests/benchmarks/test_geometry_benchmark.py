@@ -1,4 +1,4 @@
-"""The geometry benchmark's bookkeeping: which measurements there are, errors, tables."""
+"""The geometry benchmark: which measurements there are, errors, tables."""
 
 import importlib
 from pathlib import Path
@@ -7,7 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Truth
+from benchmarks._simulated_pairs import Noise, Truth, pair_maps
+
+from dreamdrive.geometry.dust3r.align.alignment import align
+from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
+from dreamdrive.geometry.dust3r.pairs import make_pairs
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -28,19 +32,11 @@ def truth() -> Truth:
     return Truth(np.full((4, 6, 8), 10.0), poses, focal_px=7.0)
 
 
-def row(**other: Any) -> dict[str, Any]:
-    noise = {"depth": 0.05, "unseen": 1.0, "mistaken": False}
-    case = {"world": "bend a", "frames": 25, "size": [128, 80], "graph": "swin-3-noncyclic", "noise": noise}
-    found = {"path_percent": 0.5, "focal_percent": 1.0, "abs_rel": 0.02, "seconds": 10.0, "loss": 1.0}
-    told = {"path_observed": True, "focal_observed": True, "edges": 138, "steps": 300, "method": "ours"}
-    return {**case, **found, **told, **other}
-
-
 def test_each_measurement_has_a_file_of_its_own() -> None:
-    jobs = module("_geometry_jobs")
+    jobs, cases = module("_geometry_jobs"), module("_geometry_cases")
     for quick in (False, True):
         wanted = jobs.everything(Path("runs"), quick=quick)
-        assert len({job.result for job in wanted}) == len(wanted)
+        assert len({cases.result_of(job) for job in wanted}) == len(wanted)
         assert {type(job).__name__ for job in wanted} >= {"Alignment", "BackendRun", "MemoryRun"}
     assert len(jobs.everything(Path("runs"), quick=True)) < 10
 
@@ -88,36 +84,53 @@ def test_a_standing_camera_has_no_path_error(truth: Truth) -> None:
     assert found["abs_rel"] == 0
 
 
-def test_the_table_names_the_targets_that_are_missed() -> None:
-    report = module("_geometry_report")
-    assert report.misses(row()) == []
-    assert report.misses(row(path_percent=1.5, focal_percent=3.5)) == ["path", "focal"]
-    assert report.misses(row(path_percent=None)) == []
-    upstream = row(method="upstream", path_percent=8.0, focal_percent=9.0)
-    lines = report.accuracy_table([row(path_percent=1.5), upstream]).splitlines()
-    assert lines[2].startswith(
-        "| bend a | where they are | 1.50 | 1.00 | 0.020 | yes | yes | path | - | - | 8.00 |"
-    )
+def test_alignment_does_not_turn_cameras_of_drawn_pairs() -> None:
+    alignment = module("_geometry_alignment")
+    truth = alignment.drawn_truth("straight b", 4, (48, 32))
+    exact = Noise(depth=0, scale=0, focal=0, outliers=0, mistaken=False)
+    found = align(pair_maps(truth, make_pairs(4, alignment.GRAPH), exact))
+    errors = alignment.errors_of(found.world_from_camera, found.focals_px, found.depth, truth)
+    assert (
+        errors["rpe_percent"] < 0.1
+    )  # half a pixel to the side and down would be 100 * 0.7 / focal_px = 1.8
 
 
-def test_a_few_steps_of_adam_tell_seconds_and_nothing_else() -> None:
-    report = module("_geometry_report")
-    ours = row(method=module("_geometry_alignment").PAPER, seconds=20.0)
-    for steps, told in ((300, "| 100 | 2.0000 | 5.0 |"), (3, "| 100 (from 3 steps) | - | 5.0 |")):
-        adam = row(method="upstream", seconds=100.0, loss=2.0, steps=steps)
-        assert report.speed_table([ours, adam]).endswith(told)
-        cells = report.accuracy_table([row(), ours, adam]).splitlines()[2].split(" | ")
-        assert (cells[-3] == "-") == (steps == 3)
+def test_the_memory_curve_is_of_one_graph_and_none_of_it_is_refused() -> None:
+    jobs = module("_geometry_jobs")
+    wanted = [job for job in jobs.everything(Path("runs")) if isinstance(job, jobs.MemoryRun)]
+    curve = [job for job in wanted if (job.size, job.graph, job.dtype) == ((512, 288), jobs.GRAPH, "float32")]
+    assert {job.frames for job in curve} == {8, 16, 25, 32, 64, 128}
+    for job in curve:
+        sizes = [(288, 512)] * job.frames
+        assert predicted_bytes(sizes, make_pairs(job.frames, job.graph), 2000) <= 1e9 * job.memory_gb
+    assert "4GB" in next(job.name for job in curve if job.frames == 25)
 
 
-def test_graphs_of_one_case_are_a_table() -> None:
-    report = module("_geometry_report")
-    other = row(graph="logwin-5-noncyclic", path_percent=0.2, edges=188)
-    assert report.graph_tables([row()]) == []
-    ((title, text),) = report.graph_tables([row(), other])
-    assert title == "Which pairs: 25 frames"
-    assert "| logwin-5-noncyclic | 188 | 0.20 | 1.00 | 10 |" in text
-    assert report.accuracy_table([row(), other]) is None
+def test_each_hard_case_has_the_authors_beside_it() -> None:
+    jobs = module("_geometry_jobs")
+    hard = [job for job in jobs.everything(Path("runs")) if getattr(job, "noise", None) == jobs.HARD]
+    for method in ("ours", jobs.PAPER, "upstream"):
+        assert {job.world for job in hard if job.method == method} == set(jobs.SEEDS)
+
+
+def test_a_draw_is_a_seed_of_its_own(monkeypatch: pytest.MonkeyPatch, truth: Truth) -> None:
+    alignment, seeds = module("_geometry_alignment"), []
+
+    class StopError(Exception):
+        pass
+
+    def drawn(truth: Truth, edges: Any, noise: Noise, seed: int) -> None:
+        seeds.append(seed)
+        raise StopError
+
+    monkeypatch.setattr(alignment, "drawn_truth", lambda *_: truth)
+    monkeypatch.setattr(alignment, "pair_maps", drawn)
+    for world in ("bend a", "standing"):
+        for frames in (24, 48):
+            for draw in range(3):
+                with pytest.raises(StopError):
+                    alignment.Alignment(world, "ours", frames, draw=draw).measure()
+    assert len(set(seeds)) == len(seeds)
 
 
 def test_what_does_not_fit_is_refused_with_the_figure() -> None:

@@ -63,6 +63,52 @@ def test_figures_are_medians_and_bests(gpu):
     }
 
 
+def gpu_row(**other):
+    rates = {"ours_per_s": 20.0, "gsplat_per_s": 10.0, "ratio": 2.0}
+    case = {"width": 96, "height": 64, "gaussians": 500, "rendering": rates, "training": rates}
+    losses = {"ours": [0.2, 0.11], "gsplat": [0.201, 0.1]}
+    return {**case, "mean_abs_difference": 1e-6, "loss_first_and_last": losses, **other}
+
+
+def test_differences_are_printed(gpu, capsys):
+    assert gpu.disagreements(gpu_row()) == []
+    gpu.print_row(gpu_row())
+    out = capsys.readouterr().out
+    assert "differ by 1.0e-06" in out
+    assert "ours 0.2000 to 0.1100, gsplat 0.2010 to 0.1000" in out
+    assert "NOT" not in out
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        ({"mean_abs_difference": 0.01}, "the images differ by more than 0.001"),
+        ({"mean_abs_difference": float("nan")}, "the images differ by more than 0.001"),
+        ({"loss_first_and_last": {"ours": [0.21, 0.1], "gsplat": [0.2, 0.1]}}, "the first losses differ by"),
+        ({"loss_first_and_last": {"ours": [0.2, 0.2], "gsplat": [0.2, 0.1]}}, "the last losses differ by"),
+    ],
+)
+def test_other_work_is_a_disagreement(gpu, capsys, other, told):
+    (trouble,) = gpu.disagreements(gpu_row(**other))
+    assert trouble.startswith(told)
+    gpu.print_row(gpu_row(**other))
+    assert f"NOT THE SAME WORK: {told}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("difference", "code"), [(1e-6, 0), (0.01, 1)])
+def test_a_disagreement_fails_and_the_slower_ssim_of_the_peer_is_said(
+    gpu, monkeypatch, capsys, difference, code
+):
+    monkeypatch.setattr("sys.argv", ["gpu.py", "--sizes", "96x64", "--gaussians", "500"])
+    monkeypatch.setattr(gpu, "why_unusable", lambda: None)
+    monkeypatch.setattr(gpu, "load_gsplat", lambda: None)
+    monkeypatch.setattr(gpu, "ssim_of_the_peer", lambda: ("plain torch", None))
+    monkeypatch.setattr(gpu, "measure", lambda *_: gpu_row(mean_abs_difference=difference))
+    monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", torch.backends.cudnn.allow_tf32)
+    assert gpu.main() == code
+    assert "fused_ssim is not installed: gsplat's steps take SSIM in plain torch" in capsys.readouterr().out
+
+
 def test_loss_in_closed_form_has_the_value_and_gradient_of_autograd(training):
     g = torch.Generator().manual_seed(0)
     image, target = torch.rand(2, 23, 31, 3, generator=g, dtype=torch.float64)
