@@ -49,13 +49,13 @@ def test_a_blank_road_gives_an_assumed_speed_and_says_so() -> None:
     grey = seen.grey.copy()
     grey[:, 90:] = 100
     street = Street(grey, seen.street, seen.small, straight([0.3] * 5), np.zeros((0, 3)), clip.times_s)
-    metric = from_ground(street, None, True, 0)
+    metric = from_ground(street, None, 0.0, 0)
     assert metric.ground is None
     assert metric.scale.source.startswith("none:")
     assert metric.scale.spread >= 0.5
     assert metric.factor * 0.3 / 0.1 == pytest.approx(8.0)
     assert metric.notes
-    asked = from_ground(replace(street, asked_m_s=5.0), None, True, 0)
+    asked = from_ground(replace(street, asked_m_s=5.0), None, 0.0, 0)
     assert asked.factor * 0.3 / 0.1 == pytest.approx(5.0)
     assert "a speed of 5 m/s is taken as asked for" in asked.scale.source
     assert asked.scale.spread == metric.scale.spread
