@@ -64,7 +64,7 @@ def test_all_noise_at_once_leaves_the_focal_length_of_a_turn_within_three_percen
     maps = pair_maps(corner, window(FRAMES), Noise(common_focal=bias, place=0.005))
     found = align(maps, OPTIONS)
     assert found.focal_observed
-    assert 0 < found.focal_error < 0.015
+    assert 0 < found.focal_error < 0.02
     assert found.focals_px[0] == pytest.approx(corner.focal_px, rel=0.03)
     assert path_error(found.world_from_camera, corner.world_from_camera) < 0.02
 
@@ -75,7 +75,7 @@ def test_the_spread_grows_with_the_noise(corner: Truth) -> None:
         for place in (0.0, 0.01, 0.04)
     ]
     assert spreads[0] < spreads[1] < spreads[2]
-    assert spreads[2] > 0.015
+    assert spreads[2] > 0.02
 
 
 def test_a_tenth_of_points_anywhere_does_no_harm(corner: Truth) -> None:
