@@ -18,7 +18,7 @@ _FARTHEST, _NEAREST = 5.0, 0.3  # of the true distance: where a mover is mistake
 
 @dataclass(frozen=True)
 class Noise:
-    """What is wrong with each pair, all of it drawn anew for each.
+    """What is wrong with each pair, drawn anew for each but for ``common_focal``.
 
     Attributes:
         depth: Standard deviation of the log depth, smooth over ``smooth`` of the width.
@@ -31,6 +31,10 @@ class Noise:
         unseen: How much greater the error of depth is where the first camera does not look.
         mistaken: Whether a mover is put where it would have to stand for its motion in the image to come
             from the camera alone; else each image has it where it is at that frame.
+        common_focal: How much longer than the true one the focal length is that all pairs believe in, as a
+            fraction, on top of ``focal``: it does not average away.
+        place: Standard deviation of a smooth error of each point along each axis, relative to its depth in
+            its own image; that of ``depth`` and ``outliers`` leaves points on their pixels' rays.
     """
 
     depth: float = 0.05
@@ -40,6 +44,8 @@ class Noise:
     outliers: float = 0.10
     unseen: float = 1.0
     mistaken: bool = True
+    common_focal: float = 0.0
+    place: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,7 @@ def pair_maps(
     for edge, (i, j) in enumerate(edges.tolist()):
         random = np.random.default_rng([seed, edge])
         scale = np.exp(noise.scale * random.standard_normal())
-        believed = np.exp(noise.focal * random.standard_normal())
+        believed = np.exp(noise.focal * random.standard_normal()) * (1 + noise.common_focal)
         stretch = scale * np.array([1 / believed, 1 / believed, 1])
         sides = [_side(truth, (i, j), image, noise, random) for image in (i, j)]
         (first, trust), (second, other_trust) = sides
@@ -148,7 +154,12 @@ def _side(
     depth, trust = _disturbed(truth, image, noise, worse, random)
     if noise.mistaken:
         depth = depth * truth.mistaken(*pair, image)
-    return _moved(_lifted(depth, truth), first_from_image), trust
+    points = _moved(_lifted(depth, truth), first_from_image)
+    if noise.place:
+        height, width = depth.shape
+        axes = [smooth_noise(height, width, noise.smooth * width, random) for _ in range(3)]
+        points = points + noise.place * depth[..., None] * np.stack(axes, axis=-1)
+    return points, trust
 
 
 def _disturbed(

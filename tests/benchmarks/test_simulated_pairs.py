@@ -66,3 +66,20 @@ def test_noise_is_greater_only_where_the_first_camera_does_not_look(drive: Truth
             same = (plain[1] == apart[1]).all(axis=-1)
             assert same[12:20, 28:36].all()
             assert not same.all()
+
+
+def test_a_common_focal_length_is_that_of_all_pairs(drive: Truth) -> None:
+    edges = window(3, 2)
+    plain, apart = (pair_maps(drive, edges, noise) for noise in (NONE, replace(NONE, common_focal=0.25)))
+    for true, found in zip(plain.points, apart.points, strict=True):
+        for one, other in zip(true, found, strict=True):
+            np.testing.assert_allclose(other, one / np.float32([1.25, 1.25, 1]), rtol=1e-6)
+
+
+def test_places_are_off_along_all_axes_by_a_share_of_the_depth(drive: Truth) -> None:
+    edges = np.array([[0, 2]])
+    plain, apart = (pair_maps(drive, edges, noise).points[0] for noise in (NONE, replace(NONE, place=0.02)))
+    for image, one, other in zip((0, 2), plain, apart, strict=True):
+        seen = drive.depth[image] > 0
+        missed = (other - one)[seen] / drive.depth[image][seen][:, None]
+        np.testing.assert_allclose(missed.std(axis=0), 0.02, rtol=0.4)

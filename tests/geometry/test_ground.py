@@ -8,7 +8,7 @@ from dreamdrive.geometry.classical import evidence
 from dreamdrive.geometry.classical.ground_points import fit_points
 from dreamdrive.geometry.classical.ground_sweep import Road, sweep
 from dreamdrive.geometry.classical.poses import pose_clip
-from dreamdrive.geometry.classical.scale import Street, asked_m_s, from_ground
+from dreamdrive.geometry.classical.scale import Street, asked_m_s, from_ground, from_road_points
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -49,16 +49,28 @@ def test_a_blank_road_gives_an_assumed_speed_and_says_so() -> None:
     grey = seen.grey.copy()
     grey[:, 90:] = 100
     street = Street(grey, seen.street, seen.small, straight([0.3] * 5), np.zeros((0, 3)), clip.times_s)
-    metric = from_ground(street, None, True, 0)
+    metric = from_ground(street, None, 0.0, 0)
     assert metric.ground is None
     assert metric.scale.source.startswith("none:")
     assert metric.scale.spread >= 0.5
     assert metric.factor * 0.3 / 0.1 == pytest.approx(8.0)
     assert metric.notes
-    asked = from_ground(replace(street, asked_m_s=5.0), None, True, 0)
+    asked = from_ground(replace(street, asked_m_s=5.0), None, 0.0, 0)
     assert asked.factor * 0.3 / 0.1 == pytest.approx(5.0)
     assert "a speed of 5 m/s is taken as asked for" in asked.scale.source
     assert asked.scale.spread == metric.scale.spread
+
+
+def test_a_scale_by_the_road_is_as_uncertain_as_the_focal_length() -> None:
+    clip, rng = make_clip(straight([0.6] * 5)), np.random.default_rng(0)
+    road = np.stack([rng.uniform(-4, 4, 300), rng.normal(1.5, 0.01, 300), rng.uniform(3, 15, 300)], axis=1)
+    grey, camera = np.zeros((6, 40, 64), np.uint8), clip.rig[0]
+    street = Street(grey, grey == 0, camera, straight([0.6] * 5), road, clip.times_s)
+    found = [from_road_points(street, 1.5, spread, 0) for spread in (0.0, 0.05, 0.35)]
+    exact, network, assumed = (each.scale.spread for each in found if each is not None)
+    assert exact < 0.1
+    assert network == pytest.approx(np.hypot(exact, 0.05))
+    assert assumed == pytest.approx(np.hypot(exact, 0.35))
 
 
 def test_the_speed_that_was_asked_for_is_that_of_the_moving_part() -> None:

@@ -113,12 +113,18 @@ def _metric(
         return scales.from_depth(ratios, street, height_m, seed)
     slow = scales.median_speed(street) < scales.SPEEDS_M_S[0]
     seen = _in_place(street) if slow else street
-    found = scales.from_road_points(seen, height_m, measured.focal_observed, seed)
+    found = scales.from_road_points(seen, height_m, _focal_spread(measured), seed)
     if found is not None:
         return found
     if slow:
         return _by_median_depth()
-    return scales.from_ground(street, height_m, measured.focal_observed, seed)
+    return scales.from_ground(street, height_m, _focal_spread(measured), seed)
+
+
+def _focal_spread(measured: Measured) -> float:
+    if measured.focal_spread is not None:
+        return measured.focal_spread
+    return 0.0 if measured.focal_observed else scales.FOCAL_SPREAD
 
 
 def _in_place(street: Street) -> Street:
@@ -132,7 +138,7 @@ def _over(ground: Ground, street: Street, measured: Measured, seed: int) -> Metr
     """Over a known road: the height of the camera above it tells metres where the unit does not."""
     if measured.unit is not None:
         return Metric(1.0, ground, Scale(measured.unit, measured.unit_spread), ())
-    found = scales.from_road_points(street, ground.offset_m, measured.focal_observed, seed)
+    found = scales.from_road_points(street, ground.offset_m, _focal_spread(measured), seed)
     return replace(found or _by_median_depth(), ground=ground)
 
 

@@ -44,6 +44,8 @@ class Measured:
         unit: What says that the unit is the metre, in words; None where nothing does.
         unit_spread: How far that metre may be off, as a fraction.
         others: What else tells metres, by its source: its metres in the unit of the poses.
+        focal_spread: How far the focal length may be off, as a fraction; None where nothing tells: then not
+            at all if observed, and as far as any assumed one if not.
         notes: What was noticed, a sentence each.
         details: Figures for the report, as JSON values.
     """
@@ -56,6 +58,7 @@ class Measured:
     unit: str | None = None
     unit_spread: float = 0.0
     others: dict[str, float] = field(default_factory=dict)
+    focal_spread: float | None = None
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 

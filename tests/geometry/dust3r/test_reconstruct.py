@@ -13,13 +13,15 @@ from dreamdrive.data.world import make_street
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
+from dreamdrive.geometry.dust3r.network.images import fitting
 from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
-from dreamdrive.geometry.dust3r.reconstruct import planned_pairs
+from dreamdrive.geometry.dust3r.reconstruct import measured, planned_pairs
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.clip import Clip, Known
 
 FRAMES, SIZE = 6, (160, 96)
 MODULE = import_module("dreamdrive.geometry.dust3r.reconstruct")
@@ -95,6 +97,48 @@ def test_weights_and_method_have_to_fit(clip: Clip, weights: Path, tmp_path: Pat
         reconstruct(clip, weights=weights)
     with pytest.raises(InputError, match="does not exist"):
         reconstruct(clip, method="dust3r", weights=tmp_path / "none.pth")
+
+
+def aligned(**changes: object) -> Aligned:
+    flat = tuple(np.full(SIZE[::-1], 2, np.float32) for _ in range(FRAMES))
+    one = Aligned(
+        world_from_camera=np.tile(np.eye(4), (FRAMES, 1, 1)),
+        focals_px=np.full(FRAMES, 100.0),
+        depth=flat,
+        pairs=(),
+        confidence=flat,
+        loss=0.0,
+        losses=(),
+        focal_error=0.05,
+        network_focal_px=100.0,
+        focal_spread=0.01,
+        pair_spread=0.1,
+        residual=np.zeros(1),
+        masked_share=np.zeros(FRAMES),
+        focal_observed=False,
+        focal_agreed=True,
+        path_observed=True,
+    )
+    return replace(one, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {},
+            "turns too little to show its focal length: it is the network's, which may be off by 5% or more",
+        ),
+        ({"focal_agreed": False, "focal_error": 0.1}, "the pairs do not agree on a focal length"),
+        ({"focal_observed": True, "network_focal_px": 105.0, "focal_error": 0.01}, "4.8% shorter than"),
+        ({"focal_observed": True, "network_focal_px": 101.0, "focal_error": 0.01}, None),
+    ],
+)
+def test_what_shows_the_focal_length_is_said(clip: Clip, changes: dict[str, object], said: str | None):
+    alone, found = replace(clip, known=Known()), aligned(**changes)
+    seen = measured(alone, found, fitting(*SIZE, SIZE[0]))
+    assert (seen.focal_observed, seen.focal_spread) == (found.focal_observed, found.focal_error)
+    assert [said is not None and said in note for note in seen.notes] == ([] if said is None else [True])
 
 
 def test_one_frame_is_too_few(clip: Clip, weights: Path):

@@ -76,13 +76,14 @@ def find_ground(
     return sweep(road, heights), "road texture"
 
 
-def from_ground(street: Street, height_m: float | None, focal_observed: bool, seed: int) -> Metric:
+def from_ground(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric:
     """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
 
     Args:
         street: Posed clip in arbitrary units.
         height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
-        focal_observed: A focal length that is only a prior makes the scale as uncertain as itself.
+        focal_spread: How far the focal length may be off, as a fraction: the scale is as uncertain as that.
+            0 where it was observed, ``FOCAL_SPREAD`` where it is only a prior.
         seed: Seed of RANSAC.
     """
     plane, how = find_ground(street, seed)
@@ -95,14 +96,14 @@ def from_ground(street: Street, height_m: float | None, focal_observed: bool, se
         return _from_speed(
             street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
         )
-    return _by_plane(plane, how, factor, height_m, focal_observed)
+    return _by_plane(plane, how, factor, height_m, focal_spread)
 
 
-def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_observed: bool) -> Metric:
+def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_spread: float) -> Metric:
     terms = (
         plane.spread,
         USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
-        0.0 if focal_observed else FOCAL_SPREAD,
+        focal_spread,
     )
     source = f"ground plane ({how}), {height_words(height_m)}"
     return Metric(
@@ -110,9 +111,7 @@ def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, foc
     )
 
 
-def from_road_points(
-    street: Street, height_m: float | None, focal_observed: bool, seed: int
-) -> Metric | None:
+def from_road_points(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric | None:
     """Scale from the height of the camera above the road that measured depth shows, however slow the path.
 
     Unlike a plane that is found by warping, it does not rest on the motion of the camera.
@@ -120,7 +119,7 @@ def from_road_points(
     Args:
         street: Posed clip in arbitrary units, its points those of dense depth.
         height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
-        focal_observed: See ``from_ground``.
+        focal_spread: See ``from_ground``.
         seed: Seed of RANSAC.
 
     Returns:
@@ -132,7 +131,7 @@ def from_road_points(
     factor = (USUAL_HEIGHT_M if height_m is None else height_m) / plane.height
     if median_speed(street) * factor > SPEEDS_M_S[1]:
         return None
-    return _by_plane(plane, "points", factor, height_m, focal_observed)
+    return _by_plane(plane, "points", factor, height_m, focal_spread)
 
 
 def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:

@@ -34,6 +34,7 @@ from dreamdrive.scene.geometry import Geometry
 
 _LEFT = 0.3  # of the usable pixels of a picture, so that it is aligned without what moves
 _MOVING = 0.01  # of all usable pixels; less moves no camera
+_WORTH_A_NOTE = 0.03  # relative, of the focal length
 _NARROWER = ("swin-3-noncyclic", "swin-2-noncyclic")
 
 
@@ -131,8 +132,7 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
     there = (trust > 1) & ~clip.held_out[:, None, None]
     depth, confidence = trusted(depth, trust, there)
     notes = [] if aligned.path_observed else ["the pairs do not agree on a path: it is not to be believed"]
-    if not aligned.focal_observed:
-        notes.append("the pairs do not agree on a focal length")
+    notes += _focal_notes(clip, aligned)
     return Measured(
         world_from_camera=aligned.world_from_camera,
         camera=replace(camera, world_from_camera=np.eye(4)),
@@ -140,14 +140,35 @@ def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
         depth=depth,
         confidence=confidence,
         unit="poses" if clip.known.metric and clip.known.world_from_camera is not None else None,
+        focal_spread=aligned.focal_error,
         notes=tuple(notes),
         details={
             "pairs_residual": float(np.median(aligned.residual)),
             "focal_spread": aligned.focal_spread,
+            "focal_error": aligned.focal_error,
+            "focal_over_network": focal_px / aligned.network_focal_px,
             "pair_spread": aligned.pair_spread,
             "masked_share": float(aligned.masked_share.mean()),
         },
     )
+
+
+def _focal_notes(clip: Clip, aligned: Aligned) -> list[str]:
+    """What to know about the focal length, where it is not given."""
+    if clip.known.intrinsics:
+        return []
+    if not aligned.focal_agreed and not aligned.focal_observed:
+        return ["the pairs do not agree on a focal length"]
+    if not aligned.focal_observed:
+        return [
+            "the camera turns too little to show its focal length: it is the network's, which may be off by "
+            f"{aligned.focal_error:.0%} or more"
+        ]
+    off = float(np.median(aligned.focals_px)) / aligned.network_focal_px - 1
+    if abs(off) < _WORTH_A_NOTE:
+        return []
+    word = "longer" if off > 0 else "shorter"
+    return [f"the turns of the camera show a focal length {abs(off):.1%} {word} than the network's"]
 
 
 def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n h w"]:

@@ -57,7 +57,7 @@ def test_exact_pairs_give_the_truth(drive: Truth, options: AlignOptions) -> None
     np.testing.assert_allclose(np.stack(found.depth)[seen], scale * drive.depth[seen], rtol=2e-3)
     assert found.residual.max() < 1e-3
     np.testing.assert_allclose(found.masked_share, (~seen).mean(axis=(1, 2)))
-    assert found.focal_observed
+    assert found.focal_agreed
     assert found.path_observed
 
 
@@ -219,8 +219,11 @@ def test_a_standing_camera_has_no_path(drive: Truth) -> None:
     assert not align(pair_maps(still, window(6), Noise()), ROBUST).path_observed
 
 
-def test_focal_lengths_that_disagree_are_not_observed(drive: Truth) -> None:
-    assert not align(pair_maps(drive, window(6), Noise(focal=0.3)), replace(PAPER, steps=5)).focal_observed
+def test_focal_lengths_that_disagree_are_not_agreed_on(drive: Truth) -> None:
+    found = align(pair_maps(drive, window(6), Noise(focal=0.3)), replace(PAPER, steps=5))
+    assert not found.focal_agreed
+    assert not found.focal_observed
+    assert found.focal_error > 0.05
 
 
 def test_what_is_too_large_is_refused_before_it_starts(noisy: PairMaps) -> None:

@@ -22,7 +22,7 @@ def test_path_and_focal_length_of_a_street(objective: str) -> None:
     assert path_error(found.world_from_camera, truth.world_from_camera) < 0.01
     assert abs(found.focals_px[0] / truth.focal_px - 1) < 0.03
     assert found.path_observed
-    assert found.focal_observed
+    assert found.focal_agreed
     seen = (truth.depth > 0) & (truth.instance == 0)
     ratio = np.stack(found.depth)[seen] / truth.depth[seen]
     assert np.median(np.abs(ratio / np.median(ratio) - 1)) < 0.06

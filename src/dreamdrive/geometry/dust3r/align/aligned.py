@@ -11,11 +11,13 @@ from dreamdrive.geometry.dust3r.align.graph import Graph
 from dreamdrive.geometry.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.dust3r.align.samples import Dense
 from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.dust3r.align.turned_focal import TurnedFocal
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.standing import unit_in
 from dreamdrive.scene.similarity import Similarity
 
-_SURE_FOCAL = 0.03  # standard error of the shared focal length up to which it counts as observed
+_NETWORK_FOCAL = 0.05  # relative; how far all pairs may be off together, however well they agree
+_AGREED_FOCAL = 0.03  # standard error of the median of the pairs up to which they agree
 _SURE_STEP = 0.5  # of the way between paired images, by which a pair's own camera may be off
 
 
@@ -35,13 +37,17 @@ class Aligned:
         loss: Of the objective that was solved, over all pixels, in the unit in which the pairs' scales
             average 0.5.
         losses: Over the solver's samples, before each of its last steps and at the end.
+        focal_error: Standard deviation of the focal lengths, relative; 0 where they are known, 0.05 or more
+            where nothing but the network speaks for them.
+        network_focal_px: Median over edges of what pointmaps speak for.
         focal_spread: Robust standard deviation over edges of the focal lengths that pointmaps speak for,
             relative.
         pair_spread: Median distance between where a pair has its first camera and where that ended, in units
             of the median distance between paired cameras.
         residual: Median relative miss (E,) of each pair's points.
         masked_share: Share of the pixels (N,) that no edge weighs.
-        focal_observed: The focal lengths are known, or the pointmaps agree on them.
+        focal_observed: The focal lengths are known, or the turns of the camera show them.
+        focal_agreed: The pointmaps agree on one.
         path_observed: The cameras move by more than pairs disagree; if not, the path is not to be believed.
     """
 
@@ -52,11 +58,14 @@ class Aligned:
     confidence: tuple[Float[np.ndarray, "_ _"], ...]
     loss: float
     losses: tuple[float, ...]
+    focal_error: float
+    network_focal_px: float
     focal_spread: float
     pair_spread: float
     residual: Float[np.ndarray, " e"]
     masked_share: Float[np.ndarray, " n"]
     focal_observed: bool
+    focal_agreed: bool
     path_observed: bool
 
 
@@ -82,6 +91,7 @@ def report(
     graph: Graph,
     found: Found,
     votes: FocalVotes,
+    turned: TurnedFocal | None,
     *,
     focal_known: bool,
     known_poses: Float[np.ndarray, "n 4 4"] | None,
@@ -99,7 +109,8 @@ def report(
         np.maximum.reduce([maps.confidence[h.edge][h.side] for h in halves]) for halves in graph.halves
     ]
     pair_spread = _pair_spread(maps, found.state)
-    error = votes.spread / np.sqrt(len(graph))
+    error = votes.spread / float(np.sqrt(len(graph)))
+    shown = turned.spread if turned is not None and turned.observed else None
     return Aligned(
         world_from_camera=poses if known_poses is None else known_poses.astype(np.float64),
         focals_px=found.state.focal_px,
@@ -108,11 +119,14 @@ def report(
         confidence=tuple(confidence),
         loss=found.dense.loss,
         losses=found.losses,
+        focal_error=0.0 if focal_known else max(error, _NETWORK_FOCAL) if shown is None else shown,
+        network_focal_px=votes.shared_px,
         focal_spread=votes.spread,
         pair_spread=pair_spread,
         residual=_residuals(found, len(maps.edges)),
         masked_share=np.array([float((trust <= 1).mean()) for trust in confidence]),
-        focal_observed=focal_known or bool(error <= _SURE_FOCAL),
+        focal_observed=focal_known or shown is not None,
+        focal_agreed=error <= _AGREED_FOCAL,
         path_observed=known_poses is not None or pair_spread <= _SURE_STEP,
     )
 

@@ -18,8 +18,9 @@ from dreamdrive.geometry.dust3r.align.memory import check_budget, predicted_byte
 from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
 from dreamdrive.geometry.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.dust3r.align.solver import solve
-from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.splat.torch_threads import one_torch_thread
@@ -35,7 +36,8 @@ class AlignOptions:
     Attributes:
         objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
             with relative misses under a cost that forgives outliers, and counts those across the ray more
-            than those along it.
+            than those along it. It also brings each pair to the focal length that is known or shared, which
+            is the one that the turns of the camera show, where they do; see ``turned_focal``.
         normalisation: How the paper's loss divides, see ``areas.half_areas``.
         focal: One focal length for all images, which one camera took, or one for ``each``.
         focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
@@ -110,8 +112,17 @@ def align(
 def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
     """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
     votes = focal_votes(sure, options.focal_rule, graph)
-    start = spanning_tree(sure, votes, graph)
-    start = replace(start, focals_px=_first_focals(start, votes, options, known))
+    turned = None
+    if options.objective == "robust" and options.focal == "shared" and known.intrinsics is None:
+        turned = turned_focal(sure, votes, graph)
+    focals = _first_focals(votes, turned, len(graph), options, known)
+    if options.objective == "robust" and focals is not None:
+        graph = replace(graph, lateral=votes.lateral(focals))
+        start = spanning_tree(sure, votes.all_at(focals), graph)
+    else:
+        start = spanning_tree(sure, votes, graph)
+    if focals is not None:
+        start = replace(start, focals_px=focals)
     poses = start.world_from_camera
     if known.world_from_camera is not None:
         start, poses = onto_known(start, known.world_from_camera)
@@ -133,19 +144,23 @@ def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions,
         graph,
         Found(found.state, dense, samples, found.losses),
         votes,
+        turned,
         focal_known=known.intrinsics is not None,
         known_poses=known.world_from_camera,
     )
 
 
 def _first_focals(
-    start: Start, votes: FocalVotes, options: AlignOptions, known: Known
-) -> Float[np.ndarray, " n"]:
+    votes: FocalVotes, turned: TurnedFocal | None, images: int, options: AlignOptions, known: Known
+) -> Float[np.ndarray, " n"] | None:
+    """Known ones, or the shared one; None where each image has one of its own to be found."""
     if known.intrinsics is not None:
         return known.intrinsics[:, 0, 0].astype(np.float64)
-    if options.focal == "shared":
-        return np.full(len(start.focals_px), votes.shared_px)
-    return start.focals_px
+    if options.focal == "each":
+        return None
+    if turned is None or not turned.observed:
+        return np.full(images, votes.shared_px)
+    return np.full(images, turned.focal_px)
 
 
 def _check_known(known: Known, images: int) -> None:

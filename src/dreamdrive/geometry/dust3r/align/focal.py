@@ -3,7 +3,7 @@
 It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/z, y/z) of their points.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -45,6 +45,17 @@ class FocalVotes:
         """Robust standard deviation over edges (1.4826 times the median distance), relative to the median."""
         apart = np.abs(np.log(self.focal_px / self.shared_px))
         return 1.4826 * weighted_median(apart, self.weight)
+
+    def all_at(self, focal_px: Float[np.ndarray, " n"]) -> "FocalVotes":
+        """The votes of pointmaps that were given the focal lengths (N,) of their images."""
+        return replace(self, focal_px=focal_px[self.image])
+
+    def lateral(self, focal_px: Float[np.ndarray, " n"]) -> Float[np.ndarray, " e"]:
+        """Factors (E,) on x and y that give pointmaps the focal lengths (N,) of their images.
+
+        A pointmap that shows none stays as it is.
+        """
+        return np.nan_to_num(self.focal_px / focal_px[self.image], nan=1.0)
 
     def per_image_px(self, count: int) -> Float[np.ndarray, " n"]:
         """Weighted median (N,) over the edges that start at an image; the shared one where none does."""

@@ -35,12 +35,15 @@ class Graph:
         halves: For each image the halves of edges that hold a pointmap of it.
         principal_px: Column and row (N, 2) of the principal points, pixels counted from 0.
         stretch: fx / fy (N,); rows times it have the focal length of columns.
+        lateral: Factor (E,) on x and y of an edge's points that gives its first pointmap the focal length to
+            be used; 1 leaves them as they are.
     """
 
     sizes: tuple[tuple[int, int], ...]
     halves: tuple[tuple[Half, ...], ...]
     principal_px: Float[np.ndarray, "n 2"]
     stretch: Float[np.ndarray, " n"]
+    lateral: Float[np.ndarray, " e"]
 
     def __len__(self) -> int:
         return len(self.sizes)
@@ -49,6 +52,14 @@ class Graph:
         """The same with these pinholes, whose pixels count from 0."""
         stretch = intrinsics[:, 0, 0] / intrinsics[:, 1, 1]
         return replace(self, principal_px=intrinsics[:, :2, 2], stretch=stretch)
+
+    def shaped(self, edge: int, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Points (..., 3) of an edge with its ``lateral`` factor, in their own precision."""
+        return points if self.lateral[edge] == 1 else points * self.shape(edge).astype(points.dtype)
+
+    def shape(self, edge: int) -> Float[np.ndarray, "3"]:
+        """Factors on x, y and z of an edge's points."""
+        return np.array([self.lateral[edge], self.lateral[edge], 1.0])
 
     def pixels(self, image: int, some: Int[np.ndarray, " p"]) -> Float[np.ndarray, "p 2"]:
         """Columns and stretched rows (P, 2) relative to the principal point, of pixels by row-major index."""
@@ -76,7 +87,8 @@ def graph_of(maps: PairMaps) -> Graph:
     _check_values(maps, sizes)
     _check_connected(maps, len(halves))
     middles = np.array([(width / 2, height / 2) for height, width in sizes])
-    return Graph(sizes, tuple(tuple(mine) for mine in halves), middles, np.ones(len(sizes)))
+    each = tuple(tuple(mine) for mine in halves)
+    return Graph(sizes, each, middles, stretch=np.ones(len(sizes)), lateral=np.ones(len(maps)))
 
 
 def _check_values(maps: PairMaps, sizes: tuple[tuple[int, ...], ...]) -> None:

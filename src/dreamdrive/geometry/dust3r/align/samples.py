@@ -33,7 +33,7 @@ def draw_samples(
         for k, half in enumerate(halves):
             trust = np.log(maps.confidence[half.edge][half.side].ravel()[some], dtype=np.float64)
             weight[k] = stands_for * trust / areas[half.edge, half.side]
-            xyz = maps.points[half.edge][half.side].reshape(-1, 3)[some]
+            xyz = graph.shaped(half.edge, maps.points[half.edge][half.side].reshape(-1, 3)[some])
             points[k] = np.where(trust[:, None] > 0, xyz, 0)
         edges = tuple(half.edge for half in halves)
         tensors = (torch.from_numpy(array) for array in (graph.pixels(image, some), points, weight))
@@ -73,6 +73,8 @@ def solve_depth(
     for image, halves in enumerate(graph.halves):
         size = graph.sizes[image]
         parts = [state.camera_from_edge(image, half.edge) for half in halves]
+        shapes = [graph.shape(half.edge) for half in halves]
+        parts = [(matrix * shape, shift) for (matrix, shift), shape in zip(parts, shapes, strict=True)]
         matrices, shifts = (torch.from_numpy(np.stack(part)).float() for part in zip(*parts, strict=True))
         flat = [
             (

@@ -62,7 +62,7 @@ def spanning_tree(
     Args:
         maps: The pairs.
         votes: Focal lengths by the robust rule where they are known already; not looked at if ``upstream``.
-        graph: Their graph, where that is known already.
+        graph: Their graph, where that is known already; if ``upstream`` its points are as the network's.
         upstream: Do all of it as the authors' program does.
         stale_focals: As it does, take an image's focal length from the pair handled before; without effect
             unless ``upstream``.
@@ -114,7 +114,7 @@ class _Tree:
         first = waiting.pop(0)
         before = edge = self.edge_of[first]
         for image, points in zip(first, self.maps.points[edge], strict=True):
-            self.points[image] = points.astype(np.float32, copy=False)
+            self.points[image] = self.graph.shaped(edge, points.astype(np.float32, copy=False))
         self.poses[first[0]] = np.eye(4)
         if self.upstream:
             self.focals[first[0]] = self._focal(edge)
@@ -129,7 +129,7 @@ class _Tree:
             side = 0 if i in self.points else 1
             placed, other = (i, j)[side], (i, j)[1 - side]
             joined = self._register(edge, side, self.points[placed])
-            self.points[other] = joined(self.maps.points[edge][1 - side])
+            self.points[other] = joined(self.graph.shaped(edge, self.maps.points[edge][1 - side]))
             self.poses.setdefault(i, _rigid(joined))
             before = edge
 
@@ -145,7 +145,8 @@ class _Tree:
         weights = np.log(trust[some])
         if np.count_nonzero(weights) < 3:
             some, weights = np.s_[:, :], np.log(trust)
-        return register(points[some], target[some], weights, robust_steps=_ROBUST_STEPS)
+        source = self.graph.shaped(edge, points[some])
+        return register(source, target[some], weights, robust_steps=_ROBUST_STEPS)
 
     def _by_strength(self) -> list[int]:
         return np.argsort(-self.scores, kind="stable").tolist()
