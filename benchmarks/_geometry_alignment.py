@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -70,9 +70,8 @@ class Alignment:
     def name(self) -> str:
         """For messages and files."""
         size = "x".join(map(str, self.size))
-        noise = ("-mistaken" if self.noise.mistaken else "") + (
-            f"-unseen{self.noise.unseen:g}" if self.noise.unseen != 1 else ""
-        )
+        usual, own = asdict(EASY), asdict(self.noise)
+        noise = "".join(f"-{name}{own[name]:g}" for name in own if own[name] != usual[name])
         steps = f"-{self.steps}" if self.steps != STEPS else ""
         draw = f"-draw{self.draw}" if self.draw else ""
         words = f"{self.world}-{self.method}-{self.frames}-{size}-{self.graph}{noise}{steps}{draw}"

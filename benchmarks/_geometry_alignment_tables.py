@@ -25,9 +25,18 @@ A mean with its range in brackets is of several draws of the noise; the other fi
 
 
 def misses(row: Row) -> list[str]:
-    """Which targets an alignment misses."""
+    """Which targets an alignment misses, and whether it says so."""
     far = row["path_percent"] is not None and not row["path_percent"] <= PATH_TARGET
-    return ["path"] * far + ["focal"] * (not row["focal_percent"] <= FOCAL_TARGET)
+    focal = "focal" if row.get("focal_observed", True) else "focal, as it says"
+    return ["path"] * far + [focal] * (not row["focal_percent"] <= FOCAL_TARGET)
+
+
+def noise_words(noise: Row) -> str:
+    """What is wrong with the pairs beside what always is."""
+    if noise["common_focal"]:
+        long, across = 100 * noise["common_focal"], 100 * noise["place"]
+        return f"focal {long:g} % long in all pairs, {across:g} % across rays"
+    return "movers mistaken" if noise["mistaken"] else "movers where they are"
 
 
 def _methods(rows: Sequence[Row]) -> dict[str, Row]:
@@ -43,7 +52,7 @@ def accuracy_table(rows: Sequence[Row]) -> str | None:
         return None
     ours = ["path, %", "RPE, %", "focal, %", "AbsRel", "< 1.25", "path observed", "focal observed", "misses"]
     program = ["path, %: authors' program", "RPE, %", "focal, %", "AbsRel", "< 1.25"]
-    head = ["world", "frames", "movers", *ours, "path, %: authors' loss", "focal, %", *program]
+    head = ["world", "frames", "noise", *ours, "path, %: authors' loss", "focal, %", *program]
     return f"{table(head, cells)}\n\n{ACCURACY_NOTE}"
 
 
@@ -55,7 +64,7 @@ def _accuracy_cells(methods: dict[str, Row]) -> list[str]:
     return [
         ours["world"],
         f"{ours['frames']} of {_size(ours)}",
-        "mistaken" if ours["noise"]["mistaken"] else "where they are",
+        noise_words(ours["noise"]),
         *_errors(ours),
         yes(ours, "path_observed"),
         yes(ours, "focal_observed"),
@@ -85,7 +94,7 @@ def speed_table(rows: Sequence[Row]) -> str | None:
             cells.append(_speed_cells(methods[PAPER], methods["upstream"], methods.get("ours", {})))
     if not cells:
         return None
-    head = ["world", "movers", "frames", "size", "pairs", "ours, authors' loss, s", "loss"]
+    head = ["world", "noise", "frames", "size", "pairs", "ours, authors' loss, s", "loss"]
     head += ["Adam, authors' loss, s", "loss", "times faster", "our default, s"]
     return f"{table(head, cells)}\n\n{SPEED_NOTE}"
 
@@ -95,7 +104,7 @@ def _speed_cells(ours: Row, adam: Row, default: Row) -> list[str]:
     known = whole and "failed" not in ours and "failed" not in adam and ours["loss"] <= adam["loss"]
     return [
         ours["world"],
-        "mistaken" if ours["noise"]["mistaken"] else "where they are",
+        noise_words(ours["noise"]),
         str(ours["frames"]),
         _size(ours),
         figure(ours, "edges", 0),

@@ -19,6 +19,8 @@ from dreamdrive.geometry.dust3r.align.alignment import AlignOptions
 
 HARD = Noise(mistaken=True)
 APART = Noise(mistaken=False, unseen=3)
+COMMON = Noise(mistaken=False, common_focal=0.05, place=0.01)
+COMMON_BESIDE = ("bend a", "corner a")  # the authors' program keeps such a focal length: two worlds show it
 PATHS, LONG = ("bend a", "corner a"), 48  # worlds and frames of the choice of graph
 APART_GRAPHS = (GRAPH, "swin-5-noncyclic", "logwin-5-noncyclic")
 CITED = (GRAPH, "logwin-5-noncyclic")  # in dreamdrive.geometry.dust3r.pairs.video_graph, of the first path
@@ -113,7 +115,8 @@ def everything(runs: Path, *, quick: bool = False) -> list[Measurement]:
     first = [*_ours(runs, EASY), *_both("bend a", runs), *_backends(runs), *_memory(runs)]
     upstream = [each for world in SEEDS for each in _both(world, runs)]
     scenes = [SceneRun(clip, runs) for clip in SCENES]
-    others = [*_speed(runs), *_graphs(runs), *_ours(runs, HARD)]
+    beside = [each for world in COMMON_BESIDE for each in _both(world, runs, COMMON)]
+    others = [*_ours(runs, COMMON), *beside, *_speed(runs), *_graphs(runs), *_ours(runs, HARD)]
     hard = [each for world in SEEDS for each in _both(world, runs, HARD)]
     return list(dict.fromkeys([*first, *upstream, *scenes, *others, *hard]))
 

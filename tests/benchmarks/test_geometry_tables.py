@@ -31,7 +31,7 @@ def row(method: str = "ours", **other: Any) -> dict[str, Any]:
 
 
 def case(method: str = "ours") -> dict[str, Any]:
-    noise = {"depth": 0.05, "unseen": 1.0, "mistaken": False}
+    noise = {"depth": 0.05, "unseen": 1.0, "mistaken": False, "common_focal": 0.0, "place": 0.0}
     told = {"frames": 25, "size": [128, 80], "graph": "swin-3-noncyclic", "noise": noise, "steps": 300}
     return {"measurement": f"align-{method}", "world": "bend a", "method": method, **told, **measured_on()}
 
@@ -65,8 +65,16 @@ def by_head(table: str, number: int = 0) -> list[tuple[str, str]]:
 def test_targets_that_are_missed(tables: ModuleType) -> None:
     assert tables.misses(row()) == []
     assert tables.misses(row(path_percent=1.5, focal_percent=3.5)) == ["path", "focal"]
+    assert tables.misses(row(focal_percent=3.5, focal_observed=False)) == ["focal, as it says"]
     assert tables.misses(row(path_percent=None)) == []
     assert tables.misses(row(path_percent=float("nan"))) == ["path"]
+
+
+def test_the_noise_is_named(tables: ModuleType) -> None:
+    usual = case()["noise"]
+    assert tables.noise_words({**usual, "mistaken": True}) == "movers mistaken"
+    common = {**usual, "common_focal": 0.05, "place": 0.01}
+    assert tables.noise_words(common) == "focal 5 % long in all pairs, 1 % across rays"
 
 
 def test_ours_stands_beside_the_authors_program(tables: ModuleType) -> None:
@@ -74,7 +82,7 @@ def test_ours_stands_beside_the_authors_program(tables: ModuleType) -> None:
     line = by_head(tables.accuracy_table([row(path_percent=1.5), upstream]))
     ours, theirs = line[:11], line[-5:]
     assert [cell for _, cell in ours] == [
-        *("bend a", "25 of 128x80", "where they are"),
+        *("bend a", "25 of 128x80", "movers where they are"),
         *("1.50", "1.20", "1.00", "0.020", "0.990", "yes", "yes", "path"),
     ]
     assert [cell for _, cell in theirs] == ["8.00", "15.00", "9.00", "0.020", "0.500"]
