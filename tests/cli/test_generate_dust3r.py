@@ -28,6 +28,7 @@ def weights(tmp_path: Path) -> Path:
     return save_pth(tmp_path / "tiny.pth", tiny(), img_size=(160, 160))
 
 
+@pytest.mark.slow
 def test_a_clip_becomes_a_scene_and_other_weights_another(run: Run, tmp_path: Path, weights: Path) -> None:
     out, hub = tmp_path / "out", tmp_path / "hub"
     hub.mkdir()

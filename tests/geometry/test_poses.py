@@ -99,6 +99,7 @@ def test_dark_frames_are_said(clip: Clip) -> None:
     assert "dark or too blank" in black.fallback
 
 
+@pytest.mark.slow
 def test_shuffled_frames_end_in_the_fallback_and_say_why(clip: Clip) -> None:
     order = np.array([3, 0, 6, 1, 7, 2, 5, 4])
     posed = pose_clip(replace(clip, frames=clip.frames[order]))
@@ -116,6 +117,7 @@ def test_very_short_clips_are_posed(count: int) -> None:
     assert posed.fallback is not None
 
 
+@pytest.mark.slow
 def test_a_bonnet_is_handed_on_with_its_name() -> None:
     posed = pose_clip(make_clip(straight([0.5] * 7), hood=True))
     assert posed.fallback is None

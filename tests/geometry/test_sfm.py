@@ -37,6 +37,7 @@ def test_the_gate_refuses_shuffled_frames(clip: Clip) -> None:
     assert any("jumps" in reason or "varies" in reason for reason in outcome.reasons)
 
 
+@pytest.mark.slow
 def test_a_start_from_standstill_is_accepted() -> None:
     steps = [0.0, 0.0, 0.0, 0.1, 0.2, 0.4, 0.6, 0.8]
     outcome = run(make_clip(straight(steps)))

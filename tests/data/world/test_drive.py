@@ -179,6 +179,7 @@ def test_as_many_boxes_as_asked_for() -> None:
     assert moving == [True] * 3 + [False] * 5
 
 
+@pytest.mark.slow
 def test_surround_cameras_see_the_street_beside_and_behind() -> None:
     layout = draw_street(3)
     front, back = (drive(layout, 2, size=(64, 48), mount=mount) for mount in ("front", "back"))

@@ -94,6 +94,7 @@ def forced(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names of x86 instruction sets")
+@pytest.mark.slow
 def test_other_instructions_give_the_same_picture(forced: Path, tmp_path: Path) -> None:
     libraries = Path(embreex.__file__).parents[1] / "embreex.libs"
     embree = next(libraries.glob("libembree4*"))

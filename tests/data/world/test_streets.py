@@ -86,6 +86,7 @@ def test_streets_differ_in_shape_and_light(layouts: list[Layout]) -> None:
     assert max(turns) > 0.1
 
 
+@pytest.mark.slow
 def test_actors_are_partly_textured_and_partly_plain_and_dark() -> None:
     """Shares of the pixels of all boxes: local contrast above 4 grey levels; below it and darker than 70."""
     textured = dark = count = 0

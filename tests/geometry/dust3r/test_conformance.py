@@ -124,6 +124,7 @@ def test_known_pinholes_poses_and_depth_are_the_truth(
     assert found.details["focal_spread"] < 1e-4
 
 
+@pytest.mark.slow
 def test_the_wrong_pinhole_would_show(
     monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
 ) -> None:
@@ -145,6 +146,7 @@ def test_without_a_calibration_the_principal_point_is_where_the_network_has_it(
     assert path_error(found.world_from_camera, street.trajectory.world_from_camera) < 1e-5
 
 
+@pytest.mark.slow
 def test_what_the_network_says_of_the_sky_does_not_count(
     monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
 ) -> None:

@@ -132,6 +132,7 @@ def test_progress_counts_to_its_end(inputs: Control) -> None:
     assert told == [(done, 4) for done in (1, 2, 3, 4)]
 
 
+@pytest.mark.slow
 def test_the_temporal_variant_samples_all_time_steps_together(inputs: Control, tmp_path: Path) -> None:
     weights = write_folder(tmp_path / "temporal", temporal=True).path
     control = replace(inputs, weights=weights, fps=None, frames="1:16:7")

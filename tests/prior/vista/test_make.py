@@ -76,6 +76,7 @@ def test_it_claims_no_geometry(clip: Clip) -> None:
     assert (clip.provenance["rounds"], clip.provenance["steps"], clip.provenance["seed"]) == (2, 1, 3)
 
 
+@pytest.mark.slow
 def test_seed_and_action_decide(clip: Clip, control: Control) -> None:
     def frames(**changes: object) -> np.ndarray:
         return PRIORS["vista"](replace(control, frames="0:4", **changes)).frames  # type: ignore[arg-type]
