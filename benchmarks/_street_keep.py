@@ -46,10 +46,3 @@ def load_features(path: Path) -> Features:
     """The features beside a record."""
     with np.load(path.with_suffix(".npz")) as stored:
         return {name: stored[name] for name in stored.files}
-
-
-def write(path: Path | None, text: str) -> None:
-    """A report, if it is wanted; its folder is made."""
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)

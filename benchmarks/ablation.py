@@ -20,11 +20,12 @@ import numpy as np
 import torch
 from _ablation_features import with_efficientnet
 from _ablation_variants import VARIANTS, Variant
+from _report_file import write
 from _street_case import NOVEL, Case, References, Start, case_digest, start
 from _street_fit import fit_case
 from _street_fit import options_of as fit_options
 from _street_jobs import QUALITY
-from _street_keep import is_current, load, save, write
+from _street_keep import is_current, load, save
 from _street_measure import measure, told_apart
 from _street_table import as_text, grid, number
 from _street_views import views_digest

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from _report_file import write
 from pandaset_truth import camera_path, moving_masks
 
 from dreamdrive.evaluate.paths import compare_paths
@@ -117,9 +118,7 @@ def main() -> int:
             print(f"{name}: {error}", file=sys.stderr, flush=True)
             continue
         print(json.dumps(rows[-1]), flush=True)
-        if args.json:
-            args.json.parent.mkdir(parents=True, exist_ok=True)
-            args.json.write_text(json.dumps({"rows": rows}, indent=1) + "\n")
+        write(args.json, json.dumps({"rows": rows}, indent=1) + "\n")
     for name in failed:
         print(f"failed: {name}", file=sys.stderr)
     return 1 if failed else 0

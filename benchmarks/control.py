@@ -24,6 +24,7 @@ import numpy as np
 import torch
 from _layout_edits import move_box, widen_road
 from _markdown import columns
+from _report_file import write
 from _street_measure import to_scene
 
 from dreamdrive.cli.machine import use_all_cores
@@ -102,13 +103,9 @@ def main() -> None:
         found = measure(seed, options)
         rows += found
         print(table(found), flush=True)
-        if options.json:
-            options.json.parent.mkdir(parents=True, exist_ok=True)
-            settings = {
-                k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items() if k != "json"
-            }
-            text = json.dumps({"settings": settings, "rows": [asdict(row) for row in rows]}, indent=1)
-            options.json.write_text(text + "\n")
+        settings = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items() if k != "json"}
+        text = json.dumps({"settings": settings, "rows": [asdict(row) for row in rows]}, indent=1)
+        write(options.json, text + "\n")
 
 
 def arguments() -> argparse.Namespace:

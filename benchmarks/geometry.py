@@ -36,6 +36,7 @@ from _geometry_cases import Measurement, Row, forget, load, measure_all
 from _geometry_jobs import everything
 from _geometry_plot import plot
 from _geometry_report import markdown
+from _report_file import write
 
 from dreamdrive.splat import set_threads
 
@@ -98,10 +99,8 @@ def main() -> int:
     report = report_of(wanted)
     text = markdown(report)
     print(text)
-    if options.json:
-        options.json.write_text(json.dumps(rounded(report)) + "\n")
-    if options.markdown:
-        options.markdown.write_text(text)
+    write(options.json, json.dumps(rounded(report)) + "\n")
+    write(options.markdown, text)
     if options.plot:
         plot(report, options.plot)
     return 1 if failed else 0

@@ -29,11 +29,12 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
+from _report_file import write
 from _street_case import FRAMES, Poses, References, references_digest, world_digest
 from _street_claims import claims
 from _street_consistency import consistency_tables
 from _street_jobs import BUDGETS, QUALITY, REPRESENTATIONS, SEEDS, Job, in_order, jobs, recorded, run
-from _street_keep import is_current, kept, load, load_features, write
+from _street_keep import is_current, kept, load, load_features
 from _street_measure import truth_features
 from _street_picture import picture
 from _street_recording import CLIP, DATA, Recorded, recording, run_recorded
