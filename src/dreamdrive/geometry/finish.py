@@ -124,7 +124,7 @@ def _metric(
 def _focal_spread(measured: Measured) -> float:
     if measured.focal_spread is not None:
         return measured.focal_spread
-    return 0.0 if measured.focal_observed else scales.FOCAL_SPREAD
+    return scales.focal_spread_of(measured.focal_observed)
 
 
 def _in_place(street: Street) -> Street:

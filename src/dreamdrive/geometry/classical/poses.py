@@ -113,8 +113,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     if len(ratios):
         metric = scale.from_depth(ratios, street, height_m, seed)
     else:
-        focal_spread = 0.0 if observed else scale.FOCAL_SPREAD
-        metric = scale.from_ground(street, height_m, focal_spread, seed)
+        metric = scale.from_ground(street, height_m, scale.focal_spread_of(observed), seed)
     poses[:, :3, 3] *= metric.factor
     placed = int(model.registered.sum())
     notes = list(outcome.notes) + list(metric.notes)
@@ -148,7 +147,7 @@ def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed:
         posed = _standing(replace(clip, known=known), evidence, height_m, reason)
         return replace(posed, metres_per_unit=None)
     street = _known_street(clip, evidence)
-    focal_spread = 0.0 if clip.known.intrinsics else scale.FOCAL_SPREAD
+    focal_spread = scale.focal_spread_of(clip.known.intrinsics)
     metric = scale.from_ground(street, height_m, focal_spread, seed)
     notes = ["the given poses are used; their unit is not known and scaled to metres", *metric.notes]
     posed = _with_known(clip, evidence, metric, notes)

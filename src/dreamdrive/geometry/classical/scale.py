@@ -76,6 +76,11 @@ def find_ground(
     return sweep(road, heights), "road texture"
 
 
+def focal_spread_of(observed: bool) -> float:
+    """How far a focal length may be off, as a fraction: not at all where it was observed."""
+    return 0.0 if observed else FOCAL_SPREAD
+
+
 def from_ground(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric:
     """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
 
