@@ -134,9 +134,9 @@ def turned_focal(maps: PairMaps, votes: FocalVotes, graph: Graph) -> TurnedFocal
     nothing = TurnedFocal(votes.shared_px, float("inf"))
     found = [_view(maps, votes, graph, edge) for edge in range(len(maps))]
     found = [each for each in found if each is not None]
-    if len({image for image, *_ in found}) < _FEWEST_IMAGES:
+    if len({int(view.image[0]) for view, _ in found}) < _FEWEST_IMAGES:
         return nothing
-    views, poses = _stacked(found)
+    views, poses = _together(found)
     log_ratio = 0.0
     for _ in range(_STEPS):
         reduced = _reduced(views, poses, votes.shared_px * float(np.exp(log_ratio)))
@@ -163,10 +163,7 @@ def _spread(image: Int[np.ndarray, " e"], reduced: _Reduced) -> float:
     return float(_UNDERSTATED * np.sqrt(scatter + reduced.floor.sum()) / reduced.curvature.sum())
 
 
-_View = tuple[int, float, np.ndarray, np.ndarray, np.ndarray, float, np.ndarray, np.ndarray]
-
-
-def _view(maps: PairMaps, votes: FocalVotes, graph: Graph, edge: int) -> _View | None:
+def _view(maps: PairMaps, votes: FocalVotes, graph: Graph, edge: int) -> tuple[_Views, _Poses] | None:
     """One pair on a coarse grid of its second image, with a first pose; None where it has nothing to say."""
     image, believed = int(maps.edges[edge, 1]), float(votes.focal_px[edge])
     height, width = graph.sizes[image]
@@ -186,22 +183,30 @@ def _view(maps: PairMaps, votes: FocalVotes, graph: Graph, edge: int) -> _View |
         return None
     pose = np.linalg.inv(posed[1])
     pixels = graph.pixels(image, np.arange(height * width).reshape(height, width)[some].ravel())
-    weight = np.where(ahead, weight, 0).ravel()
-    patches = max(1.0, _PATCHES * height / width)
-    return image, believed, pixels, points.reshape(-1, 3), weight, patches, pose[:3, :3], pose[:3, 3]
+    view = _Views(
+        image=np.array([image]),
+        believed_px=np.array([believed]),
+        pixels=pixels[None],
+        points=points.reshape(1, -1, 3),
+        weight=np.where(ahead, weight, 0).reshape(1, -1),
+        patches=np.array([max(1.0, _PATCHES * height / width)]),
+    )
+    return view, _Poses(pose[None, :3, :3], pose[None, :3, 3])
 
 
-def _stacked(found: list[_View]) -> tuple[_Views, _Poses]:
-    most = max(len(weight) for _, _, _, _, weight, *_ in found)
+def _together(found: list[tuple[_Views, _Poses]]) -> tuple[_Views, _Poses]:
+    """All pairs, those of smaller images filled up with points that weigh 0."""
+    most = max(view.weight.shape[1] for view, _ in found)
 
-    def stacked(part: int) -> np.ndarray:
-        arrays = [np.asarray(each[part]) for each in found]
-        if part not in (2, 3, 4):
-            return np.stack(arrays)
-        return np.stack([np.pad(a, [(0, most - len(a)), (0, 0)][: a.ndim]) for a in arrays])
+    def joined(name: str) -> np.ndarray:
+        arrays = [getattr(view, name) for view, _ in found]
+        if arrays[0].ndim == 1:
+            return np.concatenate(arrays)
+        return np.concatenate([np.pad(a, [(0, 0), (0, most - a.shape[1]), (0, 0)][: a.ndim]) for a in arrays])
 
-    image, believed, pixels, points, weight, patches, turn, shift = (stacked(part) for part in range(8))
-    return _Views(image, believed, pixels, points, weight, patches), _Poses(turn, shift)
+    views = _Views(**{name: joined(name) for name in _Views.__dataclass_fields__})
+    turn = np.concatenate([pose.turn for _, pose in found])
+    return views, _Poses(turn, np.concatenate([pose.shift for _, pose in found]))
 
 
 def _reduced(views: _Views, poses: _Poses, focal_px: float) -> _Reduced:
