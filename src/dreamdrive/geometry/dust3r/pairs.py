@@ -21,9 +21,10 @@ def video_graph(frames: int) -> str:
 
     Windows do not close into a circle: the first and the last frame of a drive see nothing in common.
 
-    Of 48 frames round a bend noisy pairs, made by ``benchmarks/geometry.py``, leave the path 0.30 % of its
-    length off with ``swin-3`` (276 pairs) and 0.09 % with ``logwin-5`` (418 pairs) in 1.7 times the seconds;
-    of 24 frames 0.18 and 0.09 %. Those pairs are as good far apart as near, which a network's are not.
+    Of 48 frames round a bend noisy pairs, made by ``benchmarks/geometry.py``, leave the path 0.38 % of its
+    length off with ``swin-3`` (276 pairs; mean of three draws) and 0.05 % with ``logwin-5`` (418 pairs) in
+    1.6 times the seconds; of 24 frames 0.13 and 0.06 %. With three times the noise where the first camera of
+    a pair does not look, which is nearer to a network, 0.28 and 0.07 % (48 frames, one draw).
     """
     return "swin-3-noncyclic" if frames <= _SHORT else "logwin-5-noncyclic"
 
