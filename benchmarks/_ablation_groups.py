@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import combinations
 
 import numpy as np
 import torch
@@ -46,15 +47,25 @@ def by_voxels(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
 
 
 def density_labels(values: Float[np.ndarray, "m d"], smallest: int) -> Int[np.ndarray, " m"]:
-    """Labels of HDBSCAN, -1 for noise."""
+    """Labels of HDBSCAN, clusters within ``REACH_M`` of one another joined, -1 for noise.
+
+    Its own option for that, ``cluster_selection_epsilon``, fails with NumPy from 2.4 on (scikit-learn 1.9).
+    """
     try:
         from sklearn.cluster import HDBSCAN  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise RuntimeError("clusters of HDBSCAN need scikit-learn: pip install scikit-learn") from error
     if len(values) < smallest:
         return np.full(len(values), -1)
-    found = HDBSCAN(min_cluster_size=smallest, cluster_selection_epsilon=REACH_M, copy=True)
-    return found.fit_predict(values)
+    labels = HDBSCAN(min_cluster_size=smallest, copy=True).fit_predict(values)
+    clusters = labels.max() + 1
+    trees = [KDTree(values[labels == cluster]) for cluster in range(clusters)]
+    touching = np.zeros((clusters, clusters))
+    for a, b in combinations(range(clusters), 2):
+        nearest, _ = trees[a].query(trees[b].data, distance_upper_bound=REACH_M)
+        touching[a, b] = np.isfinite(nearest).any()
+    thing = connected_components(coo_matrix(touching), directed=False)[1] if clusters else labels
+    return np.where(labels >= 0, thing[labels], -1)
 
 
 def voxel_labels(places: Float[np.ndarray, "m 4"]) -> Int[np.ndarray, " m"]:

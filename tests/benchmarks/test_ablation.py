@@ -130,6 +130,19 @@ def test_no_candidates_have_no_labels(groups: ModuleType) -> None:
     assert (groups.density_labels(np.zeros((3, 5)), 24) == -1).all()
 
 
+def test_clusters_of_density_within_reach_are_one(groups: ModuleType) -> None:
+    """Dense clumps a metre apart are one thing, those of another thing far away another one."""
+    generator = np.random.default_rng(0)
+    clumps = np.array([[0, 0], [1, 0], [2, 0], [20, 0], [21, 0]], dtype=float).repeat(60, axis=0)
+    places = np.zeros((len(clumps), 5))
+    places[:, :2] = clumps + generator.normal(0, 0.02, clumps.shape)
+    labels = groups.density_labels(places, 24)
+    first, second = (labels[clumps[:, 0] < 10], labels[clumps[:, 0] > 10])
+    assert len(set(first[first >= 0])) == len(set(second[second >= 0])) == 1
+    assert set(first) & set(second) <= {-1}
+    assert (labels >= 0).mean() > 0.9
+
+
 def test_space_time_does_not_count_withheld_frames(groups: ModuleType) -> None:
     seeds = SimpleNamespace(
         means=torch.zeros(3, 3), source_frame=torch.tensor([0, 2, 3]), features=torch.ones(3, 2)

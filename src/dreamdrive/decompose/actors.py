@@ -28,11 +28,16 @@ from dreamdrive.scene.geometry import Geometry
 class ActorOptions:
     """Constants of the tracks.
 
+    Figures are means over four drawn streets with corrupted references and true poses
+    (``benchmarks/ablation.py``). Without any tracks withheld frames lose 0.71 dB, novel views 0.23 dB.
+
     Attributes:
-        lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames.
+        lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames. Three
+            times as long, novel views lose 0.03 dB and standing things seem to move 43 mm farther.
         untracked_frames: The same for what has no track: a copy that stays where it was seen is wrong soon.
-        canonical: Which of the frames that show an actor is its canonical time.
-        lasting: Whether copies of what no other frame sees live on, see ``lives``.
+        canonical: Which of the frames that show an actor is its canonical time; both give the same pictures.
+        lasting: Whether copies of what no other frame sees live on, see ``lives``: without it novel views
+            lose 0.11 dB, and standing things seem to move 14 mm less.
         contact_weight: Trust in one frame's depth against that in the change of size between two frames; a
             frame that shows more of the actor weighs more.
         least_frames: Clusters seen in fewer frames get no track, only a short life.

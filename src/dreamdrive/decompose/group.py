@@ -23,8 +23,11 @@ from dreamdrive.scene.linked_pixels import linked_pixels
 class GroupOptions:
     """Constants of the grouping.
 
+    Figures are the mean IoU of what moves on four drawn streets with corrupted references and true poses
+    (``benchmarks/ablation.py``), 0.503 with these defaults.
+
     Attributes:
-        threshold: tau of eq. 9: a Gaussian votes dynamic above it.
+        threshold: tau of eq. 9: a Gaussian votes dynamic above it. With 0.2 0.469, 0.5 0.503, 0.65 0.492.
         candidate: Only Gaussians above this score are clustered; the rest is one static mass.
         reach_px: Neighbours of one source frame are at most this far apart in its image.
         reach_depth: ... and differ by at most this in the logarithm of depth.
@@ -38,7 +41,8 @@ class GroupOptions:
         core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere
             a little, cross tau but have no core.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
-        clustering: False keeps each Gaussian's own vote (for ablation).
+        clustering: False keeps each Gaussian's own vote (for ablation): 0.495, but there are no things then
+            that could have tracks, and withheld frames lose 0.7 dB.
     """
 
     threshold: float = 0.35
