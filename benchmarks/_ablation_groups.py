@@ -59,12 +59,14 @@ def density_labels(values: Float[np.ndarray, "m d"], smallest: int) -> Int[np.nd
         return np.full(len(values), -1)
     labels = HDBSCAN(min_cluster_size=smallest, copy=True).fit_predict(values)
     clusters = labels.max() + 1
+    if not clusters:
+        return labels
     trees = [KDTree(values[labels == cluster]) for cluster in range(clusters)]
     touching = np.zeros((clusters, clusters))
     for a, b in combinations(range(clusters), 2):
         nearest, _ = trees[a].query(trees[b].data, distance_upper_bound=REACH_M)
         touching[a, b] = np.isfinite(nearest).any()
-    thing = connected_components(coo_matrix(touching), directed=False)[1] if clusters else labels
+    thing = connected_components(touching, directed=False)[1]
     return np.where(labels >= 0, thing[labels], -1)
 
 
