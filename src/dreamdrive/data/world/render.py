@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.data.world.columns import by_columns, dot, outer, picked, turned
 from dreamdrive.data.world.materials import Semantic
 from dreamdrive.data.world.solid import Hits
 from dreamdrive.data.world.world import Moment, World
@@ -80,7 +81,7 @@ def _refine(
     eye: "_Eye", colour: np.ndarray, columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]
 ) -> None:
     """Give pixels that differ from a neighbour the mean over further rays, in place."""
-    seen = _encoded(colour).mean(axis=1).reshape(shape)
+    seen = _encoded(colour).T.mean(axis=0).reshape(shape)
     uneven = np.zeros(shape, dtype=bool)
     for axis in (0, 1):
         step = np.abs(np.diff(seen, axis=axis)) > _CONTRAST
@@ -88,11 +89,12 @@ def _refine(
         uneven[(first, slice(None)) if axis == 0 else (slice(None), first)] |= step
         uneven[(second, slice(None)) if axis == 0 else (slice(None), second)] |= step
     chosen = np.flatnonzero(uneven.ravel())
-    places = (np.stack([columns[chosen], rows[chosen]], axis=-1)[:, None] + _RAYS).reshape(-1, 2)
-    rays = eye.rays(*places.T)
-    further = eye.shade(rays, eye.trace(rays, *places.T)).reshape(len(chosen), len(_RAYS), 3)
+    across = (columns[chosen] + _RAYS[:, :1]).ravel()
+    down = (rows[chosen] + _RAYS[:, 1:]).ravel()
+    rays = eye.rays(across, down)
+    further = eye.shade(rays, eye.trace(rays, across, down)).T.reshape(3, len(_RAYS), len(chosen))
     # Bright points are cut before they are averaged, as they are in the pixels that take one ray.
-    colour[chosen] = np.minimum(further, 1.5).mean(axis=1)
+    colour[chosen] = np.minimum(further, 1.5).mean(axis=1).T
 
 
 def _encoded(colour: np.ndarray) -> np.ndarray:
@@ -114,7 +116,7 @@ class _Eye:
     def _reach(self) -> tuple[float, float, float, float]:
         """First and last column and row on which a mover can lie."""
         c, corners = self.camera, self.moment.moving.corners
-        local = _turned(corners.reshape(-1, 3) - self.centre, c.world_from_camera[:3, :3].T)
+        local = turned(corners.reshape(-1, 3) - self.centre, c.world_from_camera[:3, :3].T)
         ahead = local[:, 2] > _NEAR_M
         part = ahead.reshape(-1, 3)
         if (part.any(axis=1) & ~part.all(axis=1)).any():
@@ -128,17 +130,15 @@ class _Eye:
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Directions (N, 3) in the map frame, of length 1 along z."""
         c = self.camera
-        local = np.stack(
-            [(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px, np.ones(len(columns))], axis=-1
-        )
-        return _turned(local, c.world_from_camera[:3, :3])
+        local = by_columns([(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px, np.ones(len(columns))])
+        return turned(local, c.world_from_camera[:3, :3])
 
     def trace(self, rays: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> Hits:
         """The first triangle on each ray; those of movers are counted on from the standing ones."""
         hits = self.world.standing.first_hits(self.centre, rays)
         left, right, top, bottom = self._window
         near = np.flatnonzero((columns >= left) & (columns <= right) & (rows >= top) & (rows <= bottom))
-        moving = self.moment.moving.first_hits(self.centre, rays[near])
+        moving = self.moment.moving.first_hits(self.centre, picked(rays, near))
         nearer = moving.distance < hits.distance[near]
         hits.triangle[near[nearer]] = moving.triangle[nearer] + self.standing
         hits.distance[near[nearer]] = moving.distance[nearer]
@@ -149,10 +149,10 @@ class _Eye:
         still, moving = getattr(self.world.standing, name), getattr(self.moment.moving, name)
         first = triangle < self.standing
         if first.all():
-            return still[triangle]
-        rows = np.empty((len(triangle), *still.shape[1:]), dtype=still.dtype)
-        rows[first] = still[triangle[first]]
-        rows[~first] = moving[triangle[~first] - self.standing]
+            return picked(still, triangle)
+        rows = picked(still, np.where(first, triangle, 0))
+        second = np.flatnonzero(~first)
+        rows[second] = picked(moving, triangle[second] - self.standing)
         return rows
 
     def instances(self, hits: Hits) -> np.ndarray:
@@ -196,8 +196,9 @@ class _Eye:
                 np.einsum("nij,nj->ni", carry[owner, :3, :3], points[moving]) + carry[owner, :3, 3]
             )
         # What is infinitely far away does not see the camera move, only turn.
-        start = np.where(solid[:, None], camera.world_from_camera[:3, 3], self.centre)
-        local = _turned(points - start, camera.world_from_camera[:3, :3].T)
+        there = camera.world_from_camera[:3, 3]
+        start = by_columns([np.where(solid, a, b) for a, b in zip(there, self.centre, strict=True)])
+        local = turned(points - start, camera.world_from_camera[:3, :3].T)
         z = np.maximum(local[:, 2], 1e-6)
         across = local[:, 0] / z * camera.fx_px + camera.cx_px - columns
         return np.stack([across, local[:, 1] / z * camera.fy_px + camera.cy_px - rows], axis=-1)
@@ -205,20 +206,20 @@ class _Eye:
     def shade(self, rays: np.ndarray, hits: Hits) -> np.ndarray:
         """Linear colours (N, 3) on each ray."""
         sky = self.world.sky
-        colour = np.empty((len(rays), 3), dtype=np.float32)
+        colour = np.empty((len(rays), 3), dtype=np.float32, order="F")
         solid = hits.triangle >= 0
-        colour[~solid] = sky.colour(rays[~solid])
-        at = np.flatnonzero(solid)
+        free, at = np.flatnonzero(~solid), np.flatnonzero(solid)
+        colour[free] = sky.colour(picked(rays, free))
         if not len(at):
             return colour
-        triangle = hits.triangle[at]
-        points = (self.centre + hits.distance[at, None] * rays[at]).astype(np.float32)
-        view = rays[at].astype(np.float32)
-        length = np.sqrt(_dot(view, view))
+        triangle, distance, along = hits.triangle[at], hits.distance[at], picked(rays, at)
+        points = (self.centre + distance[:, None] * along).astype(np.float32)
+        view = along.astype(np.float32)
+        length = np.sqrt(dot(view, view))
         view /= length[:, None]
-        distance_m = hits.distance[at].astype(np.float32) * length
+        distance_m = distance.astype(np.float32) * length
         normal = self._gather("normals", triangle)
-        facing = _dot(normal, view)
+        facing = dot(normal, view)
         normal *= -np.sign(facing)[:, None]  # a surface seen from behind shines as well
         slope = np.maximum(np.abs(facing), _FLATTEST)
         material = self._gather("material", triangle)
@@ -226,8 +227,8 @@ class _Eye:
         light = self._light(points, normal, material)
         gloss = np.array(self.world.materials.gloss, np.float32)[material]
         mirrored = self._mirrored(view, normal, slope, gloss)
-        near = np.exp(np.float32(-sky.haze_per_m) * distance_m)[:, None]
-        colour[at] = (albedo * light + mirrored) * near + sky.haze * (1 - near)
+        near = np.exp(np.float32(-sky.haze_per_m) * distance_m)
+        colour[at] = (albedo * light + mirrored) * near[:, None] + outer(1 - near, sky.haze)
         return colour
 
     def _albedo(
@@ -242,35 +243,35 @@ class _Eye:
     ) -> np.ndarray:
         """Share of the light that surfaces throw back (N, 3): the mean over what the pixel covers."""
         rows = self._gather("to_uv", triangle)
-        uv = np.stack([_dot(rows[:, k, :3], points) + rows[:, k, 3] for k in (0, 1)], axis=-1)
+        uv = by_columns([dot(rows[:, k, :3], points) + rows[:, k, 3] for k in (0, 1)])
         # A pixel covers an ellipse: the short axis across the line of sight, the long one along it.
         short_m = distance_m / np.float32(self.camera.fx_px)
         along = view + slope[:, None] * normal  # the line of sight on the surface; its length is the sine
-        along *= (0.5 * short_m / slope / np.maximum(np.sqrt(_dot(along, along)), 1e-6))[:, None]
-        reach = np.stack([_dot(rows[:, k, :3], along) for k in (0, 1)], axis=-1)
-        width = np.maximum(short_m, short_m / slope / 6) * np.sqrt(_dot(rows[:, 0, :3], rows[:, 0, :3]))
+        along *= (0.5 * short_m / slope / np.maximum(np.sqrt(dot(along, along)), 1e-6))[:, None]
+        reach = by_columns([dot(rows[:, k, :3], along) for k in (0, 1)])
+        width = np.maximum(short_m, short_m / slope / 6) * np.sqrt(dot(rows[:, 0, :3], rows[:, 0, :3]))
         index = np.array(self.world.materials.texture)[material]
         return (self.world.materials.textures.lookup(index, uv, reach, width) / 255) ** 2
 
     def _light(self, points: np.ndarray, normal: np.ndarray, material: np.ndarray) -> np.ndarray:
         """Light that falls on surfaces (N, 3)."""
         sky = self.world.sky
-        lit = _dot(normal, sky.towards_sun.astype(np.float32)[None])
+        lit = dot(normal, sky.towards_sun.astype(np.float32)[None])
         sunny = np.flatnonzero(lit > 0)
-        start = points[sunny] + np.float32(1e-3) * normal[sunny]
+        start = picked(points, sunny) + np.float32(1e-3) * picked(normal, sunny)
         hidden = self.world.standing.hidden(start, sky.towards_sun)
         hidden |= self.moment.moving.hidden(start, sky.towards_sun)
         sun = np.zeros(len(points), dtype=np.float32)
         sun[sunny] = lit[sunny] * ~hidden
         open_ = (0.62 + 0.38 * normal[:, 2]).astype(np.float32)
         ground = np.flatnonzero(material == self.world.ground_material)
-        open_[ground] *= self._under_bodies(points[ground])
-        return sun[:, None] * sky.sunlight + open_[:, None] * sky.skylight
+        open_[ground] *= self._under_bodies(picked(points, ground))
+        return outer(sun, sky.sunlight) + outer(open_, sky.skylight)
 
     def _under_bodies(self, points: np.ndarray) -> np.ndarray:
         """Share of the sky's light that reaches the ground beside and below road users."""
         share = np.ones(len(points), dtype=np.float32)
-        x, y = points[:, 0].copy(), points[:, 1].copy()
+        x, y = points[:, 0], points[:, 1]
         for mover in self.world.movers:
             pose = mover.pose(self.moment.time_s).astype(np.float32)
             length, width, _ = mover.box.size_m
@@ -278,35 +279,22 @@ class _Eye:
             close = np.flatnonzero((np.abs(x - pose[0, 3]) < reach) & (np.abs(y - pose[1, 3]) < reach))
             if not len(close):
                 continue
-            local = np.abs(_turned(points[close, :2] - pose[:2, 3], pose[:2, :2].T))
+            local = np.abs(turned(picked(points[:, :2], close) - pose[:2, 3], pose[:2, :2].T))
             outside = np.maximum(local - np.array([0.45 * length, 0.42 * width], np.float32), 0)
-            share[close] *= 1 - np.float32(0.75) * np.exp(-_dot(outside, outside) / np.float32(0.35**2))
+            share[close] *= 1 - np.float32(0.75) * np.exp(-dot(outside, outside) / np.float32(0.35**2))
         return share
 
     def _mirrored(
         self, view: np.ndarray, normal: np.ndarray, slope: np.ndarray, gloss: np.ndarray
     ) -> np.ndarray:
         """Light of the sky that smooth surfaces mirror (N, 3), by Schlick's approximation."""
-        mirrored = np.zeros((len(view), 3), dtype=np.float32)
+        mirrored = np.zeros((len(view), 3), dtype=np.float32, order="F")
         smooth = np.flatnonzero(gloss > 0)
         if len(smooth):
-            v, n = view[smooth], normal[smooth]
-            back = v - 2 * _dot(v, n)[:, None] * n
+            v, n = picked(view, smooth), picked(normal, smooth)
+            back = v - 2 * dot(v, n)[:, None] * n
             share = gloss[smooth] + (1 - gloss[smooth]) * (1 - slope[smooth]) ** 5
             seen = self.world.sky.colour(back)
             seen[back[:, 2] < 0] = _GROUND_MIRRORED
             mirrored[smooth] = np.minimum(seen, 1.5) * share[:, None]
         return mirrored
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Scalar products (N,) of rows; NumPy's own sums are slow over so few columns."""
-    total = a[:, 0] * b[:, 0]
-    for k in range(1, a.shape[1]):
-        total += a[:, k] * b[:, k]
-    return total
-
-
-def _turned(vectors: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Rows (N, k) times a small matrix. A matrix library would wake all its threads for it, who then spin."""
-    return np.stack([_dot(vectors, row[None]) for row in rotation], axis=-1)

@@ -8,6 +8,7 @@ from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive.data.world.columns import dot, picked
 from dreamdrive.data.world.mesh import Mesh
 
 _OFF_SURFACE_M = 2e-3
@@ -40,10 +41,11 @@ class Solid:
     def __init__(self, mesh: Mesh, owner: Int[np.ndarray, " m"], device: EmbreeDevice) -> None:
         self.corners, self.material, self.owner = mesh.corners, mesh.material, owner
         edges = mesh.corners[:, 1:] - mesh.corners[:, :1]
-        self._across = np.cross(edges[:, 0], edges[:, 1])
-        length = np.linalg.norm(self._across, axis=1, keepdims=True)
-        self.normals = (self._across / np.maximum(length, 1e-12)).astype(np.float32)
-        self.to_uv = _texture_rows(mesh).astype(np.float32)
+        across = np.cross(edges[:, 0], edges[:, 1])
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        self._across = np.asfortranarray(across)
+        self.normals = np.asfortranarray(across / np.maximum(length, 1e-12), dtype=np.float32)
+        self.to_uv = np.asfortranarray(_texture_rows(mesh), dtype=np.float32)
         self._scene = None
         if len(mesh):
             self._scene = EmbreeScene(device)
@@ -63,8 +65,8 @@ class Solid:
         hit = np.flatnonzero(triangle >= 0)
         at = triangle[hit]
         distance = np.full(count, np.inf)
-        slope = np.einsum("ni,ni->n", self._across[at], directions[hit])
-        gap = np.einsum("ni,ni->n", self._across[at], self.corners[at, 0] - origin)
+        slope = dot(picked(self._across, at), picked(directions, hit))
+        gap = dot(self._across, self.corners[:, 0] - origin)[at]
         distance[hit] = gap / np.where(slope == 0, 1e-300, slope)
         return Hits(triangle, distance)
 

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
+from dreamdrive.data.world.columns import picked
+
 _TAPS = 4
 _ROW = 4096  # OpenCV limits a row of its sampling maps to 32767 entries
 
@@ -43,18 +45,20 @@ class Textures:
             width: Its short axis, in units of u.
         """
         atlas = self._packed()
-        sharp = np.log2(np.maximum(width * self._size[index * self._most, 0], 1e-6))
-        most, repeats = self._count[index] - 1, self._repeats[index, None]
+        first = index * self._most
+        sharp = np.log2(np.maximum(width * self._size[:, 0].take(first), 1e-6))
+        most, repeats = self._count.take(index) - 1, self._repeats.take(index)
         total = np.zeros((len(index), 3), dtype=np.float32)
         for tap, rank in enumerate((0, 2, 1, 3)):
             # Each tap takes its own of two neighbouring sizes: their mean blends both.
             level = np.floor(sharp + np.float32((rank + 0.5) / _TAPS)).astype(np.int32)
-            level = np.clip(level, 0, most)
+            tile = first + np.clip(level, 0, most)
             at = uv + np.float32((2 * tap + 1) / _TAPS - 1) * along
-            at = np.where(repeats, at - np.floor(at), np.clip(at, 0, 1))
-            tile = index * self._most + level
-            total += sampled(atlas, self._corner[tile] + at * self._size[tile] - np.float32(0.5))
-        return total / np.float32(_TAPS)
+            at = np.clip(at - np.floor(at) * repeats[:, None], 0, 1)
+            at *= picked(self._size, tile)
+            at += picked(self._corner, tile)
+            total += sampled(atlas, at - np.float32(0.5))
+        return np.asfortranarray(total / np.float32(_TAPS))
 
     def _packed(self) -> np.ndarray:
         """All sizes of all images in rows, each with a frame of one texel."""
@@ -63,7 +67,7 @@ class Textures:
         pyramids = [_levels(image) for image, _ in self.images]
         most = max(len(p) for p in pyramids)
         self._count = np.array([len(p) for p in pyramids], dtype=np.int32)
-        self._repeats = np.array([repeats for _, repeats in self.images])
+        self._repeats = np.array([repeats for _, repeats in self.images], dtype=np.float32)
         self._most = most
         corner = np.zeros((len(pyramids), most, 2), dtype=np.float32)
         size = np.ones((len(pyramids), most, 2), dtype=np.float32)
@@ -76,7 +80,7 @@ class Textures:
                 x, y, row = 0, y + row, 0
             corner[i, k], size[i, k] = (x + 1, y + 1), (wide, height)
             x, row = x + wide + 2, max(row, height + 2)
-        self._corner, self._size = corner.reshape(-1, 2), size.reshape(-1, 2)
+        self._corner, self._size = (np.asfortranarray(t.reshape(-1, 2)) for t in (corner, size))
         atlas = np.zeros((y + row, width, 3), dtype=np.uint8)
         for (_, repeats), corners, pyramid in zip(self.images, corner, pyramids, strict=True):
             edge = cv2.BORDER_WRAP if repeats else cv2.BORDER_REPLICATE
