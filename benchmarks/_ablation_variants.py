@@ -121,6 +121,7 @@ VARIANTS = {
     "tau-0.20": Variant("tau = 0.20", tau(0.20)),
     "tau-0.50": Variant("tau = 0.50", tau(0.50)),
     "tau-0.65": Variant("tau = 0.65", tau(0.65)),
+    "shadows": Variant("shadows and road around the wheels move with their cars", grouped(road=None)),
     "no-tracks": Variant(
         "no tracks: F_deform alone moves things",
         lambda quality: untracked(quality.cast.lifespan_frames)(quality),

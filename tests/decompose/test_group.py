@@ -122,6 +122,25 @@ def test_a_cluster_without_a_core_is_street():
     assert group(clip, geometry, seeds, lukewarm, GroupOptions(core=0.0)).dynamic.any()
 
 
+def test_a_shadow_stays_on_the_road_and_its_car_moves_on():
+    """The scores of a car and of the road around its wheels are alike; the road is told by its height."""
+    _, clip, geometry, seeds = scene()
+    car = seeds.features[:, 0] >= 0.5
+    above_m = geometry.ground.height_m(seeds.means.numpy().astype(np.float64))
+    places = seeds.means[car]
+    away = torch.stack([(places - mean).norm(dim=1).min() for mean in seeds.means])
+    shadow = ~car & (away < 1.0) & torch.from_numpy(above_m < 0.05)
+    assert shadow.sum() > 50
+    scores = torch.where(car | shadow, 0.9, 0.05)
+    apart = group(clip, geometry, seeds, scores, GroupOptions())
+    assert apart.dynamic[shadow].float().mean() < 0.2
+    assert apart.dynamic[car].float().mean() > 0.9
+    together = group(clip, geometry, seeds, scores, GroupOptions(road=None))
+    assert together.dynamic[shadow].float().mean() > 0.9
+    nowhere = group(clip, replace(geometry, ground=None), seeds, scores, GroupOptions())
+    assert (nowhere.dynamic == together.dynamic).all()
+
+
 def test_labels_are_handed_on_within_each_camera() -> None:
     clip = rig_clip()
     assert _successive(clip)[:6] == [(None, 0), (0, 2), (2, 6), (6, 8), (8, 10), (None, 1)]

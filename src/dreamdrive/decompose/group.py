@@ -13,6 +13,7 @@ from torch import Tensor
 
 from dreamdrive.decompose.covered import covered
 from dreamdrive.decompose.flow import carried, neighbour_flow
+from dreamdrive.decompose.on_road import on_road
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
@@ -41,6 +42,8 @@ class GroupOptions:
         core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere
             a little, cross tau but have no core.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
+        road: What lies lower over the road plane than this share of the first camera's height is road, see
+            ``on_road``, if there is a plane. None lets shadows move with their cars (the paper).
         clustering: False keeps each Gaussian's own vote (for ablation): 0.495, but there are no things then
             that could have tracks, and withheld frames lose 0.7 dB.
     """
@@ -56,6 +59,7 @@ class GroupOptions:
     certain: float = 0.6
     core: float = 0.1
     smallest: int = 24
+    road: float | None = 0.1
     clustering: bool = True
 
 
@@ -99,15 +103,37 @@ def group(
         cluster = np.where(value > options.threshold, 0, -1)
         return _grouping(clip, geometry, gaussians, cluster, options)
     index = np.flatnonzero(value > options.candidate)
-    labels = _space_time_labels(clip, geometry, gaussians, index, options)
-    size = np.bincount(labels, minlength=1)
-    votes = np.bincount(labels, weights=(value[index] > options.threshold).astype(float), minlength=1)
-    core = np.bincount(labels, weights=(value[index] > options.certain).astype(float), minlength=1)
-    wins = (votes > options.majority * size) & (core >= options.core * size) & (size >= options.smallest)
+    points = source_pixels(geometry, gaussians, index)
+    frames = gaussians.source_frame.numpy()[index]
+    labels = _space_time_labels(clip, points, frames, options)
+    upright = ~on_road(points[:, :2], frames, labels, _low(geometry, gaussians, index, options))
+    wins = _elected(labels[upright], value[index[upright]], options)
+    members = upright & np.isin(labels, wins)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
-    order = np.cumsum(wins) - 1
-    cluster[index[wins[labels]]] = order[labels[wins[labels]]]
+    cluster[index[members]] = np.searchsorted(wins, labels[members])
     return _grouping(clip, geometry, gaussians, cluster, options)
+
+
+def _low(
+    geometry: Geometry, gaussians: Gaussians, index: Int[np.ndarray, " m"], options: GroupOptions
+) -> Bool[np.ndarray, " m"]:
+    """Which Gaussians lie in the plane of the road."""
+    ground = geometry.ground
+    if ground is None or options.road is None:
+        return np.zeros(len(index), dtype=bool)
+    points = gaussians.means.detach().numpy()[index].astype(np.float64)
+    return ground.height_m(points) < options.road * ground.offset_m
+
+
+def _elected(
+    labels: Int[np.ndarray, " m"], scores: Float[np.ndarray, " m"], options: GroupOptions
+) -> Int[np.ndarray, " k"]:
+    """Labels of the clusters that vote dynamic, in order."""
+    size = np.bincount(labels)
+    votes = np.bincount(labels, weights=(scores > options.threshold).astype(float))
+    core = np.bincount(labels, weights=(scores > options.certain).astype(float))
+    wins = (votes > options.majority * size) & (core >= options.core * size) & (size >= options.smallest)
+    return np.flatnonzero(wins)
 
 
 def _grouping(
@@ -138,17 +164,15 @@ def source_pixels(
 
 
 def _space_time_labels(
-    clip: Clip, geometry: Geometry, gaussians: Gaussians, index: Int[np.ndarray, " m"], options: GroupOptions
+    clip: Clip, points: Float[np.ndarray, "m 3"], frames: Int[np.ndarray, " m"], options: GroupOptions
 ) -> Int[np.ndarray, " m"]:
     """One label a thing: components of a frame take over the labels that flow carries onto their points.
 
     Labels are handed on point by point, so that two cars that come to touch in the image keep theirs. Parts
     of one thing that began with labels of their own are joined when they hang together most of the time.
     """
-    points = source_pixels(geometry, gaussians, index)
-    frames = gaussians.source_frame.numpy()[index]
-    labels = np.full(len(index), -1, dtype=np.int64)
-    component = np.full(len(index), -1, dtype=np.int64)
+    labels = np.full(len(points), -1, dtype=np.int64)
+    component = np.full(len(points), -1, dtype=np.int64)
     for before, frame in _successive(clip):
         rows = np.flatnonzero(frames == frame)
         if not len(rows):
