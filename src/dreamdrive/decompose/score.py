@@ -25,8 +25,8 @@ class ScoreOptions:
     """Constants of the scoring.
 
     Figures are the mean IoU of what moves on four drawn streets with corrupted references and true poses
-    (``benchmarks/ablation.py``), where all defaults together reach 0.503; the paper's target and window,
-    without moving evidence among the features, 0.150.
+    (``benchmarks/ablation.py``), where all defaults together, with shadows that move, reach 0.503; the
+    paper's target and window, without moving evidence among the features, 0.150.
 
     Attributes:
         target: What the splatted scores are compared with: ``"error"`` is the paper's error map (eq. 8),
