@@ -1,9 +1,13 @@
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from tests.geometry.toy_drive import make_clip, path_error, straight
 
-from dreamdrive.geometry.classical import evidence
+from dreamdrive.geometry.classical import evidence, sfm
 from dreamdrive.geometry.classical.reconstruct import Outcome, reconstruct
+from dreamdrive.geometry.classical.sfm import Model
 from dreamdrive.scene.clip import Clip
 
 
@@ -28,6 +32,24 @@ def test_a_drive_is_posed_and_the_same_seed_gives_the_same_poses(clip: Clip) -> 
     )
     np.testing.assert_array_equal(first.settled.model.points, second.settled.model.points)
     assert first.figures == second.figures
+
+
+def test_a_folded_path_is_mapped_again_from_other_starts(clip: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
+    mapped, seeds = sfm.map_globally, list[int]()
+
+    def map_badly_twice(database: Path, count: int, seed: int) -> Model | None:
+        seeds.append(seed)
+        model = mapped(database, count, seed)
+        assert model is not None
+        folded = model.world_from_camera[[0, 5, 2, 7, 4, 1, 6, 3]]
+        return replace(model, world_from_camera=folded) if len(seeds) < 3 else model
+
+    monkeypatch.setattr(sfm, "map_globally", map_badly_twice)
+    outcome = run(clip, seed=4)
+    assert outcome.settled is not None
+    assert seeds == [4, 5, 6]
+    assert any("jumps" in note and "another start" in note for note in outcome.notes)
+    assert path_error(outcome.settled.model.world_from_camera, straight([0.5] * 7)) < 0.002
 
 
 def test_the_gate_refuses_shuffled_frames(clip: Clip) -> None:

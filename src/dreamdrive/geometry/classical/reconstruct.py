@@ -16,6 +16,8 @@ from dreamdrive.scene.camera import Camera
 
 MIN_FRAMES = 3
 MIN_FEATURES = 60
+STARTS = 6
+"""Random starting positions of global mapping that are tried."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,10 @@ def reconstruct(
     calibrated: bool,
     seed: int,
 ) -> Outcome:
-    """Global mapping, focal test and gate; incremental mapping when the gate refuses; else the reasons.
+    """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
+
+    Global mapping starts at random positions, and now and then ends in folded paths. Others are tried before
+    incremental mapping, which is slower, and less exact where a drive is straight.
 
     Args:
         grey: Frames at the working size.
@@ -66,8 +71,9 @@ def reconstruct(
     with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
         database = Path(folder) / "matches.db"
         sfm.match(database, found, square, seed)
-        for name, mapper in (("global", sfm.map_globally), ("incremental", sfm.map_incrementally)):
-            model = mapper(database, len(grey), seed)
+        for name, again, start in _attempts(seed):
+            mapper = sfm.map_globally if name == "global" else sfm.map_incrementally
+            model = mapper(database, len(grey), start)
             if model is None or model.registered.mean() < 0.5:
                 failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
             else:
@@ -79,10 +85,16 @@ def reconstruct(
                     notes += [settled.note] if settled.note else []
                     notes += ["the camera drives backwards"] if verdict.backwards else []
                     notes += [_wobbling(settled.model)] if verdict.wobbling else []
-                    notes += [f"{reasons[0]}: mapped again, frame by frame"] if reasons else []
+                    notes += [f"{reasons[0]}: mapped again, {again}"] if reasons else []
                     return Outcome(settled, (), tuple(notes), figures)
             reasons = reasons or failed
     return Outcome(None, reasons, (), figures)
+
+
+def _attempts(seed: int) -> list[tuple[str, str, int]]:
+    """Mapper, how it differs from the first, in words, and its seed."""
+    others = [("global", "from another start", (seed + k) % 2**31) for k in range(STARTS)]
+    return [*others, ("incremental", "frame by frame", seed)]
 
 
 def _refused(reason: str) -> Outcome:
