@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from dreamdrive.decompose import GroupOptions
 from dreamdrive.decompose.covered import covered
-from dreamdrive.decompose.group import Grouping, source_pixels
+from dreamdrive.decompose.group import Grouping, elected, source_pixels
 from dreamdrive.options import Quality
 
 METRES_PER_FRAME = 1.0
@@ -85,16 +85,9 @@ def majority(
     labels: Int[np.ndarray, " m"], scores: Float[np.ndarray, " m"], options: GroupOptions
 ) -> Int[np.ndarray, " m"]:
     """The vote of eq. 10 with hybrid's own constants: numbers of the dynamic clusters, -1 elsewhere."""
-    cluster = np.full(len(labels), -1, dtype=np.int64)
-    found = 0
-    for label in np.unique(labels[labels >= 0]).tolist():
-        members = np.flatnonzero(labels == label)
-        votes = (scores[members] > options.threshold).mean()
-        core = (scores[members] > options.certain).mean()
-        if len(members) >= options.smallest and votes > options.majority and core >= options.core:
-            cluster[members] = found
-            found += 1
-    return cluster
+    known = labels >= 0
+    wins = elected(labels[known], scores[known], options)
+    return np.where(np.isin(labels, wins), np.searchsorted(wins, labels), -1)
 
 
 def scaled_by_frame(errors: Float[np.ndarray, "f h w"], full: float) -> Float[np.ndarray, "f h w"]:

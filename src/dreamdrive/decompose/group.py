@@ -108,7 +108,7 @@ def group(
     frames = gaussians.source_frame.numpy()[index]
     labels = _space_time_labels(clip, points, frames, options)
     upright = ~on_road(points[:, :2], frames, labels, _low(geometry, gaussians, index, options))
-    wins = _elected(labels[upright], value[index[upright]], options)
+    wins = elected(labels[upright], value[index[upright]], options)
     members = upright & np.isin(labels, wins)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     cluster[index[members]] = np.searchsorted(wins, labels[members])
@@ -126,10 +126,10 @@ def _low(
     return ground.height_m(points) < options.road * ground.offset_m
 
 
-def _elected(
+def elected(
     labels: Int[np.ndarray, " m"], scores: Float[np.ndarray, " m"], options: GroupOptions
 ) -> Int[np.ndarray, " k"]:
-    """Labels of the clusters that vote dynamic, in order."""
+    """Labels, from 0, of the clusters that vote dynamic (eq. 10), in order."""
     size = np.bincount(labels)
     votes = np.bincount(labels, weights=(scores > options.threshold).astype(float))
     core = np.bincount(labels, weights=(scores > options.certain).astype(float))

@@ -47,8 +47,8 @@ def reconstruct(
 ) -> Outcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
-    Global mapping starts at random positions, and now and then ends in folded paths. Others are tried before
-    incremental mapping, which is slower, and less exact where a drive is straight.
+    Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
+    before incremental mapping.
 
     Args:
         grey: Frames at the working size.
