@@ -12,9 +12,9 @@ from typing import Any, cast
 
 from dreamdrive.data.colmap_binary import check_binary
 from dreamdrive.data.distortion import Distortion
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.json_file import read_json
 
 _COLMAP = {
     "SIMPLE_PINHOLE": "f cx cy",

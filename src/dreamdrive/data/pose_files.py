@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
+from dreamdrive.scene.json_file import read_json
 
 FORMATS = (
     "Trajectory JSON (world_from_camera, times_s), TUM (timestamp tx ty tz qx qy qz qw), "

@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data.clip_reader import read_clip
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.json_file import read_json
 
 RIG = "rig.json"
 _EXPECTED = (

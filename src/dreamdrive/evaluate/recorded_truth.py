@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.data.intrinsics import read_json
 from dreamdrive.data.pose_files import read_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.json_file import read_json
 
 _PNG_PER_M = 256.0
 """Grey levels a metre in KITTI's 16-bit depth pictures."""

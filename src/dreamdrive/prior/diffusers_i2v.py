@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.data.select import Selection
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
@@ -22,6 +21,7 @@ from dreamdrive.prior.protocol import Prior, Progress, silent
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.json_file import read_json
 
 NEEDED = ("image", "num_frames", "num_inference_steps", "generator", "output_type", "callback_on_step_end")
 """Arguments by which a pipeline is known to make a video from a photo, as diffusers names them."""

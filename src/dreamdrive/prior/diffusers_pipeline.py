@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
@@ -18,6 +17,7 @@ from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.json_file import read_json
 from dreamdrive.scene.trajectory import Trajectory
 
 PROMPT = "The view ahead from a car that drives along a street."

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from torch import Tensor, nn
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.memory import best_device
+from dreamdrive.scene.json_file import read_json
 from dreamdrive.weights import as_state, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)

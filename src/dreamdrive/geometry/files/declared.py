@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
+from dreamdrive.scene.json_file import read_json
 
 NAME = "geometry.json"
 _UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "1/256 m": 1 / 256}

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from dreamdrive.data.json_file import read_json
+from dreamdrive.scene.json_file import read_json
 
 OPTION = "--geometry-files"
 

@@ -12,12 +12,12 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.memory import best_device
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings
+from dreamdrive.scene.json_file import read_json
 from dreamdrive.weights import fill, read_state, sha256
 
 _DIFFUSERS = tuple(f"diffusion_pytorch_model.{end}" for end in ("safetensors", "fp16.safetensors", "bin"))

@@ -12,9 +12,9 @@ from typing import Any, cast
 import torch
 from torch import Tensor
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.stored import NOTE, Stored, open_tensors
+from dreamdrive.scene.json_file import read_json
 
 FIRST, QUANT = "conditioner.embedders.3.encoder.encoder.", "conditioner.embedders.3.encoder.quant_conv."
 SECOND = "first_stage_model.encoder."

@@ -9,12 +9,12 @@ import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
-from dreamdrive.data.json_file import read_json
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
+from dreamdrive.scene.json_file import read_json
 from dreamdrive.weights import in_words, misfits, some
 
 EXPECTED = (
