@@ -56,6 +56,7 @@ class Clip:
         requested: The trajectory a generative prior was asked for.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
             of sentences for the report.
+        cuts: Index of each first frame after a cut to another scene.
     """
 
     frames: UInt8[np.ndarray, "f h w 3"]
@@ -70,6 +71,7 @@ class Clip:
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
+    cuts: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.frames)

@@ -1,0 +1,1 @@
+"""How a run is shown: what it will cost, and how it went."""
