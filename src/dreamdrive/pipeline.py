@@ -23,6 +23,7 @@ from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.report import describe
+from dreamdrive.run.lock import only_run
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.folder import load_scene, save_scene
@@ -39,7 +40,7 @@ from dreamdrive.stages import (
     file_digest,
     stage_seed,
 )
-from dreamdrive.workspace import Workspace, open_workspace
+from dreamdrive.workspace import Workspace, check_writable, open_workspace
 
 _OF_GEOMETRY = ("geometry-files", "weights")
 
@@ -114,12 +115,14 @@ def generate(
         "seed": control.seed,
     }
     recompute = recompute_from is not None
-    workspace = open_workspace(out, request, force=force, recompute=recompute)
-    if workspace is None:
-        return False
-    stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-    _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
-    return True
+    check_writable(out)
+    with only_run(out):
+        workspace = open_workspace(out, request, force=force, recompute=recompute)
+        if workspace is None:
+            return False
+        stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
+        _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
+        return True
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def scene_bytes(out: Path) -> dict[str, bytes]:
 @pytest.mark.slow
 def test_a_killed_process_resumes_to_the_same_bytes(tmp_path: Path) -> None:
     finish(tmp_path / "whole")
-    for stage, blow, code in (("geometry", signal.SIGTERM, 130), ("static", signal.SIGKILL, -signal.SIGKILL)):
+    for stage, blow, code in (("geometry", signal.SIGTERM, 143), ("static", signal.SIGKILL, -signal.SIGKILL)):
         process = start(tmp_path / "killed")
         assert process.stdout is not None
         assert process.stderr is not None

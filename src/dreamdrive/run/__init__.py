@@ -1,0 +1,1 @@
+"""How a run is kept apart from others, and what it says."""
