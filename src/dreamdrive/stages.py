@@ -87,6 +87,7 @@ class Stages:
         options: object,
         compute: Callable[[Progress], T],
         storage: Storage[T] | None = None,
+        check: Callable[[T], None] = lambda _: None,
     ) -> T:
         """The result of a stage.
 
@@ -99,6 +100,7 @@ class Stages:
             options: Everything else the result depends on, as a dataclass or JSON values.
             compute: Makes the result.
             storage: For results that ``codec`` does not know.
+            check: Raises ``ValueError`` where a stored result does not belong to those it was made from.
         """
         key = digest([name, FORMAT, __version__, options, [self.keys[other] for other in after]])
         self.keys[name] = key
@@ -108,7 +110,8 @@ class Stages:
         if found is not None and found.key == key:
             try:
                 value = _load(folder, storage)
-            except (codec.DamagedError, InputError) as error:
+                check(value)
+            except ValueError as error:
                 _log.warning("%s is computed again: %s", name, error)
             else:
                 self.records[name] = StageRecord(found.seconds, found.peak_rss_mb, cached=True)
