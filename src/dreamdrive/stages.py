@@ -19,7 +19,7 @@ from dreamdrive.scene.json_file import of_type
 STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
 """All stages in their order; each result depends on some of those before it."""
 
-FORMAT = 2
+FORMAT = 3
 """Version of what is stored; a change makes all older results unknown."""
 
 Progress = Callable[[int, int], None]
