@@ -1,6 +1,7 @@
 """The whole pipeline on a street of a few pixels: what it leaves, and that it always leaves the same."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,10 +9,15 @@ import av
 import cv2
 import numpy as np
 import pytest
+import torch
 
-from dreamdrive import Control, InputError, generate, load_scene, options, pipeline
-from dreamdrive.fit import FitOptions
+from dreamdrive import Control, InputError, codec, generate, load_scene, options, pipeline
+from dreamdrive.decompose import Grouping
+from dreamdrive.fit import FitOptions, StaticFit
 from dreamdrive.geometry import reconstruct
+from dreamdrive.run.lock import only_run
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.stages import STAGES
 
@@ -243,3 +249,53 @@ def test_pictures_in_folders_below_the_input_count(tmp_path: Path, folder: str) 
     before = pipeline._digests(Control(tmp_path), None, None)
     picture.write_bytes(b"two")
     assert pipeline._digests(Control(tmp_path), None, None) != before
+
+
+def spoiled(value: object) -> object:
+    """The same kind of thing, of one frame or Gaussian too few."""
+    if isinstance(value, Clip):
+        return replace(value, rig=(value.rig[0].resized(32, 20),))
+    if isinstance(value, Geometry):
+        short = {
+            name: getattr(value, name)[1:] for name in ("cameras", "depth_m", "confidence", "sky", "moving")
+        }
+        return replace(value, **short)
+    if isinstance(value, Gaussians):
+        return replace(value, source_frame=value.source_frame + 100)
+    if isinstance(value, StaticFit):
+        return replace(value, gaussians=value.gaussians.select(torch.arange(3)))
+    if isinstance(value, Grouping):
+        return replace(value, cluster=value.cluster + 10**6)
+    return 2 * torch.ones(3)
+
+
+@pytest.mark.parametrize("stage", [name for name in STAGES if name != "fit"])
+def test_a_stage_that_does_not_fit_the_others_is_computed_again(
+    finished: Path, tmp_path: Path, stage: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Checksums and types are right: somebody meant it, or mixed two folders."""
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "report.json").unlink()
+    folder = out / "stages" / stage
+    codec.write(folder, spoiled(codec.read(folder)), codec.read_header(folder) or {})
+    assert make(out)
+    assert f"{stage} is computed again" in caplog.text
+    assert scene_bytes(out) == scene_bytes(finished)
+
+
+def test_a_stage_behind_a_link_is_refused(finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "report.json").unlink()
+    (out / "stages" / "geometry").rename(tmp_path / "elsewhere")
+    (out / "stages" / "geometry").symlink_to(tmp_path / "elsewhere")
+    before = {p.name: p.read_bytes() for p in (tmp_path / "elsewhere").iterdir()}
+    with pytest.raises(InputError, match="geometry is a link; dreamdrive neither reads nor writes"):
+        make(out)
+    assert {p.name: p.read_bytes() for p in (tmp_path / "elsewhere").iterdir()} == before
+
+
+def test_a_second_run_is_told_at_once(finished: Path) -> None:
+    with only_run(finished), pytest.raises(InputError, match="is in use: process"):
+        make(finished)

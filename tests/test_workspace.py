@@ -1,6 +1,7 @@
 """An output folder is only written to when that loses nothing."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -139,3 +140,119 @@ def test_a_place_below_a_file_is_refused(tmp_path: Path) -> None:
         open_workspace(tmp_path / "file" / "out", REQUEST)
     with pytest.raises(InputError, match="is a file, and a folder is needed"):
         open_workspace(tmp_path / "file", REQUEST)
+
+
+def finish(out: Path) -> None:
+    publish(out, REQUEST, {"scene/scene.json": "a", "video/drive.mp4": "a"})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "video/../../victim.txt",
+        "../victim.txt",
+        "video/../../../{parent}/victim.txt",
+        "{absolute}",
+        "video//../../victim.txt",
+        "scene/./../../victim.txt",
+        "stages/../../victim.txt",
+        "video\\..\\..\\victim.txt",
+        "",
+        ".",
+        "..",
+        "video/link/victim.txt",
+        None,
+        3,
+        ["video"],
+        {"video": 1},
+        "video/\0",
+        "video/" + "x" * 5000,
+    ],
+)
+def test_names_in_a_report_delete_nothing_outside(tmp_path: Path, name: object) -> None:
+    out, victim = tmp_path / "out", tmp_path / "victim.txt"
+    victim.write_text("mine")
+    finish(out)
+    (out / "video" / "link").symlink_to(tmp_path)
+    report = json.loads((out / "report.json").read_text())
+    if isinstance(name, str):
+        name = name.format(parent=tmp_path.name, absolute=victim)
+    (out / "report.json").write_text(json.dumps({**report, "files": [*report["files"], name]}))
+    (out / "video" / "drive.mp4").unlink()
+    assert open_workspace(out, REQUEST) is not None
+    if name == "video/link/victim.txt":
+        with pytest.raises(InputError, match=r"video/link is a link; dreamdrive neither reads nor writes"):
+            finish(out)
+    else:
+        finish(out)
+    assert victim.read_text() == "mine"
+
+
+@pytest.mark.parametrize("files", [None, {}, "video/drive.mp4", 3, [[[]]]])
+def test_a_report_without_a_list_of_files_is_no_harm(tmp_path: Path, files: object) -> None:
+    finish(tmp_path)
+    report = json.loads((tmp_path / "report.json").read_text())
+    (tmp_path / "report.json").write_text(json.dumps({**report, "files": files}))
+    open_workspace(tmp_path, REQUEST)
+    publish(tmp_path, REQUEST, {"scene/scene.json": "b"})
+    assert (tmp_path / "scene" / "scene.json").read_text() == "b"
+
+
+@pytest.mark.parametrize("name", ["video", "stages", "scene", "held_out", "report.json", "report.png"])
+@pytest.mark.parametrize("force", [True, False])
+def test_links_in_the_folder_are_refused(tmp_path: Path, name: str, force: bool) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    finish(out)
+    elsewhere.mkdir()
+    (elsewhere / "holiday.mp4").write_text("mine")
+    if (out / name).exists():
+        (out / name).rename(tmp_path / "kept")
+    (out / name).symlink_to(elsewhere)
+    with pytest.raises(InputError, match=f"{name} is a link; dreamdrive neither reads nor writes through"):
+        open_workspace(out, REQUEST, force=force)
+    assert [p.name for p in elsewhere.iterdir()] == ["holiday.mp4"]
+
+
+def test_a_link_that_comes_while_the_run_goes_on_is_refused(tmp_path: Path) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    workspace = Workspace(out, REQUEST)
+    (workspace.fresh_staging() / "video").mkdir()
+    (workspace.staging / "video" / "drive.mp4").write_text("a")
+    (out / "video").symlink_to(elsewhere)
+    with pytest.raises(InputError, match="video is a link"):
+        workspace.publish({})
+    assert not list(elsewhere.iterdir())
+
+
+def test_staging_behind_a_link_is_not_emptied(tmp_path: Path) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "holiday.mp4").write_text("mine")
+    workspace = Workspace(out, REQUEST)
+    workspace.claim()
+    (out / "stages" / "result").symlink_to(elsewhere)
+    with pytest.raises(InputError, match="result is a link"):
+        workspace.fresh_staging()
+    assert (elsewhere / "holiday.mp4").exists()
+
+
+def test_pipes_are_no_reports(tmp_path: Path) -> None:
+    finish(tmp_path)
+    (tmp_path / "report.json").unlink()
+    os.mkfifo(tmp_path / "report.json")
+    with pytest.raises(InputError, match=r"report\.json is not a file"):
+        open_workspace(tmp_path, REQUEST)
+
+
+def test_a_folder_in_the_place_of_a_file_is_said(tmp_path: Path) -> None:
+    finish(tmp_path)
+    (tmp_path / "video" / "drive.mp4").unlink()
+    (tmp_path / "video" / "drive.mp4").mkdir()
+    with pytest.raises(InputError, match=r"drive\.mp4 is a folder where a file of the result belongs"):
+        finish(tmp_path)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "video").write_text("mine")
+    Workspace(tmp_path / "other", REQUEST).claim()
+    with pytest.raises(InputError, match="video is not a folder"):
+        open_workspace(tmp_path / "other", REQUEST)

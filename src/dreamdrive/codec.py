@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -13,13 +14,18 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from dreamdrive.decompose import Grouping
+from dreamdrive.errors import InputError
 from dreamdrive.fit import StaticFit
+from dreamdrive.memory import free_bytes
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.checked import build, check_finite
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.exposure import Exposure
+from dreamdrive.scene.files import TEXT_BYTES, read_bytes
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
+from dreamdrive.scene.json_file import parse_json
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -45,7 +51,7 @@ NOUNS: dict[str, type] = {
 
 JSON_NAME, _ARRAYS = "result.json", "result.safetensors"
 # Keys of the JSON objects that stand for something else.
-_NOUN, _ARRAY, _TENSOR, _TUPLE, _DICT = "noun", "array", "tensor", "tuple", "dict"
+_NOUN, _ARRAY, _TENSOR, _TUPLE, _DICT, _ODD = "noun", "array", "tensor", "tuple", "dict", "number"
 
 
 class DamagedError(ValueError):
@@ -68,40 +74,53 @@ def write(folder: Path, value: object, header: dict[str, Any]) -> None:
     with new_file(folder / _ARRAYS) as path:
         path.write_bytes(blob)
     with new_file(folder / JSON_NAME) as path:
-        path.write_text(json.dumps(document))
+        path.write_text(json.dumps(document, allow_nan=False))
 
 
 def read_header(folder: Path) -> dict[str, Any] | None:
     """The header of what ``folder`` holds, or None where there is nothing readable."""
     try:
-        header = json.loads((folder / JSON_NAME).read_bytes())["header"]
-    except (FileNotFoundError, NotADirectoryError, ValueError, KeyError, TypeError):
+        header = _document(folder)["header"]
+    except (InputError, KeyError):
         return None
-    return header if isinstance(header, dict) else None
+    return cast("dict[str, Any]", header) if isinstance(header, dict) else None
 
 
 def read(folder: Path) -> object:
-    """What ``write`` stored.
+    """What ``write`` stored; every noun of the types and shapes that it has.
 
     Raises:
-        DamagedError: The files are missing, cut short or do not belong together.
+        DamagedError: The files are missing, cut short or changed, do not belong together, or are too large
+            for the memory that is free.
     """
     try:
-        document = json.loads((folder / JSON_NAME).read_bytes())
-        blob = (folder / _ARRAYS).read_bytes()
+        document = _document(folder)
+        free = free_bytes()
+        # Twice: as the file's bytes and as arrays.
+        blob = read_bytes(folder / _ARRAYS, at_most=2**40 if free is None else free // 2, follow=False)
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
         return _decode(document["value"], load(blob))
-    except (FileNotFoundError, ValueError, KeyError, TypeError, SafetensorError) as error:
+    except (InputError, ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
         raise DamagedError(f"{folder}: {error}") from error
+
+
+def _document(folder: Path) -> dict[str, Any]:
+    path = folder / JSON_NAME
+    document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
+    if not isinstance(document, dict):
+        raise InputError(f"{path} holds no JSON object")
+    return cast("dict[str, Any]", document)
 
 
 def _encode(value: object, name: str, arrays: dict[str, np.ndarray]) -> object:
     """JSON values for ``value``; arrays go to ``arrays`` under their path."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {_ODD: str(value)}
     if value is None or isinstance(value, str | bool | int | float):
         return value
     if isinstance(value, np.generic):
-        return value.item()
+        return _encode(value.item(), name, arrays)
     if isinstance(value, np.ndarray | torch.Tensor):
         kind = _ARRAY if isinstance(value, np.ndarray) else _TENSOR
         plain = value if isinstance(value, np.ndarray) else value.detach().numpy()
@@ -126,17 +145,20 @@ def _decode(value: Any, arrays: dict[str, Shaped[np.ndarray, "..."]]) -> Any:
         return [_decode(item, arrays) for item in cast(list[Any], value)]
     if not isinstance(value, dict):
         return value
+    if not value:
+        raise DamagedError("an entry is empty")
     kind = next(iter(cast(dict[str, Any], value)))
     content = value[kind]
-    if kind == _ARRAY:
-        return arrays[content]
-    if kind == _TENSOR:
-        return torch.from_numpy(arrays[content])
+    if kind in (_ARRAY, _TENSOR):
+        check_finite(str(content), arrays[content])
+        return arrays[content] if kind == _ARRAY else torch.from_numpy(arrays[content])
     if kind == _TUPLE:
         return tuple(_decode(item, arrays) for item in content)
     if kind == _DICT:
         return {key: _decode(item, arrays) for key, item in content.items()}
+    if kind == _ODD:
+        return float(content)
     if kind == _NOUN:
         parts = {name: _decode(item, arrays) for name, item in value["fields"].items()}
-        return NOUNS[content](**parts)
+        return build(NOUNS[content], parts)
     raise DamagedError(f"unknown entry {kind!r}")

@@ -14,6 +14,7 @@ from torch import Tensor
 from dreamdrive.data import Lens
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import manoeuvre, panels, resampled
+from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
@@ -155,7 +156,10 @@ def up_of(scene: Scene) -> Float[np.ndarray, "3"]:
 def lens_of(scene: Scene) -> Lens | None:
     """The lens of the recording, where its distortion is known."""
     values: Any = scene.provenance.get("lens")
-    return None if values is None else Lens.from_json(values)
+    try:
+        return None if values is None else Lens.from_json(values)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"the scene's lens cannot be used ({error}); generate it again") from error
 
 
 def _beside(

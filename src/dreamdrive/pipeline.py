@@ -23,6 +23,16 @@ from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.report import describe
+from dreamdrive.run.agreement import (
+    check_clip,
+    check_geometry,
+    check_grouping,
+    check_scene,
+    check_scores,
+    check_seeds,
+    check_static,
+)
+from dreamdrive.run.lock import only_run
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.folder import load_scene, save_scene
@@ -39,7 +49,7 @@ from dreamdrive.stages import (
     file_digest,
     stage_seed,
 )
-from dreamdrive.workspace import Workspace, open_workspace
+from dreamdrive.workspace import Workspace, check_writable, open_workspace
 
 _OF_GEOMETRY = ("geometry-files", "weights")
 
@@ -114,12 +124,14 @@ def generate(
         "seed": control.seed,
     }
     recompute = recompute_from is not None
-    workspace = open_workspace(out, request, force=force, recompute=recompute)
-    if workspace is None:
-        return False
-    stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-    _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
-    return True
+    check_writable(out)
+    with only_run(out):
+        workspace = open_workspace(out, request, force=force, recompute=recompute)
+        if workspace is None:
+            return False
+        stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
+        _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
+        return True
 
 
 @dataclass(frozen=True)
@@ -147,7 +159,7 @@ def _make(
     of_geometry = [request["digests"].get(name) for name in _OF_GEOMETRY]
     files = {name: value for name, value in request["digests"].items() if name not in _OF_GEOMETRY}
     reading = [chosen["prior"], _reading(control), files, control.seed]
-    clip = stages.run("prior", (), reading, partial(choose_prior(chosen["prior"]), control))
+    clip = stages.run("prior", (), reading, partial(choose_prior(chosen["prior"]), control), check=check_clip)
 
     method = chosen["geometry"]
     geometry = stages.run(
@@ -164,18 +176,21 @@ def _make(
             refine_poses=chosen["refine_poses"],
             progress=tell,
         ),
+        check=partial(check_geometry, clip),
     )
     seeds = stages.run(
         "initialise",
         ("prior", "geometry"),
         quality.seeds,
         lambda _: initialise(clip, _seen(clip, geometry), quality.seeds),
+        check=partial(check_seeds, clip),
     )
     static = stages.run(
         "static",
         ("initialise",),
         [quality.static, seed["static"]],
         lambda tell: fit_static(clip, geometry, seeds, quality.static, seed["static"], tell),
+        check=partial(check_static, seeds),
     )
     mode = chosen["representation"]
     scored, parts = _decompose(stages, clip, geometry, seeds, static, quality, mode, seed["score"])
@@ -185,6 +200,7 @@ def _make(
         [mode, quality.fit, quality.cast, quality.motion(mode), quality.densify, seed["fit"]],
         lambda tell: _fitted(control, clip, geometry, parts, static, quality, mode, seed["fit"], tell),
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
+        check=partial(check_scene, clip),
     )
     return _Made(clip, geometry, scene, scored)
 
@@ -258,12 +274,14 @@ def _decompose(
             seed,
             tell,
         ),
+        check=partial(check_scores, seeds),
     )
     grouping = stages.run(
         "group",
         ("initialise", "score"),
         settings.group,
         lambda _: group(clip, geometry, seeds, scores, settings.group),
+        check=partial(check_grouping, seeds),
     )
     moving = cast(clip, geometry, seeds, grouping, settings.cast)
     parts = Parts(static.gaussians.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)

@@ -13,6 +13,8 @@ from typing import Any, Generic, TypeVar, cast
 
 from dreamdrive import __version__, codec
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import inside, open_file
+from dreamdrive.scene.json_file import of_type
 
 STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
 """All stages in their order; each result depends on some of those before it."""
@@ -85,6 +87,7 @@ class Stages:
         options: object,
         compute: Callable[[Progress], T],
         storage: Storage[T] | None = None,
+        check: Callable[[T], None] = lambda _: None,
     ) -> T:
         """The result of a stage.
 
@@ -97,19 +100,21 @@ class Stages:
             options: Everything else the result depends on, as a dataclass or JSON values.
             compute: Makes the result.
             storage: For results that ``codec`` does not know.
+            check: Raises ``ValueError`` where a stored result does not belong to those it was made from.
         """
         key = digest([name, FORMAT, __version__, options, [self.keys[other] for other in after]])
         self.keys[name] = key
-        folder = self.folder / name
+        folder = inside(self.folder, name)
         fresh = self.recompute_from is not None and STAGES.index(name) >= STAGES.index(self.recompute_from)
-        found = None if fresh else codec.read_header(folder)
-        if found is not None and found.get("key") == key:
+        found = None if fresh else _header(folder)
+        if found is not None and found.key == key:
             try:
                 value = _load(folder, storage)
-            except (codec.DamagedError, InputError) as error:
+                check(value)
+            except ValueError as error:
                 _log.warning("%s is computed again: %s", name, error)
             else:
-                self.records[name] = StageRecord(found["seconds"], found["peak_rss_mb"], cached=True)
+                self.records[name] = StageRecord(found.seconds, found.peak_rss_mb, cached=True)
                 self.progress(name, 1, 1)
                 return value
         return self._compute(name, key, compute, storage)
@@ -137,10 +142,27 @@ class Stages:
         value = self.measure(name, compute)
         record = self.records[name]
         self.claim()
-        header = {"key": key, "seconds": record.seconds, "peak_rss_mb": record.peak_rss_mb}
-        folder = self.folder / name
-        _store(folder, value, header, storage)
+        folder = inside(self.folder, name)
+        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)), storage)
         return _load(folder, storage)
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What is noted beside a stage's result."""
+
+    key: str
+    seconds: float
+    peak_rss_mb: float
+
+
+def _header(folder: Path) -> _Header | None:
+    """What is noted beside the result in a folder; None where there is none, or no such note."""
+    found = codec.read_header(folder)
+    try:
+        return None if found is None else of_type(found, _Header, str(folder))
+    except InputError:
+        return None
 
 
 def _store(folder: Path, value: T, header: dict[str, Any], storage: Storage[T] | None) -> None:
@@ -154,7 +176,7 @@ def _store(folder: Path, value: T, header: dict[str, Any], storage: Storage[T] |
 
 
 def _load(folder: Path, storage: Storage[T] | None) -> T:
-    return cast(T, codec.read(folder)) if storage is None else storage.read(folder / "value")
+    return cast(T, codec.read(folder)) if storage is None else storage.read(inside(folder, "value"))
 
 
 def digest(value: object) -> str:
@@ -177,9 +199,12 @@ def file_digest(path: Path, *, deep: bool = False) -> str:
     Args:
         path: A file or a folder; hidden files in it do not count. Links are followed.
         deep: Whether the folders in a folder count.
+
+    Raises:
+        InputError: It is neither a regular file nor a folder, or may not be read.
     """
-    if path.is_file():
-        with path.open("rb") as file:
+    if not path.is_dir():
+        with open_file(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     files = sorted(file for file in _files(path, deep) if not file.name.startswith("."))
     return digest([[f.relative_to(path).as_posix(), file_digest(f)] for f in files])

@@ -1,18 +1,26 @@
-"""The output folder: whose it is, what may be replaced, and how a result takes the place of an older one."""
+"""The output folder: whose it is, what may be replaced, and how a result takes the place of an older one.
+
+What lies in the folder may be damaged or hostile: names in its files count only below it, and links do not.
+"""
 
 import json
 import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.atomic import new_file
+from dreamdrive.scene.atomic import new_file, remove
+from dreamdrive.scene.files import TEXT_BYTES, inside, is_inside, read_bytes
+from dreamdrive.scene.json_file import parse_json
 from dreamdrive.stages import digest
 
 OURS = ("held_out", "report.json", "report.png", "scene", "stages", "video")
 """What ``generate`` puts into an output folder."""
+
+RESULT = ("held_out", "report.png", "scene", "video")
+"""What of these is moved there from ``staging``, and removed when a later result lacks it."""
 
 REPORT = "report.json"
 
@@ -50,9 +58,10 @@ class Workspace:
     def fresh_staging(self) -> Path:
         """An empty ``staging`` folder."""
         self.claim()
-        shutil.rmtree(self.staging, ignore_errors=True)
-        self.staging.mkdir(parents=True)
-        return self.staging
+        staging = inside(self.out, "stages/result")
+        remove(staging)
+        staging.mkdir(parents=True)
+        return staging
 
     def publish(self, report: dict[str, Any]) -> None:
         """Move what lies in ``staging`` to its place and write the report.
@@ -60,16 +69,21 @@ class Workspace:
         Files of an earlier result that the new one does not have are removed; no other file is touched. The
         report goes away first and comes back last, so a folder with a report holds the whole result of it.
         """
+        _check_kinds(self.out)
         moved = sorted(p.relative_to(self.staging) for p in self.staging.rglob("*") if p.is_file())
         replaced = self.stages / "replaced.json"
         if (self.out / REPORT).exists():
             (self.out / REPORT).replace(replaced)
         for path in moved:
-            target = self.out / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            (self.staging / path).replace(target)
-        for name in set(_files(replaced)) - {p.as_posix() for p in moved}:
-            (self.out / name).unlink(missing_ok=True)
+            folder = _folder_of(self.out, path)
+            folder.mkdir(parents=True, exist_ok=True)
+            if (folder / path.name).is_dir() and not (folder / path.name).is_symlink():
+                raise InputError(
+                    f"{folder / path.name} is a folder where a file of the result belongs; move it"
+                )
+            (self.staging / path).replace(folder / path.name)
+        for name in sorted(set(_files(replaced)) - {p.as_posix() for p in moved}):
+            _remove_file(self.out, Path(name))
         names = [p.as_posix() for p in moved]
         document = {**report, "identity": digest(self.request), "files": names}
         text = json.dumps(document, indent=1, allow_nan=False)
@@ -96,7 +110,8 @@ def open_workspace(
     Raises:
         InputError: The folder cannot be written, holds something else, or the result of another request.
     """
-    _check_writable(out)
+    check_writable(out)
+    _check_kinds(out)
     entries = sorted(p.name for p in out.iterdir() if not p.name.startswith(".")) if out.is_dir() else []
     finished, begun = _identity(out / REPORT), _identity(out / "stages" / "request.json")
     wanted = digest(request)
@@ -125,8 +140,12 @@ def open_workspace(
     return Workspace(out, request)
 
 
-def _check_writable(out: Path) -> None:
-    """Fail before the work rather than after it."""
+def check_writable(out: Path) -> None:
+    """Fail before the work rather than after it.
+
+    Raises:
+        InputError: Something else is in the way, or the place may not be written to.
+    """
     existing = out
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -136,12 +155,36 @@ def _check_writable(out: Path) -> None:
         raise InputError(f"cannot write to {out}: no permission to write in {existing}")
 
 
+def _check_kinds(out: Path) -> None:
+    """What dreamdrive writes to is a folder or file of its own, and no link, which could lead anywhere."""
+    for name in OURS:
+        path = inside(out, name)
+        if path.exists() and path.is_file() != bool(path.suffix):
+            raise InputError(
+                f"{path} is not a {'file' if path.suffix else 'folder'}, which dreamdrive would have to "
+                "replace; choose another output folder or move it away"
+            )
+
+
+def _folder_of(out: Path, name: Path) -> Path:
+    """The folder of a result's file; no link on the way."""
+    return out if len(name.parts) == 1 else inside(out, name.parent.as_posix())
+
+
+def _remove_file(out: Path, name: Path) -> None:
+    """Remove a file of an earlier result; what has become a folder or lies behind a link is left alone."""
+    path = _folder_of(out, name) / name.name
+    if path.is_symlink() or path.is_file():
+        path.unlink()
+
+
 def _read(path: Path) -> dict[str, Any]:
+    """The JSON object in one of our own files; nothing where it is damaged or something else."""
     try:
-        document = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+        document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
+    except InputError:
         return {}
-    return document if isinstance(document, dict) else {}
+    return cast("dict[str, Any]", document) if isinstance(document, dict) else {}
 
 
 def _identity(path: Path) -> str | None:
@@ -151,14 +194,16 @@ def _identity(path: Path) -> str | None:
 
 
 def _files(report: Path) -> list[str]:
-    """The files of the result that ``report`` describes."""
-    names = _read(report).get("files", [])
-    return [name for name in names if isinstance(name, str) and Path(name).parts[0] in OURS]
+    """The files of the result that ``report`` describes; names of anything else do not count."""
+    names = _read(report).get("files")
+    listed = cast("list[object]", names) if isinstance(names, list) else []
+    return [str(name) for name in listed if is_inside(name) and Path(str(name)).parts[0] in RESULT]
 
 
 def _difference(out: Path, request: dict[str, Any]) -> str:
     """Which parts of the request differ, in words."""
-    before = _flat(_read(out / "stages" / "request.json").get("request", {}))
+    noted = _read(out / "stages" / "request.json").get("request")
+    before = _flat(cast("dict[str, Any]", noted) if isinstance(noted, dict) else {})
     now = _flat(json.loads(json.dumps(request)))
     names = [name for name in now if before.get(name) != now[name]] if before else []
     return f" ({', '.join(names)} differ{'s' if len(names) == 1 else ''})" if names else ""

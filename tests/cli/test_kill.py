@@ -1,48 +1,39 @@
 """A run that is really killed goes on, and ends with the bytes of a run in one go."""
 
+import importlib
 import signal
-import subprocess
-import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
-
-def start(out: Path) -> "subprocess.Popen[str]":
-    command = [sys.executable, "-u", "-c", "from dreamdrive.cli.main import main; main()", "generate"]
-    options = ["--prior", "street-world", "--frames", "0:5", "--size", "64x40", "--quality", "draft"]
-    return subprocess.Popen(
-        [*command, *options, "-o", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ["--prior", "street-world", "--frames", "0:5", "--size", "64x40", "--quality", "draft"]
 
 
-def finish(out: Path) -> None:
-    process = start(out)
-    process.communicate()
-    assert process.returncode == 0
-
-
-def scene_bytes(out: Path) -> dict[str, bytes]:
-    return {p.name: p.read_bytes() for p in sorted((out / "scene").iterdir())}
+@pytest.fixture
+def kill(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    return importlib.import_module("kill")
 
 
 @pytest.mark.slow
-def test_a_killed_process_resumes_to_the_same_bytes(tmp_path: Path) -> None:
-    finish(tmp_path / "whole")
-    for stage, blow, code in (("geometry", signal.SIGTERM, 130), ("static", signal.SIGKILL, -signal.SIGKILL)):
-        process = start(tmp_path / "killed")
-        assert process.stdout is not None
-        assert process.stderr is not None
-        for line in process.stdout:
-            if line.startswith(f"{stage}:"):
-                process.send_signal(blow)
-                break
-        with process:
-            said = process.stderr.read()
-        assert process.returncode == code
-        if blow == signal.SIGTERM:
-            assert "the same command goes on from there" in said
-            assert "Traceback" not in said
-        assert not (tmp_path / "killed" / "report.json").exists()
-    finish(tmp_path / "killed")
-    assert scene_bytes(tmp_path / "killed") == scene_bytes(tmp_path / "whole")
+def test_runs_killed_at_any_moment_end_with_the_same_bytes(kill: ModuleType, tmp_path: Path) -> None:
+    kills = kill.measure(tmp_path, SMALL, times=4, seed=3)
+    assert [each.different for each in kills] == [()] * 4
+
+
+@pytest.mark.slow
+def test_a_run_that_is_asked_to_terminate_keeps_its_stages(kill: ModuleType, tmp_path: Path) -> None:
+    process = kill.start(tmp_path / "out", SMALL)
+    for line in process.stdout:
+        if line.startswith("initialise:"):
+            process.send_signal(signal.SIGTERM)
+            break
+    said = process.communicate()[0]
+    assert process.returncode == 143
+    assert "Traceback" not in said
+    assert not (tmp_path / "out" / "report.json").exists()
+    assert (tmp_path / "out" / "stages" / "geometry" / "result.json").is_file()
+    again = kill.start(tmp_path / "out", SMALL).communicate()[0]
+    assert "geometry: 0.0 s" in again

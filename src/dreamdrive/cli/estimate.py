@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, cast
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import inside
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate.estimate import Estimate
@@ -29,9 +30,9 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
     if out.name == "scene" and (out / "scene.json").is_file():
         out = out.parent
     stages = out / "stages"
-    geometry = cast("Geometry | None", _stage(stages / "geometry"))
+    geometry = cast("Geometry | None", _stage(inside(out, "stages/geometry")))
     if geometry is not None and not (out / "scene").is_dir() and (stages / "prior").is_dir():
-        clip = cast("Clip", _stage(stages / "prior"))
+        clip = cast("Clip", _stage(inside(out, "stages/prior")))
         source = clip.provenance.get("input")
         lens = clip.provenance.get("lens") is not None
         name = None if source is None else Path(str(source)).resolve().name

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from types import FrameType
 
 from dreamdrive.memory import free_bytes
 
@@ -31,9 +32,17 @@ def use_all_cores() -> None:
     set_threads(available_cores())
 
 
+class Terminated(KeyboardInterrupt):
+    """Asked to terminate (SIGTERM), which ends the work as Ctrl-C does."""
+
+
 def stop_like_an_interruption() -> None:
     """Let a request to terminate end the work as Ctrl-C does.
 
     To be called after pycolmap is imported: it installs a handler that prints the stack and dies.
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise Terminated
+
+    signal.signal(signal.SIGTERM, stop)

@@ -13,6 +13,7 @@ from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
+from dreamdrive.cli.machine import Terminated
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.world import world
@@ -27,7 +28,7 @@ COMMANDS = {
     "prior": prior,
     "doctor": doctor,
 }
-_USER_ERROR, _INTERRUPTED = 2, 130
+_USER_ERROR, _INTERRUPTED, _TERMINATED = 2, 130, 143
 # What the machine may refuse without anything being wrong with the program.
 _REFUSALS = {
     errno.ENOSPC: "free some space, or choose a folder on another disk",
@@ -43,7 +44,7 @@ _REFUSALS = {
 def main() -> None:
     """Run the command that the arguments name and exit with its status.
 
-    Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted.
+    Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted, 143 terminated.
     """
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     if sys.argv[1:] == ["--version"]:
@@ -60,9 +61,9 @@ def main() -> None:
     except InputError as error:
         errors.print(f"error: {error}")
         sys.exit(_USER_ERROR)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         errors.print("interrupted: finished stages are kept, and the same command goes on from there")
-        sys.exit(_INTERRUPTED)
+        sys.exit(_TERMINATED if isinstance(error, Terminated) else _INTERRUPTED)
     except OSError as error:
         if error.errno not in _REFUSALS:
             raise

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import inside
 
 if TYPE_CHECKING:
     from dreamdrive.scene.scene import Scene
@@ -28,4 +29,4 @@ def open_scene(out: Path) -> "Scene":
         raise InputError(
             f"{out} holds no scene{unfinished}; expected the folder that dreamdrive generate wrote"
         )
-    return load_scene(out / "scene")
+    return load_scene(inside(out, "scene"))

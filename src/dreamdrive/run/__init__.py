@@ -1,1 +1,1 @@
-"""How a run is shown: what it will cost, and how it went."""
+"""How a run is kept apart from others, and what it says."""

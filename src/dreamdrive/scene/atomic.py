@@ -19,12 +19,14 @@ def new_file(path: Path) -> Generator[Path, None, None]:
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # A link under this name would lead the writer elsewhere.
+        remove(partial)
         yield partial
         os.replace(partial, path)
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
-        _remove(partial)
+        remove(partial)
 
 
 @contextmanager
@@ -45,14 +47,14 @@ def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None,
             # A kill between the two renames below left the old folder under this name.
             os.replace(retired, path)
         _check_free(path, replace, mark)
-        _remove(partial)
+        remove(partial)
         partial.mkdir(parents=True)
         yield partial
         _swap(partial, path, retired)
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
-        _remove(partial)
+        remove(partial)
 
 
 def _check_free(path: Path, replace: bool, mark: str) -> None:
@@ -70,7 +72,7 @@ def _check_free(path: Path, replace: bool, mark: str) -> None:
 
 def _swap(partial: Path, path: Path, retired: Path) -> None:
     """Put ``partial`` in the place of ``path``, which returns if that fails."""
-    _remove(retired)
+    remove(retired)
     existed = path.exists()
     if existed:
         os.replace(path, retired)
@@ -80,10 +82,11 @@ def _swap(partial: Path, path: Path, retired: Path) -> None:
         if existed:
             os.replace(retired, path)
         raise
-    _remove(retired)
+    remove(retired)
 
 
-def _remove(path: Path) -> None:
+def remove(path: Path) -> None:
+    """Remove a file, a link or a folder with all that is in it; what links lead to is left alone."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     elif os.path.lexists(path):

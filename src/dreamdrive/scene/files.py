@@ -5,8 +5,8 @@ import os
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
 
 from dreamdrive.errors import InputError
 
@@ -17,7 +17,7 @@ _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 
 @contextmanager
-def open_file(path: Path, where: str = "", *, follow: bool = True) -> Generator[BinaryIO, None, None]:
+def open_file(path: Path, where: str = "", *, follow: bool = True) -> Generator[BufferedReader, None, None]:
     """A regular file, open for reading.
 
     A pipe, a device or a folder is refused at once: reading it would wait, or never end.

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import safetensors
 import safetensors.torch
@@ -14,14 +15,17 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.actor import Actor
+from dreamdrive.memory import free_bytes
 from dreamdrive.scene.atomic import new_folder
-from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.checked import build, check_finite
 from dreamdrive.scene.deformation import DeformationField
 from dreamdrive.scene.exposure import Exposure
+from dreamdrive.scene.files import TEXT_BYTES, inside, read_bytes
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.json_file import of_type, parse_json
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.stored_index import FARTHEST_M, MAX_PIXELS, About, StoredIndex, increasing
 from dreamdrive.scene.stored_motion import described, rebuilt
 
 FORMAT = "dreamdrive scene"
@@ -67,21 +71,26 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
 
 
 def load_scene(path: Path) -> Scene:
-    """Read a scene folder.
+    """Read a scene folder; nothing in it is believed before it is checked.
 
     Raises:
-        InputError: No scene, a newer format, or a file that is missing or differs from what was written.
+        InputError: No scene, a newer format, a file that is missing or differs from what was written, values
+            that no scene has, or more than the memory that is free.
     """
     index = _read_index(path)
-    parts = {name: _read_part(path, name, digest) for name, digest in index["parts"].items()}
+    stored = of_type(index, StoredIndex, str(path / _INDEX))
+    of_type(stored.provenance, About, f"{path / _INDEX}: provenance")
+    parts = {name: _read_part(path, name, digest) for name, digest in stored.parts.items()}
 
     def part(name: str) -> dict[str, Tensor] | None:
         return parts.get(f"{_BLOCK}-{name}.safetensors")
 
     try:
-        return _rebuild(index, part)
+        scene = _rebuild(stored, part)
+        _check(scene)
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} is not a complete scene ({error}); generate it again") from error
+    return scene
 
 
 def _version(scene: Scene) -> int:
@@ -136,15 +145,13 @@ def _checksum(index: dict[str, Any]) -> str:
 
 def _read_index(path: Path) -> dict[str, Any]:
     try:
-        index = json.loads((path / _INDEX).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"{path} is not a scene folder: {_INDEX} cannot be read ({error.strerror})"
-        ) from error
-    except ValueError as error:
-        raise InputError(
-            f"{path / _INDEX} is damaged or no scene ({error}); generate the scene again"
-        ) from error
+        data = read_bytes(path / _INDEX, _INDEX, at_most=TEXT_BYTES, follow=False)
+    except InputError as error:
+        raise InputError(f"{path} is not a scene folder: {error}") from error
+    try:
+        index = parse_json(data, _INDEX)
+    except InputError as error:
+        raise InputError(f"{path} is damaged or no scene: {error}; generate the scene again") from error
     if not isinstance(index, dict) or index.get("format") != FORMAT:
         raise InputError(f"{path / _INDEX} does not describe a scene; expected format {FORMAT!r}")
     if index.get("version") not in range(1, VERSION + 1):
@@ -158,44 +165,86 @@ def _read_index(path: Path) -> dict[str, Any]:
 
 
 def _read_part(path: Path, name: str, digest: str) -> dict[str, Tensor]:
+    free = free_bytes()
     try:
-        data = (path / name).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} is incomplete: {name} cannot be read ({error.strerror})") from error
+        # Twice: as the file's bytes and as tensors.
+        limit = 2**40 if free is None else free // 2
+        data = read_bytes(inside(path, name), name, at_most=limit, follow=False)
+    except InputError as error:
+        raise InputError(f"{path} is incomplete: {error}") from error
     if hashlib.sha256(data).hexdigest() != digest:
         raise InputError(
             f"{path / name} is damaged: its SHA-256 differs from {_INDEX}; generate the scene again"
         )
     try:
-        return safetensors.torch.load(data)
-    except safetensors.SafetensorError as error:
-        raise InputError(f"{path / name} is not a safetensors file ({error})") from error
+        tensors = safetensors.torch.load(data)
+        for key, tensor in tensors.items():
+            check_finite(key, tensor)
+    except (safetensors.SafetensorError, ValueError, KeyError) as error:
+        raise InputError(f"{path / name} holds no tensors of a scene ({error})") from error
+    return tensors
 
 
-def _rebuild(index: dict[str, Any], part: Callable[[str], dict[str, Tensor] | None]) -> Scene:
+def _rebuild(stored: StoredIndex, part: Callable[[str], dict[str, Tensor] | None]) -> Scene:
     static, dynamic = part("static"), part("dynamic")
     if static is None or dynamic is None:
         raise KeyError("no static or no dynamic Gaussians")
     sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
     return Scene(
-        static=Gaussians(**static),
-        dynamic=Gaussians(**dynamic),
-        deformation=None if motion is None else rebuilt(index["deformation"], motion),
-        actors=tuple(Actor(**_arrays(a, "times_s", "positions_m")) for a in index["actors"]),
-        sky=None if sky is None else Sky(sky["texture"], **{n: tuple(r) for n, r in index["sky"].items()}),
+        static=build(Gaussians, static),
+        dynamic=build(Gaussians, dynamic),
+        deformation=None if motion is None else rebuilt(stored.deformation or {}, motion),
+        actors=tuple(actor.actor() for actor in stored.actors),
+        sky=None if sky is None else build(Sky, {**sky, **_asdict(stored.sky)}),
         exposure=None if exposure is None else _exposure(exposure),
-        cameras=tuple(Camera(**_arrays(c, "world_from_camera")) for c in index["cameras"]),
-        times_s=np.array(index["times_s"], dtype=np.float64),
-        held_out=np.array(index["held_out"], dtype=bool),
-        camera=np.array(index["camera"], dtype=np.int64) if "camera" in index else None,
-        provenance=index["provenance"],
+        cameras=tuple(camera.camera() for camera in stored.cameras),
+        times_s=np.array(stored.times_s, dtype=np.float64),
+        held_out=np.array(stored.held_out, dtype=bool),
+        camera=None if stored.camera is None else np.array(stored.camera, dtype=np.int64),
+        provenance=stored.provenance,
     )
 
 
+def _asdict(stored: msgspec.Struct | None) -> dict[str, Any]:
+    return {} if stored is None else msgspec.structs.asdict(stored)
+
+
 def _exposure(part: dict[str, Tensor]) -> Exposure:
-    camera = part["camera"].numpy() if "camera" in part else None
-    return Exposure(part["transforms"], part["times_s"].numpy(), camera)
+    arrays = {name: tensor.numpy() for name, tensor in part.items() if name != "transforms"}
+    return build(Exposure, {**arrays, "transforms": part["transforms"]})
 
 
-def _arrays(values: dict[str, Any], *names: str) -> dict[str, Any]:
-    return {**values, **{name: np.array(values[name], dtype=np.float64) for name in names}}
+def _check(scene: Scene) -> None:
+    """Whether the parts belong together, and nothing is larger or farther away than a scene reaches."""
+    count = len(scene.cameras)
+    for camera in (0,) if scene.camera is None else np.unique(scene.camera).tolist():
+        own = slice(None) if scene.camera is None else scene.camera == camera
+        increasing(scene.times_s[own].tolist(), "times of the views")
+    if max(camera.width_px * camera.height_px for camera in scene.cameras) > MAX_PIXELS:
+        raise ValueError(f"a view has more than {MAX_PIXELS:.0e} pixels")
+    for part in (scene.static, scene.dynamic):
+        if not len(part):
+            continue
+        if not 0 <= int(part.source_frame.min()) <= int(part.source_frame.max()) < count:
+            raise ValueError(f"Gaussians come from frames beyond the {count} of the scene")
+        if float(part.means.abs().max()) > FARTHEST_M:
+            raise ValueError(f"Gaussians lie more than {FARTHEST_M:g} m away")
+    _check_tracked(scene)
+    source, up = scene.provenance.get("source_index"), scene.provenance.get("up")
+    if source is not None and len(source) != count:
+        raise ValueError(f"source_index names {len(source)} frames of {count}")
+    if up is not None and abs(float(np.linalg.norm(up)) - 1) > 1e-3:
+        raise ValueError(f"up is {up}, not a unit vector")
+
+
+def _check_tracked(scene: Scene) -> None:
+    motion, actor = scene.deformation, scene.dynamic.actor
+    if (
+        not isinstance(motion, DeformationField)
+        or not motion.config.actors
+        or actor is None
+        or not len(actor)
+    ):
+        return
+    if not -1 <= int(actor.min()) <= int(actor.max()) < motion.config.actors:
+        raise ValueError(f"Gaussians belong to actors beyond the {motion.config.actors} with a track")

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
@@ -13,6 +14,15 @@ from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.vibration import Vibration, VibrationConfig
 
 _KIND = "kind"
+# What a motion on disk may ask for: layers and levels cost time even before they have memory.
+_LARGEST = {
+    "depth": 64,
+    "levels": 12,
+    "position_frequencies": 30,
+    "time_frequencies": 30,
+    "track_times": 2000,
+}
+_LARGEST_OTHER = 1e5
 
 
 def described(motion: Motion) -> dict[str, Any]:
@@ -29,9 +39,35 @@ def rebuilt(values: dict[str, Any], state: dict[str, Tensor]) -> Motion:
         TypeError, ValueError, RuntimeError: Values or tensors do not belong to it.
     """
     rest = dict(values)
-    motion = KINDS[rest.pop(_KIND, DeformationField.kind)](rest)
-    motion.load_state_dict(state)
+    kind = rest.pop(_KIND, DeformationField.kind)
+    for name, value in rest.items():
+        if not isinstance(value, int | float) or not abs(value) <= _LARGEST.get(name, _LARGEST_OTHER):
+            raise ValueError(f"{name} of the motion is {value!r}")
+    # Without memory until the stored tensors are known to be of the shapes that the values ask for.
+    with torch.device("meta"):
+        motion = KINDS[kind](rest)
+    _check_types(motion.state_dict(), state)
+    motion.load_state_dict(state, assign=True)
+    _check_values(motion)
     return motion.requires_grad_(False)
+
+
+def _check_types(wanted: dict[str, Tensor], given: dict[str, Tensor]) -> None:
+    for name, tensor in given.items():
+        if name in wanted and wanted[name].dtype != tensor.dtype:
+            raise ValueError(f"{name} of the motion is {tensor.dtype}, not {wanted[name].dtype}")
+
+
+def _check_values(motion: Motion) -> None:
+    """Whether times increase and space has a size."""
+    state = motion.state_dict()
+    for name in ("time_range_s", "track_times_s"):
+        if name in state and not bool((torch.diff(state[name]) > 0).all()):
+            raise ValueError(f"{name} of the motion does not increase")
+    if "radius_m" in state and not float(state["radius_m"]) > 0:
+        raise ValueError("the motion's radius_m is not positive")
+    if "low_m" in state and not bool((state["high_m"] > state["low_m"]).all()):
+        raise ValueError("the motion's box is empty")
 
 
 def _field(values: dict[str, Any]) -> DeformationField:

@@ -1,0 +1,103 @@
+"""What ``scene.json`` holds, with the bounds within which it is believed."""
+
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+from msgspec import Meta
+
+from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.camera import Camera
+
+MAX_SIDE_PX = 16384
+"""Largest width and height of a recorded view: 16K video."""
+FARTHEST_M = 1e7
+"""Farthest place in a scene along each axis: float32 still tells metres there."""
+MAX_PIXELS = 64_000_000
+"""Most pixels of a view."""
+
+_Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+_Pixels = Annotated[float, Meta(ge=-1e6, le=1e6)]
+_Side = Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
+_Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+_Row = tuple[_Metres, _Metres, _Metres, _Metres]
+_Point = tuple[_Metres, _Metres, _Metres]
+
+
+class StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A view, as ``Camera``."""
+
+    fx_px: _Pixels
+    fy_px: _Pixels
+    cx_px: _Pixels
+    cy_px: _Pixels
+    width_px: _Side
+    height_px: _Side
+    world_from_camera: tuple[_Row, _Row, _Row, _Row]
+
+    def camera(self) -> Camera:
+        """The noun; ``ValueError`` where the pose is not rigid or a focal length not positive."""
+        pose = np.array(self.world_from_camera, dtype=np.float64)
+        return Camera(self.fx_px, self.fy_px, self.cx_px, self.cy_px, self.width_px, self.height_px, pose)
+
+
+class StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What moves, as ``Actor``."""
+
+    id: Annotated[int, Meta(ge=0, le=10**6)]
+    name: Annotated[str, Meta(max_length=200)]
+    kind: Annotated[str, Meta(max_length=200)]
+    count: Annotated[int, Meta(ge=0, le=10**9)]
+    times_s: list[float]
+    positions_m: list[_Point]
+
+    def actor(self) -> Actor:
+        """The noun; ``ValueError`` where times and places do not belong together."""
+        times_s = increasing(self.times_s, f"times of {self.name}")
+        if len(self.positions_m) != len(times_s):
+            raise ValueError(f"{self.name} has {len(times_s)} times and {len(self.positions_m)} places")
+        positions_m = np.array(self.positions_m, dtype=np.float64).reshape(-1, 3)
+        return Actor(self.id, self.name, self.kind, self.count, times_s, positions_m)
+
+
+class StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The range of the panorama, as ``Sky``."""
+
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+
+
+class About(msgspec.Struct, frozen=True):
+    """What of a scene's provenance is used; the rest is for people."""
+
+    up: tuple[float, float, float] | None = None
+    source_index: list[int] | None = None
+    lens: dict[str, Any] | None = None
+    input: str | None = None
+
+
+class StoredIndex(msgspec.Struct, frozen=True):
+    """All of ``scene.json`` that a scene is made of."""
+
+    parts: dict[str, _Digest]
+    actors: list[StoredActor]
+    cameras: Annotated[list[StoredCamera], Meta(min_length=1)]
+    times_s: list[float]
+    held_out: list[bool]
+    provenance: dict[str, Any]
+    camera: list[Annotated[int, Meta(ge=0, le=10**4)]] | None = None
+    deformation: dict[str, int | float | str] | None = None
+    sky: StoredSky | None = None
+
+
+def increasing(values: list[float], name: str) -> Float[np.ndarray, " t"]:
+    """Times as an array.
+
+    Raises:
+        ValueError: They do not increase.
+    """
+    times_s = np.array(values, dtype=np.float64)
+    if (np.diff(times_s) <= 0).any():
+        raise ValueError(f"{name} do not increase")
+    return times_s
