@@ -44,7 +44,7 @@ def sample(
     Raises:
         InputError: The input, an option, the weights or ``out`` cannot be used.
     """
-    name = prior or prior_of(control.path)
+    name = prior or prior_of(control.path, weights is not None)
     control = control if weights is None else replace(control, weights=find_weights(weights))
     chosen = choose_prior(name)
     chosen.check(control)

@@ -208,6 +208,4 @@ def _percent(facts: Facts) -> str:
 def _aside(facts: Facts) -> str:
     if facts.fallback is not None or len(facts.scenes) > 1:
         return "views beside the recorded path cannot be trusted here, since distances are a guess"
-    return (
-        f"views up to {ASIDE_M} m beside the recorded path hold best; further away what no frame saw is missing"
-    )
+    return f"views up to {ASIDE_M} m beside the recorded path hold best; further away what no frame saw is missing"

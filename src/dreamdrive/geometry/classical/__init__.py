@@ -24,17 +24,15 @@ def reconstruct(
 ) -> Geometry:
     """Pose a clip and find its depth, see ``geometry.protocol``; no network.
 
-    Steps are counted in frames that are gone through once. Each step of posing takes about as long as one pass
-    over all frames; those that a clip does not need are jumped over.
+    Steps are counted in frames that are gone through once. A step of posing takes about as long as one pass
+    over all frames; what a clip does not need is jumped over.
     """
     passes, used = len(clip), int((~clip.held_out).sum())
     posing, total = (1 + STEPS) * passes, (1 + STEPS) * passes + PASSES * used
     posed = pose_clip(
         clip, camera_height_m=camera_height_m, seed=seed, tell=_counted(progress, 0, passes, total)
     )
-    dense = densify(
-        in_metres(clip, posed.metres_per_unit), posed, tell=_counted(progress, posing, 1, total)
-    )
+    dense = densify(in_metres(clip, posed.metres_per_unit), posed, tell=_counted(progress, posing, 1, total))
     progress(total, total)
     return assemble(clip, posed, dense)
 

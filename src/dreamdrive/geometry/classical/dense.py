@@ -47,9 +47,7 @@ class StaticDepth:
     confidence: Float[np.ndarray, "f h w"]
 
 
-def densify(
-    clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell: Tell = unheard
-) -> Dense:
+def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell: Tell = unheard) -> Dense:
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken

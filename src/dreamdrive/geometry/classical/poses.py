@@ -236,7 +236,12 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
 def _level_road(height_m: float | None, spread: float) -> Metric:
     wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
     source = f"level road assumed, {scale.height_words(height_m)}"
-    return Metric(1.0, Ground(np.array([0.0, -1.0, 0.0]), wanted), Scale(source, spread, basis=scale.height_basis(height_m)), ())
+    return Metric(
+        1.0,
+        Ground(np.array([0.0, -1.0, 0.0]), wanted),
+        Scale(source, spread, basis=scale.height_basis(height_m)),
+        (),
+    )
 
 
 def as_posed(
