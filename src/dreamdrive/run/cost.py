@@ -171,7 +171,8 @@ def check_memory(planned: Planned, free: int | None) -> None:
         advice.append(f"--size {small[0]}x{2 * round(small[0] * height / width / 2)}")
     words = f"give {' or '.join(advice)}" if advice else "free some memory, or give a smaller --size"
     raise InputError(
-        f"{_what(planned)} need about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free; {words}"
+        f"{_what(planned)} need about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free; "
+        f"{words}"
     )
 
 
@@ -184,9 +185,8 @@ def announcement(
         return duration(_rounded(seconds_of(one, quality, representation, cores)))
 
     on = "1 core" if cores == 1 else f"{cores} cores"
-    said = (
-        f"{_what(planned)} take about {time_of(planned)} and {bytes_of(planned) / 1e9:.1f} GB of memory on {on}",
-    )
+    memory = f"{bytes_of(planned) / 1e9:.1f} GB"
+    said = (f"{_what(planned)} take about {time_of(planned)} on {on}, and {memory} of memory",)
     if planned.chosen or planned.frames <= LONG:
         return said
     step = min(ceil(planned.frames / _SHORT), max(1, int((planned.rate_hz or _LEAST_HZ) / _LEAST_HZ)))

@@ -112,8 +112,8 @@ def _of_fallback(facts: Facts) -> str | None:
         return None  # too few frames have a sentence of their own
     if facts.fallback == "blank":
         return (
-            "nothing in the frames could be followed from one to the next: they are too dark, too plain or too "
-            "noisy. The camera counts as standing still. Choose clearer frames with --frames"
+            "nothing in the frames could be followed from one to the next: they are too dark, too plain or "
+            "too noisy. The camera counts as standing still. Choose clearer frames with --frames"
         )
     if facts.fallback == "standing":
         return (
@@ -122,12 +122,12 @@ def _of_fallback(facts: Facts) -> str | None:
         )
     if facts.interval_s > SLOW_S:
         return (
-            f"the frames are {facts.interval_s:.1f} s apart, too far to tell how the camera moved; its path is "
-            "a guess. Give a recording with five frames a second or more, or a smaller step in --frames"
+            f"the frames are {facts.interval_s:.1f} s apart, too far to tell how the camera moved; its path "
+            "is a guess. Give a recording with five frames a second or more, or a smaller step in --frames"
         )
     return (
-        "the frames did not show clearly how the camera moved; its path is a guess. Choose frames in which the "
-        "car drives along a street that is well seen, with --frames, or give the path with --poses"
+        "the frames did not show clearly how the camera moved; its path is a guess. Choose frames in which "
+        "the car drives along a street that is well seen, with --frames, or give the path with --poses"
     )
 
 
@@ -147,8 +147,8 @@ def _of_cuts(facts: Facts) -> str | None:
 def _of_few(facts: Facts) -> str | None:
     if facts.frames < ENOUGH_FRAMES:
         return (
-            f"there are only {facts.frames} frames. Give {ENOUGH_FRAMES} or more, better 24, with --frames or a "
-            "longer recording"
+            f"there are only {facts.frames} frames. Give {ENOUGH_FRAMES} or more, better 24, with --frames "
+            "or a longer recording"
         )
     if facts.placed < ENOUGH_FRAMES:
         return (
@@ -178,8 +178,8 @@ def _metres(facts: Facts) -> str:
     if facts.basis in ("usual speed", "usual depth"):
         what = "a speed of 8 m/s" if facts.basis == "usual speed" else "a distance of 12 m"
         return (
-            f"nothing shows them; {what} is assumed, so that all distances may be off by {_percent(facts)} or "
-            f"more. Frames in which the road is well seen help, and --poses"
+            f"nothing shows them; {what} is assumed, so that all distances may be off by {_percent(facts)} "
+            "or more. Frames in which the road is well seen help, and --poses"
         )
     if facts.basis == "asked speed":
         return f"from the speed that was asked for; they may be off by {_percent(facts)}"
@@ -196,7 +196,7 @@ def _assumed(facts: Facts) -> tuple[list[str], list[str]]:
         assumed.append("the camera is taken to be 1.5 m above the road")
         give.append(_HEIGHT)
     if not facts.focal_observed:
-        assumed.append("its field of view is a guess")
+        assumed.append(f"{'its' if assumed else "the camera's"} field of view is a guess")
         give.append(_VIEW)
     return assumed, give
 
@@ -208,4 +208,4 @@ def _percent(facts: Facts) -> str:
 def _aside(facts: Facts) -> str:
     if facts.fallback is not None or len(facts.scenes) > 1:
         return "views beside the recorded path cannot be trusted here, since distances are a guess"
-    return f"views up to {ASIDE_M} m beside the recorded path hold best; further away what no frame saw is missing"
+    return f"views up to {ASIDE_M} m beside the recorded path hold best; further away gaps show"

@@ -9,12 +9,12 @@ from jaxtyping import Bool, Float, Int
 from dreamdrive.scene.camera import Camera
 
 Basis = Literal["given", "height", "usual height", "asked speed", "usual speed", "usual depth"]
-"""What the metre rests on: what was given in metres; the height of the camera above the road, given or assumed;
-a speed, asked for or assumed; an assumed distance."""
+"""What the metre rests on: what was given in metres; the height of the camera above the road, given or
+assumed; a speed, asked for or assumed; an assumed distance."""
 
 Fallback = Literal["few", "blank", "standing", "refused"]
-"""Why the full reconstruction did not run: too few frames, nothing to follow in them, a camera that stands, or a
-path that nobody could believe."""
+"""Why the full reconstruction did not run: too few frames, nothing to follow in them, a camera that stands,
+or a path that nobody could believe."""
 
 
 @dataclass(frozen=True)
