@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import Control, InputError, codec, generate, load_scene, options, pipeline
+from dreamdrive import Control, InputError, Outcome, codec, generate, load_scene, options, pipeline
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, StaticFit
 from dreamdrive.geometry import reconstruct

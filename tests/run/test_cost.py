@@ -46,15 +46,15 @@ def test_more_cores_are_quicker_and_more_steps_slower() -> None:
 
 def test_a_short_clip_gets_one_line() -> None:
     assert announcement(CLIP, "draft", "hybrid", 2) == (
-        "24 frames at 480x270 take about 50 s on 2 cores, and 1.2 GB of memory",
+        "24 frames at 480x270 take about 45 s on 2 cores, and 1.2 GB of memory",
     )
 
 
 def test_a_long_clip_that_nobody_shortened_gets_a_cheaper_choice() -> None:
     long = replace(CLIP, frames=160, rate_hz=25.0, size=(480, 270), chosen=False)
     first, second = announcement(long, "standard", "hybrid", 1)
-    assert first == "160 frames at 480x270 take about 13 min on 1 core, and 4.7 GB of memory"
-    assert second == ("That is a long clip: --frames 0:142:3 takes 48 of its frames, in about 5 min")
+    assert first == "160 frames at 480x270 take about 12 min on 1 core, and 4.7 GB of memory"
+    assert second == ("That is a long clip: --frames 0:142:3 takes 48 of its frames, in about 4 min 30 s")
     assert len(announcement(replace(long, chosen=True), "standard", "hybrid", 1)) == 1
     assert len(announcement(replace(long, frames=60), "standard", "hybrid", 1)) == 1
 

@@ -149,10 +149,11 @@ def test_facts_are_those_of_the_result() -> None:
         geometry, fallback="words", fallback_kind="blank", placed=5, scale=Scale("x", 0.2, basis="height")
     )
     facts = facts_of(clip, found, "draft", {1: Likeness(20.0, 0.5), 2: Likeness(30.0, 0.5)}, {})
+    assert facts.interval_s == pytest.approx(0.1)
     assert facts == Facts(
         frames=6,
         placed=5,
-        interval_s=pytest.approx(0.1),
+        interval_s=facts.interval_s,
         fallback="blank",
         scenes=((10, 16), (18, 20)),
         step=2,

@@ -72,11 +72,15 @@ def check_largest(size: tuple[int, int], text: str) -> None:
     Raises:
         InputError: They are larger than ``MAX_SIDE_PX`` or ``MAX_PIXELS``.
     """
-    if max(size) > MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS:
+    if _too_large(size):
         raise InputError(
             f"{text}: too large for H.264 video; expected {MAX_SIDE_PX} pixels a side and "
             f"{MAX_PIXELS / 1e6:.1f} million in all at most, such as 3840x2160"
         )
+
+
+def _too_large(size: tuple[int, int]) -> bool:
+    return max(size) > MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS
 
 
 def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizing:
@@ -104,10 +108,10 @@ def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizi
     if cut > MAX_CROP:
         by_width = (wanted[0], _even(wanted[0] * source[1] / source[0]))
         by_height = (_even(wanted[1] * source[0] / source[1]), wanted[1])
+        nearest = [f"{w}x{h}" for w, h in (by_width, by_height) if not _too_large((w, h))]
         raise InputError(
             f"{text} would cut away {100 * cut:.0f} % of the {source[0]}x{source[1]} frames (at most "
-            f"{100 * MAX_CROP:.0f} % is cropped); the nearest sizes are {by_width[0]}x{by_width[1]} "
-            f"and {by_height[0]}x{by_height[1]}"
+            f"{100 * MAX_CROP:.0f} % is cropped); the nearest sizes are {' and '.join(nearest)}"
         )
     return cover(source, wanted)
 

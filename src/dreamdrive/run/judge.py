@@ -196,7 +196,8 @@ def _assumed(facts: Facts) -> tuple[list[str], list[str]]:
         assumed.append("the camera is taken to be 1.5 m above the road")
         give.append(_HEIGHT)
     if not facts.focal_observed:
-        assumed.append(f"{'its' if assumed else "the camera's"} field of view is a guess")
+        whose = "its" if assumed else "the camera's"
+        assumed.append(f"{whose} field of view is a guess")
         give.append(_VIEW)
     return assumed, give
 
