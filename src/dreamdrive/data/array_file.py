@@ -14,13 +14,13 @@ from jaxtyping import Shaped, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.files import open_file
+from dreamdrive.scene.zip_file import directory_bytes
 
 ARRAY_BYTES = 256_000_000
 """Bytes that arrays may take, a number counting as at least four: depth of 64 megapixels."""
 _DIRECTORY_BYTES = 1_000_000
 """Most that the table of contents of an NPZ may hold; each array takes about 100 bytes there."""
 _CHUNK = 1 << 20
-_TAIL = 66_000
 # A member of a zip is none of typing's kinds of files.
 _Stream = IO[bytes] | zipfile.ZipExtFile
 # What zipfile and NumPy raise on damaged files.
@@ -50,7 +50,8 @@ def read_npz(path: Path, names: Sequence[str], *, at_most: int = ARRAY_BYTES) ->
     """
     with open_file(path) as file:
         try:
-            _check_directory(file)
+            if directory_bytes(file) > _DIRECTORY_BYTES:
+                raise InputError("holds more files than an npz with a few arrays")
             with zipfile.ZipFile(file) as archive:
                 return _members(archive, names, at_most)
         except InputError as error:
@@ -76,19 +77,6 @@ def read_npy(path: Path, *, at_most: int = ARRAY_BYTES) -> Shaped[np.ndarray, "*
             raise InputError(f"{path}: the array {error}") from None
         except _DAMAGE as error:
             raise InputError(f"{path} cannot be read as an npy ({error})") from error
-
-
-def _check_directory(file: IO[bytes]) -> None:
-    """Refuse a table of contents that takes much memory; zipfile reads all of it."""
-    size = file.seek(0, 2)
-    file.seek(max(size - _TAIL, 0))
-    tail = file.read(_TAIL)
-    file.seek(0)
-    end = tail.rfind(b"PK\5\6")
-    if b"PK\6\7" in tail[max(end - 20, 0) : end] or (
-        end >= 0 and int.from_bytes(tail[end + 12 : end + 16], "little") > _DIRECTORY_BYTES
-    ):
-        raise InputError("holds more files than an npz with a few arrays")
 
 
 def _members(archive: zipfile.ZipFile, names: Sequence[str], at_most: int) -> dict[str, np.ndarray]:
