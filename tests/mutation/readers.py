@@ -1,0 +1,6 @@
+"""All readers that are tried; each module adds its own."""
+
+from tests.mutation.stored_readers import STORED
+from tests.mutation.text_readers import TEXT
+
+READERS = {reader.name: reader for reader in (*TEXT, *STORED)}
