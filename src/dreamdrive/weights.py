@@ -4,6 +4,7 @@ import hashlib
 import os
 import pickle
 import re
+import struct
 import warnings
 import zipfile
 from collections import defaultdict
@@ -19,7 +20,7 @@ from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.files import open_file
-from dreamdrive.scene.tensor_file import HEADER_BYTES, header_problem
+from dreamdrive.scene.tensor_file import HEADER_BYTES, briefly, header_problem
 from dreamdrive.scene.zip_file import directory_bytes
 
 Network = TypeVar("Network", bound=nn.Module)
@@ -72,7 +73,9 @@ def fill_network(
         with torch.device("meta"):
             network = make()
     except (RuntimeError, OverflowError) as error:
-        raise InputError(f"{source}: no network is of these sizes ({error}); expected {expected}") from None
+        raise InputError(
+            f"{source}: no network is of these sizes ({briefly(error)}); expected {expected}"
+        ) from None
     return fill(network, state, source, expected)
 
 
@@ -113,7 +116,7 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
             raise SafetensorError(problem)
         return load_file(path)
     except (OSError, SafetensorError, ValueError, RuntimeError, KeyError) as error:
-        raise InputError(f"{path} is missing or damaged ({error}); expected {expected}") from None
+        raise InputError(f"{path} is missing or damaged ({briefly(error)}); expected {expected}") from None
 
 
 def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
@@ -150,10 +153,11 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
         MemoryError,
         AssertionError,
         NotImplementedError,
+        struct.error,
     ) as error:
         refused = _REFUSED.search(str(error))
         about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
-        about = f"; {error}" if isinstance(error, zipfile.BadZipFile) else about
+        about = f"; {briefly(error)}" if isinstance(error, zipfile.BadZipFile) else about
         raise InputError(
             f"{path} cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled "
             f"object{about}); expected {expected}"
@@ -175,7 +179,7 @@ def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
         raise InputError(f"{source} holds no table of tensors; expected {expected}")
     for key, value in content.items():
         if problem := _problem(value):
-            raise InputError(f"{source}: {key} {problem}; expected {expected}")
+            raise InputError(f"{source}: {briefly(key)} {problem}; expected {expected}")
     return {str(key): value for key, value in content.items()}
 
 
@@ -249,13 +253,15 @@ def _check_numbers(
     for key, value in state.items():
         if value.is_floating_point() != wanted[key].is_floating_point() or value.is_complex():
             raise InputError(
-                f"{source}: {key} holds {_name(value)}, not {_name(wanted[key])}; expected {expected}"
+                f"{source}: {briefly(key)} holds {_name(value)}, not {_name(wanted[key])}; expected {expected}"
             )
         # The extremes tell without a copy; what is not a number is its own extreme.
         if value.is_floating_point() and value.numel():
             low, high = torch.aminmax(value if value.element_size() > 1 else value.float())
             if not (torch.isfinite(low) and torch.isfinite(high)):
-                raise InputError(f"{source}: {key} holds numbers that are not finite; copy the file again")
+                raise InputError(
+                    f"{source}: {briefly(key)} holds numbers that are not finite; copy the file again"
+                )
 
 
 def _name(value: Tensor) -> str:
@@ -298,4 +304,4 @@ def in_words(found: Mapping[str, list[str]]) -> str:
 
 def some(keys: Sequence[str]) -> str:
     """The first few keys, for a message."""
-    return ", ".join(keys[:_SHOWN]) + (", ..." if len(keys) > _SHOWN else "")
+    return ", ".join(map(briefly, keys[:_SHOWN])) + (", ..." if len(keys) > _SHOWN else "")

@@ -21,7 +21,7 @@ from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.json_file import parse_json
-from dreamdrive.scene.tensor_file import header_problem
+from dreamdrive.scene.tensor_file import briefly, header_problem
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
@@ -128,17 +128,17 @@ def read_features(path: Path) -> FeatureFile:
                 stated = file.get_slice(name)
                 kind = _TYPES.get(str(stated.get_dtype()), str(stated.get_dtype()))
                 if problem := _misfit(tuple(stated.get_shape()), kind):
-                    raise InputError(f"{where}: {name!r} {problem}")
+                    raise InputError(f"{where}: {briefly(repr(name))} {problem}")
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except InputError:
         raise
     except (OSError, SafetensorError, TypeError, ValueError, AttributeError, KeyError) as error:
-        raise InputError(f"{where} cannot be read ({error}); expected {_EXPECTED}") from None
+        raise InputError(f"{where} cannot be read ({briefly(error)}); expected {_EXPECTED}") from None
     if not arrays:
         raise InputError(f"{where} holds no array; expected {_EXPECTED}")
     for name, array in arrays.items():
         if problem := _problem(array):
-            raise InputError(f"{where}: {name!r} {problem}")
+            raise InputError(f"{where}: {briefly(repr(name))} {problem}")
     if len({len(array) for array in arrays.values()}) > 1:
         counts = ", ".join(f"{name!r} {len(array)}" for name, array in arrays.items())
         raise InputError(f"{where}: its arrays have different numbers of frames: {counts}")
@@ -154,7 +154,7 @@ def write_features(path: Path, features: FeatureFile) -> None:
     """
     for name, array in features.arrays.items():
         if problem := _problem(array):
-            raise ValueError(f"features {name!r} {problem}")
+            raise ValueError(f"features {briefly(repr(name))} {problem}")
     arrays = {name: np.ascontiguousarray(array) for name, array in features.arrays.items()}
     blob = save(arrays, metadata={_KEY: json.dumps(features.provenance)})
     with new_file(path) as partial:

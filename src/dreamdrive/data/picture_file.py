@@ -44,10 +44,14 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     if header is None or 0 in (header.width_px, header.height_px):
         raise InputError(f"{where} cannot be read as an image; expected {KINDS}")
     _check(header, data, where)
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         raise InputError(f"{where} cannot be read as an image: {error.err}") from error
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     if picture is None:  # pyright: ignore[reportUnnecessaryComparison]
         raise InputError(f"{where} cannot be read as an image; expected {KINDS}")
     return _upright(np.asarray(picture), header.orientation)

@@ -60,13 +60,15 @@ def _png(data: bytes) -> Header | None:
     if data[12:16] != b"IHDR":
         return None
     width, height = struct.unpack_from(">II", data, 16)
-    place, orientation = 8, 1
-    while place + 8 <= len(data):
+    place, orientation, kind = 8, 1, b""
+    while kind != b"IEND":
         length, kind = struct.unpack_from(">I4s", data, place)
         if kind == b"eXIf":
             orientation = _turn(data[place + 8 : place + 8 + length])
-            break
         place += 12 + length
+        # OpenCV takes memory for what a part says that it holds.
+        if place > len(data):
+            return None
     return Header("PNG", width, height, orientation)
 
 

@@ -57,7 +57,12 @@ class Video:
         try:
             with _opened(path) as container:
                 stream = _pictures(container, path)
-                size = stream.codec_context.width, stream.codec_context.height
+                coded = stream.codec_context
+                if coded is None:  # pyright: ignore[reportUnnecessaryComparison]
+                    raise InputError(
+                        f"{path} holds pictures of a kind that cannot be decoded; expected H.264 or the like"
+                    )
+                size = coded.width, coded.height
                 rate = stream.average_rate
         except FFmpegError as error:
             raise InputError(

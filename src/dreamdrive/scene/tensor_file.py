@@ -8,6 +8,7 @@ from dreamdrive.scene.files import open_file
 
 HEADER_BYTES = 16_000_000
 """Most that the table of tensors in a file may hold; that of Vista takes half a megabyte."""
+_LONGEST = 200
 
 
 def header_problem(path: Path) -> str | None:
@@ -21,3 +22,9 @@ def header_problem(path: Path) -> str | None:
     if 2 <= header <= min(size - 8, HEADER_BYTES):
         return None
     return f"it states a header of {header} bytes and has {size}"
+
+
+def briefly(error: object) -> str:
+    """What a library says of a file, on one line, without all that it repeats from the file."""
+    said = " ".join(str(error).split())
+    return said if len(said) <= _LONGEST else said[:_LONGEST] + "..."

@@ -18,7 +18,8 @@ from dreamdrive.geometry.files.given import DepthFiles
 from dreamdrive.scene.files import check_file
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
-_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R", "RGB", "RGBA")
+_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R")
+_EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 _MILLIMETRE, _KITTI_M = 0.001, 1 / 256
 
 
@@ -53,7 +54,7 @@ def read_depth(
         unit = 1.0
     elif unit is None:
         unit, said = _usual_unit(path, stored, kitti)
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         depth = stored.astype(np.float32)
         depth *= np.float32(unit)
     if not np.isfinite(depth).all() or (depth < 0).any():
@@ -103,33 +104,34 @@ def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
         ) from None
     check_file(path)
     try:
-        with OpenEXR.File(str(path), header_only=True) as file:
-            _check_exr(path, file)
-        with OpenEXR.File(str(path)) as file:
-            channels: dict[str, Any] = {name: each.pixels for name, each in file.channels().items()}
-    except (OSError, RuntimeError, ValueError, TypeError) as error:
+        file = OpenEXR.InputFile(str(path))
+        try:
+            return _exr_channel(path, file), False
+        finally:
+            file.close()
+    except (OSError, RuntimeError, ValueError, TypeError, EOFError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: cannot be read as EXR ({error})") from error
+
+
+def _exr_channel(path: Path, file: Any) -> Shaped[np.ndarray, "h w"]:
+    """The channel with depth, read only where the header says that it fits into memory."""
+    header = file.header()
+    channels, window = header["channels"], header["dataWindow"]
     name = next((name for name in _EXR_CHANNELS if name in channels), None)
     if name is None and len(channels) == 1:
         name = next(iter(channels))
     if name is None:
         raise InputError(f"{path}: has the channels {', '.join(channels)}; expected Z, V, Y or a single one")
-    pixels = np.asarray(channels[name])
-    return (pixels[..., 0] if pixels.ndim == 3 else pixels), False
-
-
-def _check_exr(path: Path, file: Any) -> None:
-    """Whether the header of an EXR says that it fits into memory."""
-    numbers = 0
-    for part in file.parts:
-        low, high = part.header["dataWindow"]
-        width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
-        numbers += width * height * len(part.header["channels"])
-    if numbers > MAX_PIXELS:
+    width, height = window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
+    if not 0 < width * height <= MAX_PIXELS:
         raise InputError(
-            f"{path}: says that it holds {numbers / 1e6:.0f} million numbers; expected at most "
-            f"{MAX_PIXELS // 10**6} million"
+            f"{path}: is an image of {width}x{height} pixels; expected at most {MAX_PIXELS // 10**6} "
+            "megapixels"
         )
+    dtype = _EXR_TYPES[str(channels[name].type)]
+    return np.frombuffer(file.channel(name), dtype).reshape(height, width)
 
 
 _READERS = {".npz": _read_npz, ".npy": _read_npy, ".exr": _read_exr, ".png": _read_png}

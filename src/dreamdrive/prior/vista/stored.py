@@ -15,7 +15,7 @@ from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.scene.json_file import read_json
-from dreamdrive.scene.tensor_file import header_problem
+from dreamdrive.scene.tensor_file import briefly, header_problem
 from dreamdrive.weights import check_sizes, in_words, misfits, some
 
 EXPECTED = (
@@ -144,13 +144,13 @@ def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
         shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
     except (OSError, SafetensorError) as error:
         raise InputError(
-            f"{path} is no .safetensors or is cut short ({error}); copy it again, expected {EXPECTED}"
+            f"{path} is no .safetensors or is cut short ({briefly(error)}); copy it again, expected {EXPECTED}"
         ) from None
 
     def read(key: str) -> Tensor:
         value = file.get_tensor(key)
         if not value.is_floating_point():
-            raise InputError(f"{path}: {key} holds {value.dtype}; expected floating-point numbers")
+            raise InputError(f"{path}: {briefly(key)} holds {value.dtype}; expected floating-point numbers")
         return value
 
     return shapes, read
@@ -186,10 +186,12 @@ def _part(
         config = config_of(part, own)
     except KeyError as error:
         raise InputError(
-            f"{path}: the {TITLES[part]} lacks {error.args[0]} and more; expected {EXPECTED}"
+            f"{path}: the {TITLES[part]} lacks {briefly(error.args[0])} and more; expected {EXPECTED}"
         ) from None
     except (RuntimeError, ValueError, IndexError, ArithmeticError) as error:
-        raise InputError(f"{path}: tensors of the {TITLES[part]} do not fit together ({error})") from None
+        raise InputError(
+            f"{path}: tensors of the {TITLES[part]} do not fit together ({briefly(error)})"
+        ) from None
     return StoredPart(config, own, lambda name: chosen[name].make(read))
 
 
@@ -222,7 +224,9 @@ def _check(stored: Stored, part: Part) -> None:
     try:
         network = make_empty(part, own.config, stored.kind)
     except _NO_NETWORK as error:
-        raise InputError(f"{stored.path}: config.json of the {TITLES[part]} is of no use ({error})") from None
+        raise InputError(
+            f"{stored.path}: config.json of the {TITLES[part]} is of no use ({briefly(error)})"
+        ) from None
     wanted = {name: tuple(value.shape) for name, value in network.state_dict().items()}
     if wrong := misfits(wanted, own.shapes):
         raise InputError(
