@@ -174,8 +174,7 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no depth in a file": (
         lambda folder: np.savez(recording(folder) / "lidar_depth" / "0001.npz", u=np.zeros(2), v=np.zeros(2)),
-        "PLACE/lidar_depth/0001.npz cannot be read ('depth is not a file in the archive'); expected arrays "
-        "u, v and depth",
+        "PLACE/lidar_depth/0001.npz lacks the array 'depth'; expected arrays u, v and depth",
     ),
     "lists of different lengths": (
         lambda folder: write_points(recording(folder) / "lidar_depth" / "0001.npz", [1], [1, 2], [3]),

@@ -8,6 +8,7 @@ import os
 import shutil
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -319,7 +320,7 @@ def zip_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
                     )
                     inner, how = change(inner, rng)
                 new.writestr(name, inner)
-    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, struct.error, EOFError):
+    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, struct.error, zlib.error, EOFError):
         return bytes_changed(data, rng)
     return made.getvalue(), f"member {spoilt}: {how}"
 

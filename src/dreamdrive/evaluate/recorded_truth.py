@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
-from zipfile import BadZipFile
 
-import cv2
 import msgspec
 import numpy as np
 from jaxtyping import Bool, Float
 from msgspec import Meta
 
+from dreamdrive.data.array_file import read_npz
 from dreamdrive.data.camera_models import IndexedPinhole, MatrixPinhole, NamedFrames
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.pose_files import read_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import FARTHEST_M, MAX_SIDE_PX, Camera
@@ -203,10 +203,10 @@ def _lifted(
 def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns, rows and depths as stored, places by integer pixel index."""
     try:
-        with np.load(path) as stored:
-            u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
-    except (OSError, KeyError, ValueError, BadZipFile) as error:
-        raise InputError(f"{path} cannot be read ({error}); expected arrays u, v and depth") from error
+        stored = read_npz(path, ("u", "v", "depth"))
+        u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
+    except KeyError as error:
+        raise InputError(f"{path} lacks the array {error}; expected arrays u, v and depth") from None
     usable = u.ndim == 1 and u.shape == v.shape == depth.shape and np.isfinite([u, v, depth]).all()
     if not usable or not (depth > 0).all():
         raise InputError(
@@ -218,11 +218,11 @@ def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _picture(path: Path, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same of a picture of depth, 0 where there is none."""
-    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if picture is None or picture.dtype != np.uint16 or picture.shape != (size[1], size[0]):
-        got = "nothing readable" if picture is None else f"{picture.dtype} of shape {picture.shape}"
+    picture = read_picture(path)
+    if picture.dtype != np.uint16 or picture.shape != (size[1], size[0]):
         raise InputError(
-            f"{path} holds {got}; expected 16 bits of grey, 256 levels a metre, {size[0]}x{size[1]} pixels"
+            f"{path} holds {picture.dtype} of shape {picture.shape}; expected 16 bits of grey, 256 levels a "
+            f"metre, {size[0]}x{size[1]} pixels"
         )
     v, u = np.nonzero(picture)
     return u.astype(np.float64), v.astype(np.float64), picture[v, u] / _PNG_PER_M
