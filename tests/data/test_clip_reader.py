@@ -233,3 +233,11 @@ def test_golden_a_distorted_video_survives_there_and_back(data_dir):
     error = (again - plain.frames[0] / 255.0)[seen]
     assert seen.mean() > 0.85
     assert -10 * np.log10(np.mean(error**2)) > 35
+
+
+def test_a_clock_of_no_camera_asks_for_a_rate(make_video):
+    path = make_video(6, rate=1_000_000)
+    with pytest.raises(InputError) as caught:
+        read_clip(path)
+    assert str(caught.value) == f"{path} has no usable times; give its rate with --fps"
+    np.testing.assert_allclose(read_clip(path, fps=10).times_s, np.arange(6) / 10)

@@ -18,7 +18,7 @@ from dreamdrive.data.poses import read_poses
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.data.source import Source, one_frame, open_source
-from dreamdrive.data.video import Video
+from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
@@ -215,7 +215,8 @@ def _times(
         return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if all(t is not None for t in clock_s):
         times_s = np.array(clock_s, dtype=np.float64)
-        if (np.diff(times_s) > 0).all():
+        rate = (index[-1] - index[0]) / max(times_s[-1] - times_s[0], 1e-12)
+        if (np.diff(times_s) > 0).all() and RATES_HZ[0] <= rate <= RATES_HZ[1]:
             return times_s, ()
     if source.rate_hz is None:
         raise InputError(f"{source.path} has no usable times; give its rate with --fps")

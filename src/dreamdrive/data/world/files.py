@@ -1,24 +1,27 @@
 """Worlds on disk: what each camera records, and all truth beside it."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import cv2
 import numpy as np
 
+from dreamdrive.data.array_file import read_npz
 from dreamdrive.data.corruption import Corruption
 from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
 from dreamdrive.data.world.materials import Semantic
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.json_file import read_json
 from dreamdrive.scene.layout import Layout
 
 
@@ -80,14 +83,14 @@ def read_world(path: Path, camera: str = "front") -> Drive:
         raise InputError(f"{path} holds neither frames nor a camera {camera!r}; make the world again")
     try:
         return _read_camera(folder, layout)
-    except (OSError, KeyError, TypeError, ValueError, BadZipFile) as error:
+    except (OSError, KeyError, TypeError, ValueError, MemoryError) as error:
         raise InputError(f"{folder} is not a complete world ({error}); make it again") from error
 
 
 def _read_camera(folder: Path, layout: Layout) -> Drive:
-    pinhole = _pinhole(json.loads((folder / "cameras.json").read_text(encoding="utf-8")))
-    path = json.loads((folder / "poses.json").read_text(encoding="utf-8"))
-    hulls = json.loads((folder / "boxes.json").read_text(encoding="utf-8"))
+    pinhole = _pinhole(read_json(folder / "cameras.json"))
+    path = read_json(folder / "poses.json")
+    hulls = read_json(folder / "boxes.json")
     times_s = np.array(path["times_s"], dtype=np.float64)
     shape = len(times_s), pinhole.height_px, pinhole.width_px
     world_from_map = np.array(hulls["world_from_map"], dtype=np.float64)
@@ -120,19 +123,19 @@ def _images(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
     images = np.zeros(shape, dtype=np.uint8)
     for i in range(len(images)):
         path = folder / f"{i:04d}.png"
-        image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
-        images[i] = _of_shape(path, image, shape[1:])
+        images[i] = _of_shape(path, read_picture(path, f"{path.parent.name}/{path.name}"), shape[1:])
     return images
 
 
 def _array(path: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    with np.load(path) as stored:
-        return _of_shape(path, stored[name], shape)
+    # At most of doubles.
+    stored = read_npz(path, [name], at_most=8 * math.prod(shape))
+    return _of_shape(path, stored.get(name), shape)
 
 
 def _of_shape(path: Path, values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     if values is None or values.shape != shape:
-        got = "nothing readable" if values is None else f"shape {values.shape}"
+        got = "no such array" if values is None else f"shape {values.shape}"
         raise ValueError(f"{path.name} of {path.parent.name} holds {got}, expected {shape}")
     return values
 

@@ -3,21 +3,23 @@
 All hold depth along z (not along the ray), 0 where it is unknown, the first row at the top.
 """
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import Float, Shaped
 
+from dreamdrive.data.array_file import read_npy, read_npz
+from dreamdrive.data.picture_file import MAX_PIXELS, read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import NAME, Declared
 from dreamdrive.geometry.files.given import DepthFiles
+from dreamdrive.scene.files import check_file
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
-_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R", "RGB", "RGBA")
+_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R")
+_EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 _MILLIMETRE, _KITTI_M = 0.001, 1 / 256
 
 
@@ -52,10 +54,12 @@ def read_depth(
         unit = 1.0
     elif unit is None:
         unit, said = _usual_unit(path, stored, kitti)
-    depth = stored.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        depth = stored.astype(np.float32)
+        depth *= np.float32(unit)
     if not np.isfinite(depth).all() or (depth < 0).any():
         raise InputError(f"{path}: holds negative, NaN or infinite depth; write 0 where there is none")
-    return depth * np.float32(unit), said
+    return depth, said
 
 
 def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"], kitti: bool) -> tuple[float, str]:
@@ -71,31 +75,22 @@ def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"], kitti: bool) -> t
 
 def _read_npz(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
     """The array ``depth_m`` (in metres for sure) or ``depth``."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            name = "depth" if "depth" in archive and "depth_m" not in archive else "depth_m"
-            return np.asarray(archive[name]), name == "depth_m"
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: cannot be read as an npz with an array depth_m or depth ({error})"
-        ) from error
+    stored = read_npz(path, ("depth_m", "depth"))
+    for name, array in stored.items():
+        return array, name == "depth_m"
+    raise InputError(f"{path}: holds neither an array depth_m nor depth")
 
 
 def _read_npy(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
-    try:
-        stored = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read as an npy ({error})") from error
-    if not isinstance(stored, np.ndarray):
-        raise InputError(f"{path}: is an npz called npy; call it .npz")
+    stored = read_npy(path)
     return (stored[..., 0] if stored.ndim == 3 and stored.shape[2] == 1 else stored), False
 
 
 def _read_png(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None or image.dtype != np.uint16 or image.ndim != 2:
+    image = read_picture(path)
+    if image.dtype != np.uint16 or image.ndim != 2:
         raise InputError(f"{path}: expected a grey PNG of 16 bits with depth, 0 where unknown")
-    return np.asarray(image), False
+    return image, False
 
 
 def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
@@ -107,18 +102,36 @@ def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
             f"{path}: EXR files are read by the package OpenEXR, which is not installed; "
             "pip install 'dreamdrive[exr]', or give the depth as .npz"
         ) from None
+    check_file(path)
     try:
-        with OpenEXR.File(str(path)) as file:
-            channels: dict[str, Any] = {name: each.pixels for name, each in file.channels().items()}
-    except (OSError, RuntimeError, ValueError, TypeError) as error:
+        file = OpenEXR.InputFile(str(path))
+        try:
+            return _exr_channel(path, file), False
+        finally:
+            file.close()
+    except (OSError, RuntimeError, ValueError, TypeError, EOFError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: cannot be read as EXR ({error})") from error
+
+
+def _exr_channel(path: Path, file: Any) -> Shaped[np.ndarray, "h w"]:
+    """The channel with depth, read only where the header says that it fits into memory."""
+    header = file.header()
+    channels, window = header["channels"], header["dataWindow"]
     name = next((name for name in _EXR_CHANNELS if name in channels), None)
     if name is None and len(channels) == 1:
         name = next(iter(channels))
     if name is None:
         raise InputError(f"{path}: has the channels {', '.join(channels)}; expected Z, V, Y or a single one")
-    pixels = np.asarray(channels[name])
-    return (pixels[..., 0] if pixels.ndim == 3 else pixels), False
+    width, height = window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
+    if not 0 < width * height <= MAX_PIXELS:
+        raise InputError(
+            f"{path}: is an image of {width}x{height} pixels; expected at most {MAX_PIXELS // 10**6} "
+            "megapixels"
+        )
+    dtype = _EXR_TYPES[str(channels[name].type)]
+    return np.frombuffer(file.channel(name), dtype).reshape(height, width)
 
 
 _READERS = {".npz": _read_npz, ".npy": _read_npy, ".exr": _read_exr, ".png": _read_png}
