@@ -253,7 +253,8 @@ def _check_numbers(
     for key, value in state.items():
         if value.is_floating_point() != wanted[key].is_floating_point() or value.is_complex():
             raise InputError(
-                f"{source}: {briefly(key)} holds {_name(value)}, not {_name(wanted[key])}; expected {expected}"
+                f"{source}: {briefly(key)} holds {_name(value)}, not {_name(wanted[key])}; expected "
+                f"{expected}"
             )
         # The extremes tell without a copy; what is not a number is its own extreme.
         if value.is_floating_point() and value.numel():
