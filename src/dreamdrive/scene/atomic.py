@@ -19,6 +19,8 @@ def new_file(path: Path) -> Generator[Path, None, None]:
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # What a kill left there is not added to, and a link there not followed.
+        _remove(partial)
         yield partial
         os.replace(partial, path)
     except OSError as error:
