@@ -11,7 +11,7 @@ def parse_size(text: str) -> tuple[int, int]:
     Raises:
         InputError: The text has another form.
     """
-    match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
+    match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip())
     if match is None:
         raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")
     return int(match[1]), int(match[2])

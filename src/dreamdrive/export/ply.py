@@ -86,6 +86,19 @@ def export_ply(scene: Scene, path: Path) -> None:
             (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
 
 
+def left_out_of_ply(scene: Scene, path: Path) -> str:
+    """What of a scene ``export_ply`` finds no place for, in a sentence."""
+    alone = path.suffix.lower() == ".ply"
+    shown = f"the scene at {float(scene.times_s[0]):.3g} s" if alone else "the scene at its recorded times"
+    parts = {
+        "sky": scene.sky is not None,
+        "exposure of the recording": scene.exposure is not None,
+        "motion" if alone else "motion in between": len(scene.dynamic) > 0,
+    }
+    missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
+    return f"PLY holds {shown}{': ' if missing else ''}{missing}."
+
+
 def _fields(coefficients: int) -> list[str]:
     names = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
     names += [f"f_rest_{i}" for i in range(3 * (coefficients - 1))]
