@@ -149,7 +149,7 @@ def softened(drives: dict[str, np.ndarray]) -> Iterator[Case]:
                     yield Case(f"{disturbance.__name__}, cut", label, disturbance(both, random), (len(a),))
 
 
-def photo_drives(photos: list[np.ndarray], count: int = 400) -> Iterator[Case]:
+def photo_drives(photos: list[np.ndarray], count: int = 200) -> Iterator[Case]:
     """A slow zoom into one photo, and another into a photo of another place."""
     random = np.random.default_rng(0)
     for first, second in random.integers(0, len(photos), (count, 2)):

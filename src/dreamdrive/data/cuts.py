@@ -8,17 +8,14 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.data.likeness import Likeness
 
-SHARED, SHARED_MATCHES = 0.05, 18
+SHARED, SHARED_MATCHES = 0.1, 10
 """From here on two frames certainly show one place."""
-CLOSE, CLOSE_MATCHES = 0.15, 30
+CLOSE, CLOSE_MATCHES = 0.15, 20
 """How much neighbours of a cut must share: where they share little anyway, nothing follows from less."""
-DIP = 0.7
-"""A frame that is mixed from two scenes shares less than this part of what is usual around it."""
 LONGEST_FADE = 3
 """Mixed frames between two scenes."""
 MIXED = 0.25
 """Part of the difference to both scenes that their mixture may leave."""
-_AROUND = 6
 _BEFORE, _AFTER = 3, 4  # frames that are asked whether the scene comes back
 
 
@@ -41,7 +38,7 @@ class Found:
 
     Attributes:
         cuts: Changes to another scene, in the order of time.
-        blank: Frames of one colour.
+        blank: Frames without any texture, such as black ones.
         strange: Single frames that have nothing in common with those around them, which show one scene.
     """
 
@@ -65,8 +62,8 @@ def find_cuts(frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h
     shown = [i for i in range(len(frames)) if not looks.shows_nothing(i)]
     search = _Search(looks, shown)
     cuts: list[Cut] = []
-    for gap in search.doubtful():
-        found = search.cut_at(gap)
+    for start in range(len(shown) - 1):
+        found = search.cut_behind(start)
         if found is not None and (not cuts or found.last >= cuts[-1].first):
             cuts.append(found)
     return Found(tuple(cuts), blank, search.strange())
@@ -79,20 +76,11 @@ class _Search:
         self.looks, self.shown = looks, shown
         self.shares = np.array([looks.share(a, b) for a, b in pairwise(shown)])
 
-    def doubtful(self) -> list[int]:
-        """Places whose frame has little in common with the next, measured by what is usual around it."""
-        usual = [
-            np.median(self.shares[max(0, gap - _AROUND) : gap + _AROUND + 1])
-            for gap in range(len(self.shares))
-        ]
-        return [gap for gap, share in enumerate(self.shares) if share < max(SHARED, DIP * usual[gap])]
-
-    def cut_at(self, gap: int) -> Cut | None:
-        """The change to another scene that a gap belongs to, the shortest there is."""
-        for span in range(1, LONGEST_FADE + 2):
-            for start in range(max(0, gap - span + 1), min(gap, len(self.shares) - span) + 1):
-                if self._is_cut(start, span):
-                    return Cut(self.shown[start], self.shown[start + span])
+    def cut_behind(self, start: int) -> Cut | None:
+        """The change to another scene that follows a frame at once, the shortest there is."""
+        for end in range(start + 1, min(len(self.shown), start + LONGEST_FADE + 2)):
+            if self._is_cut(start, end):
+                return Cut(self.shown[start], self.shown[end])
         return None
 
     def strange(self) -> tuple[int, ...]:
@@ -106,12 +94,11 @@ class _Search:
             and not self._shared(k, k + 1)
         )
 
-    def _is_cut(self, start: int, span: int) -> bool:
-        end = start + span
+    def _is_cut(self, start: int, end: int) -> bool:
         return (
-            (span == 1 or self._mixed(start, end))
+            (end == start + 1 or self._mixed(start, end))
             and self.looks.share(self.shown[start], self.shown[end]) < SHARED
-            and self._sides_agree(start, end, span)
+            and self._sides_agree(start, end)
             and not self._comes_back(start, end)
         )
 
@@ -123,12 +110,18 @@ class _Search:
         a, b = self.shown[first], self.shown[second]
         return self.looks.share(a, b) >= CLOSE or self.looks.matches(a, b) >= CLOSE_MATCHES
 
-    def _sides_agree(self, start: int, end: int, span: int) -> bool:
-        """Whether frames that are as far apart have much in common, on both sides where there are any."""
-        before, after = max(0, start - span), min(len(self.shown) - 1, end + span)
-        if before == start and after == end:
-            return False
-        return (before == start or self._close(before, start)) and (after == end or self._close(end, after))
+    def _sides_agree(self, start: int, end: int) -> bool:
+        """Whether frames that are as far apart have much in common on both sides.
+
+        Where one side is a single frame, the other has to answer for both, over twice the distance too.
+        """
+        span, last = end - start, len(self.shown) - 1
+        before, after = max(0, start - span), min(last, end + span)
+        if before == start:
+            return self._close(end, after) and end + 2 <= last and self._close(end, min(last, end + 2 * span))
+        if after == end:
+            return self._close(before, start) and start >= 2 and self._close(max(0, start - 2 * span), start)
+        return self._close(before, start) and self._close(end, after)
 
     def _comes_back(self, start: int, end: int) -> bool:
         """Whether the scene before is seen again after."""

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 _FLOW_WIDTH_PX, _FEATURE_WIDTH_PX = 160, 320
 _WINDOW_PX = 9
@@ -15,7 +15,7 @@ _PICTURE, _PICTURE_SHARE = 3.0, 0.01  # the same in grey levels; a frame with le
 _SAME = 0.75  # correlation of two windows
 _ROUND_TRIP_PX, _ROUND_TRIP_SHARE = 1.0, 0.05
 _FIXED_LOOKS, _FIXED_SAME, _MOST = 8, 0.8, 0.5
-_FEATURES, _FEATURE_CONTRAST, _RATIO = 800, 0.02, 0.8
+_FEATURES, _FEATURE_CONTRAST, _RATIO = 800, 0.02, 0.7
 _EPIPOLAR_PX, _SURE, _TRIES = 1.5, 0.999, 500
 
 Grey = UInt8[np.ndarray, "h w"]
@@ -45,13 +45,14 @@ class Likeness:
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self.share = cache(self._share)
         self.matches = cache(self._matches)
+        self.thumbnail = cache(self._thumbnail)
         self._features = cache(self._extract)
 
     def shows_nothing(self, frame: int) -> bool:
-        """Whether a frame is of one colour."""
+        """Whether there is no texture in a frame: it is black, or of one colour."""
         return self._blank[frame]
 
-    def thumbnail(self, frame: int) -> Float[np.ndarray, "h w"]:
+    def _thumbnail(self, frame: int) -> Float[np.ndarray, "h w"]:
         """A frame of 40 columns, in grey levels."""
         return _shrunk(self._frames[frame], _FLOW_WIDTH_PX // 4).astype(np.float64)
 
@@ -86,19 +87,20 @@ class Likeness:
     def _matches(self, first: int, second: int) -> int:
         """Number of features of two frames that one motion of the camera explains.
 
-        Dearer than ``share``, and finds what has moved far. Pictures of two places have 9 in the median, by
-        chance, and 15 or less in 99 of 100 pairs.
+        Dearer than ``share``, and finds what has moved far. Of 582 pairs of pictures of two places none had
+        more than 8, by chance; of frames of one drive 1 s apart 85 of 100 had.
         """
         (here, said), (there, heard) = self._features(first), self._features(second)
         if min(len(here), len(there)) < 8:
             return 0
-        near = cv2.BFMatcher(cv2.NORM_L2).knnMatch(said, heard, k=2)
-        pairs = [one for one, other in near if one.distance < _RATIO * other.distance]
-        if len(pairs) < 8:
+        chosen = _mutual(said, heard)
+        pair = np.flatnonzero(chosen >= 0)
+        if len(pair) < 8:
             return 0
-        a, b = here[[pair.queryIdx for pair in pairs]], there[[pair.trainIdx for pair in pairs]]
         cv2.setRNGSeed(0)
-        agree = cv2.findFundamentalMat(a, b, cv2.FM_RANSAC, _EPIPOLAR_PX, _SURE, _TRIES)[1]
+        agree = cv2.findFundamentalMat(
+            here[pair], there[chosen[pair]], cv2.FM_RANSAC, _EPIPOLAR_PX, _SURE, _TRIES
+        )[1]
         return 0 if agree is None else int(agree.sum())  # pyright: ignore[reportUnnecessaryComparison]
 
     def _extract(self, frame: int) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n d"]]:
@@ -107,6 +109,16 @@ class Likeness:
         sift = cv2.SIFT.create(nfeatures=_FEATURES, contrastThreshold=_FEATURE_CONTRAST)
         found, descriptors = sift.detectAndCompute(grey, usable)
         return np.array([point.pt for point in found], np.float32).reshape(-1, 2), descriptors
+
+
+def _mutual(said: Float[np.ndarray, "n d"], heard: Float[np.ndarray, "m d"]) -> Int[np.ndarray, " n"]:
+    """Index of the descriptor that each is clearly nearest to, and that is nearest to it; -1 for none."""
+    apart = (said**2).sum(1)[:, None] + (heard**2).sum(1) - 2 * said @ heard.T
+    row, best = np.arange(len(said)), apart.argmin(axis=1)
+    mutual = apart.argmin(axis=0)[best] == row
+    nearest = apart[row, best]
+    apart[row, best] = np.inf
+    return np.where(mutual & (nearest < _RATIO**2 * apart.min(axis=1)), best, -1)
 
 
 def _shrunk(frame: UInt8[np.ndarray, "h w 3"], width: int) -> UInt8[np.ndarray, "h2 w2"]:

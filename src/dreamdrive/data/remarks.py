@@ -60,7 +60,7 @@ def of_cuts(found: Found, index: Int[np.ndarray, " f"]) -> list[str]:
         notes.append(_of_cuts(found.cuts, index))
     if found.blank and len(found.blank) < len(index):
         which = runs(index[list(found.blank)].tolist())
-        notes.append(f"{_frames(found.blank, which, 'shows', 'show')} nothing but one colour.")
+        notes.append(f"{_frames(found.blank, which, 'shows', 'show')} nothing that could be recognised.")
     if found.strange:
         which = runs(index[list(found.strange)].tolist())
         what = "has", "have"
