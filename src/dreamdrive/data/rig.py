@@ -161,6 +161,7 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
         source_index=parts[0].source_index[row],
         known=known,
         requested=parts[0].requested,
+        cuts=tuple(sorted(step * count + p for p, each in enumerate(parts) for step in each.cuts)),
         provenance={
             **parts[0].provenance,
             "input": str(path),

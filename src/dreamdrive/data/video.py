@@ -90,11 +90,13 @@ class Video:
         Raises:
             InputError: The file ends or breaks off before the last wanted frame.
         """
-        index, first_s = -1, None
+        index, first_s, damaged = -1, None, False
         for index, frame in enumerate(self._decode(wanted)):
             first_s = _time_s(frame) if index == 0 else first_s
+            # Only the frame that could not be read is marked; those that refer to it are as bad.
+            damaged = frame.is_corrupt or (damaged and not frame.key_frame)
             if index in wanted:
-                yield _raw(frame, index, first_s)
+                yield _raw(frame, index, first_s, damaged)
             if index >= wanted[-1]:
                 return
         if index < 0:
@@ -145,18 +147,16 @@ def _pictures(container: InputContainer, path: Path) -> VideoStream:
     raise InputError(f"{path} holds no picture track; expected a video")
 
 
-def _raw(frame: VideoFrame, index: int, first_s: float | None) -> RawFrame:
+def _raw(frame: VideoFrame, index: int, first_s: float | None, damaged: bool) -> RawFrame:
     rgb = frame.to_ndarray(format="rgb24")
     quarters = round(frame.rotation / 90) % 4
     notes: list[str] = []
-    if frame.is_corrupt:
-        notes.append(f"Frame {index} of the video is damaged.")
     if quarters:
         rgb = np.ascontiguousarray(np.rot90(rgb, quarters))
         notes.append("The video is turned upright as its header asks.")
     now_s = _time_s(frame)
     time_s = None if now_s is None or first_s is None else now_s - first_s
-    return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes))
+    return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes), damaged)
 
 
 def _time_s(frame: VideoFrame) -> float | None:

@@ -54,6 +54,7 @@ class Clip:
         latents: What the frames were decoded from, for priors with a latent space (F, h, w, C).
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
+        cuts: Index of each first frame of its camera after a change to another scene.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
             of sentences for the report.
     """
@@ -69,6 +70,7 @@ class Clip:
     latents: Float[np.ndarray, "f _ _ _"] | None = None
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
+    cuts: tuple[int, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -76,6 +78,8 @@ class Clip:
         for name in ("times_s", "camera", "valid", "held_out", "source_index"):
             if len(getattr(self, name)) != count:
                 raise ValueError(f"clip: {name} has {len(getattr(self, name))} entries for {count} frames")
+        if not all(0 < cut < count for cut in self.cuts):
+            raise ValueError(f"clip: cuts {self.cuts} are not all inside its {count} frames")
         if count and not 0 <= int(self.camera.min()) <= int(self.camera.max()) < len(self.rig):
             raise ValueError("clip: camera indexes beyond the rig")
 
@@ -118,6 +122,7 @@ class Clip:
             source_index=self.source_index[rows],
             features={name: values[rows] for name, values in self.features.items()},
             latents=None if self.latents is None else self.latents[rows],
+            cuts=tuple(np.flatnonzero(np.isin(rows, self.cuts)).tolist()),
             known=replace(
                 known,
                 world_from_camera=None if known.world_from_camera is None else known.world_from_camera[rows],
