@@ -125,18 +125,21 @@ def test_farther_aside_the_share_is_said(wall: Scene, caplog: pytest.LogCaptureF
     caplog.set_level(logging.WARNING)
     share = share_seen(wall, drives_of(wall, ["shift"], 5.0, None)[0].path)
     assert caplog.messages == [
-        f"--shift-m 5 goes 5 m from the recorded path and sees {share:.0%} of what is near there; beyond "
+        f"--shift-m 5 goes 5 m from the recorded path and sees {share:.0%} of what is seen there; beyond "
         "about a lane's width (3.5 m) expect gaps and torn shapes"
     ]
 
 
+NOTHING_SEEN = (
+    "from the recorded path and sees 0% of what is seen there; expected a drive up to about a lane's width "
+    "(3.5 m) aside, looking the same way; a file's poses are in the world of the first recorded camera: x "
+    "right, y down, z forward, metres"
+)
+
+
 @pytest.mark.parametrize("right_m", [50.0, -1e6])
 def test_where_nothing_is_seen_a_drive_is_refused(wall: Scene, tmp_path: Path, right_m: float) -> None:
-    said = (
-        f"goes {abs(right_m):.3g} m from the recorded path and sees 0% of what is near there; expected a "
-        "drive near the recorded one, in the world of its first camera (x right, y down, z forward, metres): "
-        "up to about a lane's width (3.5 m) aside is sensible"
-    )
+    said = f"goes {abs(right_m):.3g} m {NOTHING_SEEN}"
     with pytest.raises(InputError) as error:
         drives_of(wall, ["stop", "shift"], right_m, None)
     assert str(error.value) == f"--shift-m {right_m:g} {said}"
@@ -145,3 +148,12 @@ def test_where_nothing_is_seen_a_drive_is_refused(wall: Scene, tmp_path: Path, r
     with pytest.raises(InputError) as error:
         drives_of(wall, [str(file)], 2.0, None)
     assert str(error.value) == f"--trajectory {file} {said}"
+
+
+def test_a_file_that_looks_elsewhere_is_refused(wall: Scene, tmp_path: Path) -> None:
+    back, file = ahead(5), tmp_path / "back.json"
+    back[:, :3, :3] = np.diag([-1.0, 1.0, -1.0])
+    write_trajectory(Trajectory(back, np.arange(5) / 10), file)
+    with pytest.raises(InputError) as error:
+        drives_of(wall, [str(file)], 2.0, None)
+    assert str(error.value) == f"--trajectory {file} goes 0 m {NOTHING_SEEN}"
