@@ -114,9 +114,9 @@ def _check_seen(seen: float, away_m: float, option: str) -> None:
     where = f"{option} goes {away_m:.3g} m from the recorded path and sees {seen:.0%} of what is seen there"
     if seen < LEAST_SEEN:
         raise InputError(
-            f"{where}; expected a drive up to about a lane's width ({LANE_M:g} m) aside, looking the "
-            "same way; a file's poses are in the world of the first recorded camera: x right, y down, z forward, "
-            "metres"
+            f"{where}; expected a drive up to about a lane's width ({LANE_M:g} m) aside, looking the same "
+            "way; a file's poses are in the world of the first recorded camera: x right, y down, z "
+            "forward, metres"
         )
     if away_m > _ASIDE_M:
         _log.warning("%s; beyond about a lane's width (%g m) expect gaps and torn shapes", where, LANE_M)
