@@ -40,8 +40,8 @@ def test_a_cut_beside_an_end_is_found(before, after, first):
     assert [cut.first for cut in find(A[:before], B[:after]).cuts] == [first]
 
 
-def test_two_frames_tell_nothing():
-    assert find(A[:1], B[:1]) == Found()
+def test_two_frames_tell_no_cut():
+    assert find(A[:1], B[:1]) == Found(apart=True)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -71,7 +71,9 @@ def test_light_is_no_cut():
 
 
 def test_frames_that_have_little_in_common_throughout_tell_nothing():
-    assert find(*(approach(seed, 1) for seed in range(8))).cuts == ()
+    found = find(*(approach(seed, 1) for seed in range(8)))
+    assert found.cuts == ()
+    assert found.apart
 
 
 def test_what_is_fixed_to_the_camera_does_not_hide_a_cut():

@@ -53,6 +53,14 @@ def test_blank_and_strange_frames_are_named():
     ]
 
 
+def test_frames_without_any_motion_between_them_are_named():
+    assert of_cuts(Found(apart=True, blank=(0, 1, 2)), np.arange(3)) == [
+        "Most frames have nothing in common with the next one, and no motion can be seen between them; "
+        "choose a smaller step with --frames if this is one drive.",
+        "No frame shows anything that could be recognised.",
+    ]
+
+
 def names(numbers, form="{:04d}.png"):
     return [PurePath(form.format(number)) for number in numbers]
 

@@ -7,8 +7,10 @@ import av
 import numpy as np
 import pytest
 from av.stream import Disposition
+from tests.data.pictures import approach
 
 from dreamdrive.data import video
+from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
@@ -104,6 +106,31 @@ def test_a_phone_held_upright_gives_upright_frames(make_video, matrix, quarters)
     frame = next(Video.open(path).read(ALL))
     np.testing.assert_array_equal(frame.rgb, np.rot90(plain, quarters))
     assert "upright" in frame.notes[0]
+
+
+def test_frames_that_the_decoder_patched_up_are_marked_up_to_the_next_key_frame(tmp_path):
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w") as container:
+        options = {"g": "10", "bf": "0", "crf": "20", "sc_threshold": "0", "preset": "veryfast"}
+        stream = container.add_stream("libx264", rate=20, options=options)
+        stream.width, stream.height, stream.pix_fmt = 160, 96, "yuv420p"
+        for picture in approach(count=30):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    assert not any(frame.damaged for frame in Video.open(path).read(ALL))
+    with av.open(str(path)) as container:
+        places = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(path.read_bytes())
+    start, size = places[13]
+    rubbish = np.random.default_rng(0).integers(0, 256, size // 2, dtype=np.uint8).tobytes()
+    data[start + size // 4 : start + size // 4 + len(rubbish)] = rubbish
+    path.write_bytes(data)
+    assert [frame.index for frame in Video.open(path).read(ALL) if frame.damaged] == list(range(13, 20))
+    said = (
+        "Frames 13 to 19 of the video are damaged, or built upon damaged ones, and patched up by the decoder."
+    )
+    assert said in read_clip(path).provenance["notes"]
+    assert said.replace("13 to 19", "14, 16 and 18") in read_clip(path, frames="0:30:2").provenance["notes"]
 
 
 def test_golden_a_real_video_has_the_frames_its_notes_say(data_dir):

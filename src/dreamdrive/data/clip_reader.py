@@ -28,6 +28,8 @@ from dreamdrive.scene.trajectory import Trajectory
 
 FOLDER_RATE_HZ = 10.0
 """Rate at which the images of a folder count unless told."""
+BLACK, BLACK_SPREAD = 16.0, 4.0
+"""Grey levels: mean and standard deviation below which frames show nothing."""
 MAX_FRAMES = 1000
 """Frames a clip may have: all are in memory, 0.4 MB each at 480x270, and every stage adds its own."""
 
@@ -91,6 +93,7 @@ def read_clip(
             f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
         )
     frames_rgb = np.stack(picked.frames)
+    _check_pictures(frames_rgb, valid, path)
     found = find_cuts(frames_rgb, valid)
     notes += [*of_damage(picked.damaged), *_gaps(source, index, picked.times_s, fps), *of_cuts(found, index)]
     sampler = picked.sampler
@@ -232,6 +235,18 @@ def _times(
     return index / source.rate_hz, (
         f"The video's own times are unusable: its frames count as {source.rate_hz:g} Hz.",
     )
+
+
+def _check_pictures(
+    frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"], path: Path
+) -> None:
+    """Refuse a recording of nothing: a lens cap, a camera that failed."""
+    shown = (frame[where] for frame, where in zip(frames, valid, strict=True) if where.any())
+    if all(pixels.mean() < BLACK and pixels.std() < BLACK_SPREAD for pixels in shown):
+        raise InputError(
+            f"{path}: every selected frame is black; expected pictures of a street, choose others with "
+            "--frames"
+        )
 
 
 def _gaps(

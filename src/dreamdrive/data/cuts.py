@@ -40,11 +40,13 @@ class Found:
         cuts: Changes to another scene, in the order of time.
         blank: Frames without any texture, such as black ones.
         strange: Single frames that have nothing in common with those around them, which show one scene.
+        apart: Whether most frames have nothing in common with the next one, so that no cut can be told.
     """
 
     cuts: tuple[Cut, ...] = ()
     blank: tuple[int, ...] = ()
     strange: tuple[int, ...] = ()
+    apart: bool = False
 
 
 def find_cuts(frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"]) -> Found:
@@ -66,7 +68,7 @@ def find_cuts(frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h
         found = search.cut_behind(start)
         if found is not None and (not cuts or found.last >= cuts[-1].first):
             cuts.append(found)
-    return Found(tuple(cuts), blank, search.strange())
+    return Found(tuple(cuts), blank, search.strange(), search.apart())
 
 
 class _Search:
@@ -83,13 +85,20 @@ class _Search:
                 return Cut(self.shown[start], self.shown[end])
         return None
 
+    def apart(self) -> bool:
+        """Whether most frames have nothing in common with the next."""
+        lonely = [k for k, share in enumerate(self.shares) if share < SHARED]
+        if 2 * len(lonely) <= len(self.shares):
+            return False
+        return 2 * sum(not self._shared(k, k + 1) for k in lonely) > len(self.shares)
+
     def strange(self) -> tuple[int, ...]:
         """Single frames without anything in common with the frames around them."""
         return tuple(
             self.shown[k]
             for k in range(1, len(self.shown) - 1)
             if max(self.shares[k - 1 : k + 1]) < SHARED
-            and self._shared(k - 1, k + 1)
+            and self._close(k - 1, k + 1)
             and not self._shared(k - 1, k)
             and not self._shared(k, k + 1)
         )

@@ -108,6 +108,8 @@ class Likeness:
         usable = cv2.resize(self._usable.astype(np.uint8), grey.shape[::-1], interpolation=cv2.INTER_NEAREST)
         sift = cv2.SIFT.create(nfeatures=_FEATURES, contrastThreshold=_FEATURE_CONTRAST)
         found, descriptors = sift.detectAndCompute(grey, usable)
+        if not found:  # the descriptors are then None
+            return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
         return np.array([point.pt for point in found], np.float32).reshape(-1, 2), descriptors
 
 

@@ -58,7 +58,14 @@ def of_cuts(found: Found, index: Int[np.ndarray, " f"]) -> list[str]:
     notes: list[str] = []
     if found.cuts:
         notes.append(_of_cuts(found.cuts, index))
-    if found.blank and len(found.blank) < len(index):
+    if found.apart:
+        notes.append(
+            "Most frames have nothing in common with the next one, and no motion can be seen between them; "
+            "choose a smaller step with --frames if this is one drive."
+        )
+    if len(found.blank) == len(index):
+        notes.append("No frame shows anything that could be recognised.")
+    elif found.blank:
         which = runs(index[list(found.blank)].tolist())
         notes.append(f"{_frames(found.blank, which, 'shows', 'show')} nothing that could be recognised.")
     if found.strange:
