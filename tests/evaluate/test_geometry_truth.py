@@ -168,7 +168,8 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no size": (
         lambda folder: (recording(folder) / "meta.json").write_text("{}"),
-        "--truth PLACE/meta.json is unusable (KeyError('width')); expected JSON with width, height and, "
+        "--truth PLACE/meta.json is unusable (calibration: Object missing required field `width`); expected "
+        "JSON with width, height and, "
         'where known, intrinsics {"fx", "fy", "cx", "cy"} in pixels',
     ),
     "no depth in a file": (
@@ -199,12 +200,14 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no matrix": (
         lambda folder: edit(pandaset(folder) / "cameras.json", '"K"', '"k"'),
-        "--truth PLACE/cameras.json: side_camera has no usable width, height and K (KeyError('K')); expected "
+        "--truth PLACE/cameras.json: side_camera has no usable width, height and K (calibration: "
+        "Object missing required field `K`); expected "
         "pixels and a 3x3 matrix",
     ),
     "boxes without a place": (
         lambda folder: edit(pandaset(folder) / "cuboids.json", "position", "place"),
-        "--truth PLACE/cuboids.json is damaged (KeyError('position')); expected frames, each a list of boxes "
+        "--truth PLACE/cuboids.json is damaged (cuboids: Object missing required field "
+        "`position` - at `$.frames[5][0]`); expected frames, each a list of boxes "
         "with motion, position, size_wlh and yaw: take it away to do without what moves",
     ),
 }

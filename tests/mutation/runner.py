@@ -102,7 +102,8 @@ def _in_child(wanted: Sequence[Case], place: Path) -> list[Outcome]:
     if len(done) < len(wanted):
         code = os.waitstatus_to_exitcode(status)
         end = signal.Signals(-code).name if code < 0 else f"exit {code}"
-        words = trace.read_text(errors="replace")[-3000:]
+        words = trace.read_text(errors="replace")
+        words = words[words.find("Timeout (") :][:1500] if "Timeout (" in words else words[-1500:]
         done.append(Outcome(wanted[len(done)], "wrong", said=f"the process ended ({end}): {words}"))
     return done
 

@@ -19,6 +19,7 @@ from dreamdrive.geometry.dust3r.network.config import config_from_call, config_f
 from dreamdrive.geometry.files import attach, bent_model
 from dreamdrive.geometry.files.formats import companions
 from dreamdrive.scene.action import check_action
+from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.files import read_text
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
 from tests.geometry.dust3r.network.test_config import CALL, HUB
@@ -36,7 +37,6 @@ _META = {
     "distortion": {"model": "opencv k1 k2 p1 p2 k3", "coefficients": [0.1, 0.01, 0, 0, 0]},
 }
 _KITTI = "\n".join(" ".join(map(repr, pose[:3].ravel().tolist())) for pose in _TRUTH) + "\n"
-_FAR_M = 1e6
 
 
 def _json(name: str, content: object) -> Callable[[Path], object]:
@@ -46,7 +46,7 @@ def _json(name: str, content: object) -> Callable[[Path], object]:
 def _poses(path: Path, camera: str | None = None) -> None:
     rows = read_pose_file(path, "--poses", camera)
     assert np.isfinite(rows.world_from_camera).all()
-    assert np.abs(rows.world_from_camera[:, :3, 3]).max() <= _FAR_M
+    assert np.abs(rows.world_from_camera[:, :3, 3]).max() <= FARTHEST_M
     read_poses(path, camera or "", np.array([0, 2]), np.array([0.0, 0.2]), lambda: 4)
 
 
@@ -58,7 +58,7 @@ def _attached(folder: Path) -> None:
     known = attach(clip, folder / "model").known
     assert known.world_from_camera is not None
     assert np.isfinite(known.world_from_camera).all()
-    assert np.abs(known.world_from_camera[:, :3, 3]).max() <= 2 * _FAR_M
+    assert np.abs(known.world_from_camera[:, :3, 3]).max() <= 2 * FARTHEST_M
     assert known.depth_m is None or np.isfinite(known.depth_m).all()
 
 

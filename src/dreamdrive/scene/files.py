@@ -74,7 +74,8 @@ def read_bytes(path: Path, where: str = "", *, at_most: int, follow: bool = True
         if size > at_most:
             raise InputError(f"{where} holds {size / 1e6:.1f} MB; expected at most {at_most / 1e6:.0f} MB")
         try:
-            return file.read(at_most)
+            # Not ``at_most``: so much memory would be taken, however short the file.
+            return file.read(size)
         except OSError as error:
             raise InputError(f"{where} cannot be read: {error.strerror}") from error
 
