@@ -65,6 +65,14 @@ def test_a_header_cut_short_is_none(make):
     assert parse_header(data[:10]) is None or make is jpeg
 
 
+def test_a_part_of_a_png_that_claims_more_than_the_file_is_none():
+    """OpenCV takes memory for as much as it claims."""
+    data = bytearray(png(70, 48))
+    at = data.index(b"IDAT") - 4
+    data[at : at + 4] = struct.pack(">I", 2**31 - 1)
+    assert parse_header(bytes(data)) is None
+
+
 def test_other_kinds_are_none():
     for data in (b"", b"GIF89a" + bytes(40), b"P6 10 10 255 " + bytes(300), b"\x89PNG\r\n\x1a\n" + bytes(30)):
         assert parse_header(data) is None

@@ -216,3 +216,13 @@ def test_a_cover_is_no_video(tmp_path):
         container.mux(sound.encode())
     with pytest.raises(InputError, match="holds no picture track"):
         Video.open(path)
+
+
+def test_pictures_of_an_unknown_kind_are_refused(make_video):
+    path = make_video(3)
+    path.write_bytes(path.read_bytes().replace(b"avc1", b"xyz9"))
+    with pytest.raises(InputError) as caught:
+        Video.open(path)
+    assert str(caught.value) == (
+        f"{path} holds pictures of a kind that cannot be decoded; expected H.264 or the like"
+    )

@@ -144,7 +144,8 @@ def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
         shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
     except (OSError, SafetensorError) as error:
         raise InputError(
-            f"{path} is no .safetensors or is cut short ({briefly(error)}); copy it again, expected {EXPECTED}"
+            f"{path} is no .safetensors or is cut short ({briefly(error)}); copy it again, expected "
+            f"{EXPECTED}"
         ) from None
 
     def read(key: str) -> Tensor:
