@@ -136,6 +136,11 @@ def test_an_archive_of_countless_parts_is_refused(tmp_path: Path, monkeypatch: p
     assert refusal(saved(tmp_path)) == DAMAGED.format("; it holds more parts than weights have")
 
 
+def test_an_archive_of_endless_values_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(weights, "_PICKLE_BYTES", 100)
+    assert refusal(saved(tmp_path)) == DAMAGED.format("; it holds more plain values than weights have")
+
+
 def test_a_pipe_is_no_weights(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "w.pth")
     assert refusal(tmp_path / "w.pth") == "FILE does not exist or is no file; expected small.pth"

@@ -25,6 +25,8 @@ from dreamdrive.scene.zip_file import directory_bytes
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4
+_PICKLE_BYTES = 4_000_000
+"""Most that ``torch.save`` may have written beside the tensors; 1000 tensors take 0.1 MB."""
 _WIDEST, _DEEPEST = 65_536, 1000
 """Largest number that a configuration of a network may hold, and of what counts layers."""
 _LAYERS = re.compile("layers|depth|blocks_num|num_blocks")
@@ -233,6 +235,8 @@ def _check_archive(path: Path) -> None:
     # TorchScript is compressed in part, and refused without being unpacked.
     script = any(part.filename.endswith("/constants.pkl") for part in parts)
     packed = any(part.compress_type != zipfile.ZIP_STORED for part in parts)
+    if any(part.filename.endswith("/data.pkl") and part.file_size > _PICKLE_BYTES for part in parts):
+        raise zipfile.BadZipFile("it holds more plain values than weights have")
     if not script and (packed or sum(part.file_size for part in parts) > size):
         raise zipfile.BadZipFile("it is compressed, as torch.save never does")
 

@@ -14,6 +14,7 @@ from jaxtyping import Shaped, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.files import open_file
+from dreamdrive.scene.tensor_file import briefly
 from dreamdrive.scene.zip_file import directory_bytes
 
 ARRAY_BYTES = 256_000_000
@@ -57,7 +58,7 @@ def read_npz(path: Path, names: Sequence[str], *, at_most: int = ARRAY_BYTES) ->
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         except (*_DAMAGE, zipfile.BadZipFile) as error:
-            raise InputError(f"{path} cannot be read as an npz ({error})") from error
+            raise InputError(f"{path} cannot be read as an npz ({briefly(error)})") from error
 
 
 def read_npy(path: Path, *, at_most: int = ARRAY_BYTES) -> Shaped[np.ndarray, "*d"]:
@@ -76,7 +77,7 @@ def read_npy(path: Path, *, at_most: int = ARRAY_BYTES) -> Shaped[np.ndarray, "*
         except InputError as error:
             raise InputError(f"{path}: the array {error}") from None
         except _DAMAGE as error:
-            raise InputError(f"{path} cannot be read as an npy ({error})") from error
+            raise InputError(f"{path} cannot be read as an npy ({briefly(error)})") from error
 
 
 def _members(archive: zipfile.ZipFile, names: Sequence[str], at_most: int) -> dict[str, np.ndarray]:

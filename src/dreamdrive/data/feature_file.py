@@ -25,8 +25,8 @@ from dreamdrive.scene.tensor_file import briefly, header_problem
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
-FEATURE_BYTES = 2_000_000_000
-"""Largest file: 1000 frames at an eighth of 480x270 with all channels that are allowed take half of it."""
+FEATURE_BYTES = 600_000_000
+"""Largest file: 1000 frames at an eighth of 480x270 in half precision, with as many channels as may be."""
 INDEX = "frame_index"
 """Where the provenance may list the frames of the input that the rows are of."""
 _KEY = "provenance"

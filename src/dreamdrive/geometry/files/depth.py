@@ -11,15 +11,17 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from dreamdrive.data.array_file import read_npy, read_npz
-from dreamdrive.data.picture_file import MAX_PIXELS, read_picture
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import NAME, Declared
 from dreamdrive.geometry.files.given import DepthFiles
-from dreamdrive.scene.files import check_file
+from dreamdrive.scene.files import check_file, is_path
+from dreamdrive.scene.tensor_file import briefly
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
 _EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R")
-_EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
+_EXR_NUMBERS = 32_000_000
+"""Numbers that an EXR may have over all its channels; its library holds them twice."""
 _MILLIMETRE, _KITTI_M = 0.001, 1 / 256
 
 
@@ -27,7 +29,9 @@ def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> Depth
     """The depth files in ``folder``, called like ``labels``, one label for each selected frame."""
     of: dict[int, Path] = {}
     for row, label in enumerate(labels):
-        found = next((path for end in ENDINGS if (path := folder / f"{label}{end}").is_file()), None)
+        # Pictures of a model may have any name, also one that no file has.
+        named = [folder / f"{label}{end}" for end in ENDINGS if is_path(f"{label}{end}")]
+        found = next((path for path in named if path.is_file()), None)
         if found is not None:
             of[row] = found
     return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit)
@@ -55,7 +59,7 @@ def read_depth(
     elif unit is None:
         unit, said = _usual_unit(path, stored, kitti)
     with np.errstate(over="ignore", invalid="ignore"):
-        depth = stored.astype(np.float32)
+        depth = stored.astype(np.float32, copy=not stored.flags.writeable)
         depth *= np.float32(unit)
     if not np.isfinite(depth).all() or (depth < 0).any():
         raise InputError(f"{path}: holds negative, NaN or infinite depth; write 0 where there is none")
@@ -104,34 +108,35 @@ def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
         ) from None
     check_file(path)
     try:
-        file = OpenEXR.InputFile(str(path))
-        try:
-            return _exr_channel(path, file), False
-        finally:
-            file.close()
-    except (OSError, RuntimeError, ValueError, TypeError, EOFError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: cannot be read as EXR ({error})") from error
-
-
-def _exr_channel(path: Path, file: Any) -> Shaped[np.ndarray, "h w"]:
-    """The channel with depth, read only where the header says that it fits into memory."""
-    header = file.header()
-    channels, window = header["channels"], header["dataWindow"]
+        with OpenEXR.File(str(path), header_only=True) as file:
+            _check_exr(path, file)
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels: dict[str, Any] = {name: each.pixels for name, each in file.channels().items()}
+    except InputError:
+        raise
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
+        raise InputError(f"{path}: cannot be read as EXR ({briefly(error)})") from error
     name = next((name for name in _EXR_CHANNELS if name in channels), None)
     if name is None and len(channels) == 1:
         name = next(iter(channels))
     if name is None:
-        raise InputError(f"{path}: has the channels {', '.join(channels)}; expected Z, V, Y or a single one")
-    width, height = window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
-    if not 0 < width * height <= MAX_PIXELS:
+        named = briefly(", ".join(channels))
+        raise InputError(f"{path}: has the channels {named}; expected Z, V, Y or a single one")
+    return np.asarray(channels[name]), False
+
+
+def _check_exr(path: Path, file: Any) -> None:
+    """Whether the header of an EXR says that it fits into memory."""
+    numbers = 0
+    for part in file.parts:
+        low, high = part.header["dataWindow"]
+        width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
+        numbers += max(width, 0) * max(height, 0) * len(part.header["channels"])
+    if numbers > _EXR_NUMBERS:
         raise InputError(
-            f"{path}: is an image of {width}x{height} pixels; expected at most {MAX_PIXELS // 10**6} "
-            "megapixels"
+            f"{path}: states {numbers / 1e6:.0f} million numbers; expected at most "
+            f"{_EXR_NUMBERS // 10**6} million"
         )
-    dtype = _EXR_TYPES[str(channels[name].type)]
-    return np.frombuffer(file.channel(name), dtype).reshape(height, width)
 
 
 _READERS = {".npz": _read_npz, ".npy": _read_npy, ".exr": _read_exr, ".png": _read_png}
