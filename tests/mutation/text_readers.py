@@ -18,13 +18,16 @@ from dreamdrive.evaluate.geometry_truth import read_geometry_truth
 from dreamdrive.geometry.dust3r.network.config import config_from_call, config_from_json
 from dreamdrive.geometry.files import attach, bent_model
 from dreamdrive.geometry.files.formats import companions
+from dreamdrive.prior.magicdrive.config import read_settings
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.files import read_text
+from dreamdrive.scene.json_file import read_json
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
 from tests.geometry.dust3r.network.test_config import CALL, HUB
 from tests.geometry.files import drives
 from tests.mutation.reader import Reader
+from tests.prior.magicdrive.tiny import official_configs
 from tests.streets import small_street
 
 _NAMES = [f"{i:04d}.jpg" for i in range(4)]
@@ -132,6 +135,11 @@ def _layout(folder: Path) -> None:
     write_layout(small_street(frames=2, size=(24, 16), parked=1).layout, folder / "layout.json")
 
 
+def _magicdrive(folder: Path) -> None:
+    for name, content in zip(("unet", "controlnet"), official_configs(temporal=True), strict=True):
+        drives.write_json(folder / f"{name}.json", content)
+
+
 def _action(folder: Path) -> None:
     for line in read_text(folder / "actions.txt").split("\n"):
         check_action(parse_action(line))
@@ -186,6 +194,12 @@ TEXT: tuple[Reader, ...] = (
         "dust3r-call",
         lambda f: (f / "call.txt").write_text(CALL),
         lambda f: config_from_call(read_text(f / "call.txt"), str(f / "call.txt")),
+    ),
+    Reader(
+        "magicdrive-config",
+        _magicdrive,
+        lambda f: read_settings(read_json(f / "unet.json"), read_json(f / "controlnet.json")),
+        names_file=False,
     ),
     Reader(
         "action",

@@ -129,6 +129,8 @@ def read_colmap(folder: Path) -> Any:
     model = pycolmap.Reconstruction()
     try:
         (model.read_binary if ending == ".bin" else model.read_text)(str(folder))
+        for image in model.images.values():
+            str(image.name)  # which it decodes here
     except (ValueError, IndexError, KeyError, RuntimeError, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{folder}: the COLMAP model is damaged ({reason}); export it again") from error

@@ -15,7 +15,7 @@ from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import NAME, Declared
 from dreamdrive.geometry.files.given import DepthFiles
-from dreamdrive.scene.files import check_file
+from dreamdrive.scene.files import check_file, is_path
 from dreamdrive.scene.tensor_file import briefly
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
@@ -29,7 +29,9 @@ def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> Depth
     """The depth files in ``folder``, called like ``labels``, one label for each selected frame."""
     of: dict[int, Path] = {}
     for row, label in enumerate(labels):
-        found = next((path for end in ENDINGS if (path := folder / f"{label}{end}").is_file()), None)
+        # Pictures of a model may have any name, also one that no file has.
+        named = [folder / f"{label}{end}" for end in ENDINGS if is_path(f"{label}{end}")]
+        found = next((path for path in named if path.is_file()), None)
         if found is not None:
             of[row] = found
     return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit)

@@ -22,10 +22,10 @@ from dreamdrive.geometry.files.depth import ENDINGS
 from dreamdrive.geometry.files.given import DepthFiles, Given
 from dreamdrive.geometry.files.json_record import read_record
 from dreamdrive.geometry.files.wanted import Wanted
+from dreamdrive.scene.files import is_path
 
 _OURS_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 _USUAL_FACTOR = 1e-3
-_LONGEST_NAME = 1024
 
 
 def read_transforms(path: Path, wanted: Wanted) -> Given:
@@ -64,9 +64,9 @@ def depth_files(path: Path) -> list[Path]:
 
 def _beside(path: Path, name: object) -> Path:
     """The file that a name means, which counts from the folder of ``path``."""
-    if not isinstance(name, str) or "\0" in name or len(name) > _LONGEST_NAME:
+    if not is_path(name):
         raise InputError(f"{path}: depth_file_path {name!r} is no name of a file")
-    return path.parent / name
+    return path.parent / str(name)
 
 
 def _poses(frames: list[dict[str, Any]], path: Path) -> Float[np.ndarray, "f 4 4"]:
