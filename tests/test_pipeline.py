@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import Control, InputError, codec, generate, load_scene, options, pipeline
+from dreamdrive import Control, InputError, Outcome, codec, generate, load_scene, options, pipeline
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, StaticFit
 from dreamdrive.geometry import reconstruct
@@ -38,7 +38,7 @@ def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     shorten(monkeypatch)
 
 
-def make(out: Path, control: Control = TINY, **changes: object) -> bool:
+def make(out: Path, control: Control = TINY, **changes: object) -> Outcome:
     settings: dict[str, object] = {"prior": "street-world", "quality": "draft", **changes}
     return generate(control, out, **settings)  # type: ignore[arg-type]
 
@@ -53,7 +53,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("pipeline") / "out"
     with pytest.MonkeyPatch.context() as patch:
         shorten(patch)
-        assert make(out)
+        assert not make(out).already_finished
     return out
 
 
@@ -61,12 +61,13 @@ def test_features_and_paths_count_by_their_content(tmp_path: Path, monkeypatch: 
     """Not by their names: another file of the same name makes the prior run again."""
     requests: list[dict[str, dict[str, str]]] = []
     monkeypatch.setattr(pipeline, "open_workspace", lambda out, request, **_: requests.append(request))
+    monkeypatch.setattr(pipeline, "read_outcome", lambda path, already_finished: already_finished)
     files = {name: tmp_path / f"{name}.file" for name in ("features", "trajectory")}
     control = Control(tmp_path, frames="0:2", **files)
     for text in ("one", "other"):
         for path in files.values():
             path.write_text(text)
-        assert not generate(control, tmp_path / "out")
+        assert generate(control, tmp_path / "out")
     first, second = (request["digests"] for request in requests)
     assert all(first[name] != second[name] for name in files)
     files["features"].unlink()
@@ -106,7 +107,7 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
         assert record["peak_rss_mb"] > 50
     scene = load_scene(finished / "scene")
     assert report["gaussians"] == {"static": len(scene.static), "dynamic": len(scene.dynamic)}
-    assert set(report["scale"]) == {"source", "spread", "others", "disagreement"}
+    assert set(report["scale"]) == {"source", "spread", "others", "basis", "disagreement"}
     assert set(report["focal"]) == {"px", "observed"}
     assert report["requested"] is None
     assert list(report["held_out"]) == ["2"]
@@ -114,11 +115,18 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
     assert set(report["baselines"]) == {"repeat_previous", "average_neighbours", "flow_interpolation"}
     assert "detected" in report
     assert "fallback" in report
+    assert report["rough"][0].startswith("there are only 6 frames. ")
+    assert [line.split()[0] for line in report["limits"]] == ["they", "views"]
+    assert cv2.imread(str(finished / "stages" / "first.png")) is not None
 
 
 def test_a_finished_output_is_left_alone(finished: Path) -> None:
     before = {p: p.stat().st_mtime_ns for p in finished.rglob("*")}
-    assert not make(finished)
+    outcome = make(finished)
+    assert outcome.already_finished
+    assert (outcome.frames, outcome.size, outcome.withheld) == (6, (64, 40), 1)
+    assert list(outcome.seconds) == [*STAGES, "videos"]
+    assert outcome.rough[0].startswith("there are only 6 frames. ")
     assert {p: p.stat().st_mtime_ns for p in finished.rglob("*")} == before
 
 
@@ -148,7 +156,9 @@ def test_a_killed_run_goes_on_to_the_same_bytes(
             make(tmp_path)
     assert not (tmp_path / "report.json").exists()
     seen: list[str] = []
-    assert make(tmp_path, progress=lambda stage, done, total: seen.append(stage) if total == 0 else None)
+    assert not make(
+        tmp_path, progress=lambda stage, done, total: seen.append(stage) if total == 0 else None
+    ).already_finished
     assert "prior" not in seen
     assert "geometry" not in seen
     assert scene_bytes(tmp_path) == scene_bytes(finished)
@@ -157,7 +167,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(
 @pytest.mark.slow
 def test_from_recomputes_and_gives_the_same_bytes(finished: Path, tmp_path: Path) -> None:
     make(tmp_path)
-    assert make(tmp_path, recompute_from="group")
+    assert not make(tmp_path, recompute_from="group").already_finished
     cached = {k: v["cached"] for k, v in json.loads((tmp_path / "report.json").read_text())["stages"].items()}
     assert [name for name in STAGES if not cached[name]] == ["group", "fit"]
     assert scene_bytes(tmp_path) == scene_bytes(finished)
@@ -206,7 +216,7 @@ def test_the_input_counts_by_its_content(tmp_path: Path) -> None:
         for i in range(3):
             cv2.imwrite(str(tmp_path / folder / f"{i}.png"), np.roll(picture, 2 * i, axis=1))
     make(tmp_path / "out", Control(tmp_path / "a", size=(64, 40)), prior="replay")
-    assert not make(tmp_path / "out", Control(tmp_path / "b", size=(64, 40)), prior="replay")
+    assert make(tmp_path / "out", Control(tmp_path / "b", size=(64, 40)), prior="replay")
     cv2.imwrite(str(tmp_path / "b" / "1.png"), picture)
     with pytest.raises(InputError, match="another input"):
         make(tmp_path / "out", Control(tmp_path / "b", size=(64, 40)), prior="replay")

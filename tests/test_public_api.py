@@ -21,6 +21,7 @@ PUBLIC = [
     "Gaussians",
     "Geometry",
     "InputError",
+    "Outcome",
     "Scene",
     "Trajectory",
     "generate",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dreamdrive.errors import InputError as InputError
     from dreamdrive.pipeline import generate as generate
+    from dreamdrive.run.outcome import Outcome as Outcome
     from dreamdrive.scene.camera import Camera as Camera
     from dreamdrive.scene.clip import Clip as Clip
     from dreamdrive.scene.control import Control as Control
@@ -27,6 +28,7 @@ _HOME = {
     "Gaussians": "dreamdrive.scene.gaussians",
     "Geometry": "dreamdrive.scene.geometry",
     "InputError": "dreamdrive.errors",
+    "Outcome": "dreamdrive.run.outcome",
     "Scene": "dreamdrive.scene.scene",
     "Trajectory": "dreamdrive.scene.trajectory",
     "generate": "dreamdrive.pipeline",

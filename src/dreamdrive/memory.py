@@ -1,9 +1,17 @@
-"""Where networks run, and how much memory is free there."""
+"""What this machine offers: cores, memory, and where networks run."""
 
+import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import torch
+
+
+def available_cores() -> int:
+    """Cores this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def best_device() -> "torch.device":

@@ -1,5 +1,6 @@
 """The paper's pipeline: prior, geometry, Gaussians, decomposition, joint fit; each stage kept on disk."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.hub import find_weights
+from dreamdrive.memory import available_cores, free_bytes
 from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
@@ -32,9 +34,12 @@ from dreamdrive.run.agreement import (
     check_seeds,
     check_static,
 )
+from dreamdrive.run.cost import announcement, check_memory, plan
 from dreamdrive.run.lock import only_run
+from dreamdrive.run.outcome import Outcome, outcome_of, read_outcome
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.files import inside
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
@@ -49,7 +54,13 @@ from dreamdrive.stages import (
     file_digest,
     stage_seed,
 )
-from dreamdrive.workspace import Workspace, check_writable, open_workspace
+from dreamdrive.workspace import REPORT, Workspace, check_writable, open_workspace
+
+Say = Callable[[str], None]
+"""Called with a sentence for somebody who waits."""
+
+FIRST_PICTURE = "first.png"
+"""In the folder of the stages: what the geometry shows, before anything is fitted."""
 
 _OF_GEOMETRY = ("geometry-files", "weights")
 
@@ -70,7 +81,8 @@ def generate(
     recompute_from: str | None = None,
     force: bool = False,
     progress: StageProgress = lambda stage, done, total: None,
-) -> bool:
+    say: Say = lambda sentence: None,
+) -> Outcome:
     """Make a scene, its videos and a report in the folder ``out``.
 
     An interrupted run goes on from its last finished stage when called again; the scene is byte-identical to
@@ -93,14 +105,16 @@ def generate(
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of another input or other options.
         progress: Told of every step of every stage.
+        say: Told what somebody who waits wants to know, a sentence each: what the run will cost, and where a
+            first picture lies.
 
     Returns:
-        False if ``out`` already held the finished result.
+        How the run ended, also where ``out`` already held the finished result.
 
     Raises:
-        InputError: The input, an option or ``out`` cannot be used.
+        InputError: The input, an option or ``out`` cannot be used, or memory cannot hold the clip.
     """
-    prior = prior or prior_of(control.path)
+    prior = prior or prior_of(control.path, weights is not None)
     control, network = _with_networks(control, prior, weights, geometry_weights)
     choose_prior(prior).check(control)
     backend_of(geometry_method, network)
@@ -128,10 +142,27 @@ def generate(
     with only_run(out):
         workspace = open_workspace(out, request, force=force, recompute=recompute)
         if workspace is None:
-            return False
+            return read_outcome(inside(out, REPORT), already_finished=True)
+        _announce(control, prior, quality, representation, say)
         stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
-        _publish(workspace, stages, control, _make(stages, control, geometry_files, network, request))
-        return True
+        made = _make(stages, control, geometry_files, network, request, say)
+        return outcome_of(_publish(workspace, stages, control, made), REPORT, already_finished=False)
+
+
+def _announce(
+    control: Control, prior: str, quality: QualityName, representation: Representation, say: Say
+) -> None:
+    """Say what the run will cost, where that is known before the frames are read.
+
+    Raises:
+        InputError: Memory cannot hold it.
+    """
+    planned = plan(control, prior)
+    if planned is None:
+        return
+    check_memory(planned, free_bytes())
+    for sentence in announcement(planned, quality, representation, available_cores()):
+        say(sentence)
 
 
 @dataclass(frozen=True)
@@ -150,6 +181,7 @@ def _make(
     geometry_files: Path | None,
     weights: Path | None,
     request: dict[str, Any],
+    say: Say,
 ) -> _Made:
     """The stages in their order, each with the results it depends on and the options that change it."""
     chosen, height_m = request["options"], request["options"]["camera_height_m"]
@@ -178,6 +210,10 @@ def _make(
         ),
         check=partial(check_geometry, clip),
     )
+    if not stages.records["geometry"].cached:
+        picture = inside(stages.folder, FIRST_PICTURE)
+        write_png(picture, draw_geometry(clip, geometry))
+        say(f"A first picture: the path, distances and what moves, in {picture}")
     seeds = stages.run(
         "initialise",
         ("prior", "geometry"),
@@ -312,8 +348,8 @@ def _fitted(
     return replace(scene, provenance=about)
 
 
-def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made) -> None:
-    """Put scene, videos, withheld frames and report into the output folder, all at once."""
+def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made) -> dict[str, Any]:
+    """Put scene, videos, withheld frames and report into the output folder, all at once; the report."""
     staging, clip, scene = workspace.fresh_staging(), made.clip, made.scene
     chosen = workspace.request["options"]
 
@@ -335,6 +371,7 @@ def _publish(workspace: Workspace, stages: Stages, control: Control, made: _Made
         score_baselines(clip, made.geometry),
     )
     workspace.publish(report)
+    return report
 
 
 def _reading(control: Control) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from dreamdrive import __version__
 from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.held_out import Likeness
+from dreamdrive.run.judge import facts_of, limits_of, rough_because
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
@@ -43,6 +44,8 @@ def describe(
         held_out: Likeness of the withheld frames, by index in the clip.
         baselines: The same of predictions that need no scene.
     """
+    blended = baselines.get("flow_interpolation", {})
+    facts = facts_of(clip, geometry, request["options"]["quality"], held_out, blended)
     report = {
         "version": __version__,
         "versions": {"python": platform.python_version(), **package_versions()},
@@ -69,6 +72,8 @@ def describe(
         "requested": against_request(clip, geometry),
         "detected": list(geometry.detected),
         "fallback": geometry.fallback,
+        "rough": list(rough_because(facts)),
+        "limits": list(limits_of(facts)),
         "notes": list(clip.provenance.get("notes", [])),
         "geometry": geometry.details,
         "held_out": _by_source_index(clip, held_out),

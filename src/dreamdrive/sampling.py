@@ -7,13 +7,14 @@ from typing import Any
 from dreamdrive import __version__
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import INDEX, MAX_CHANNELS, FeatureFile, write_features
-from dreamdrive.data.recording import write_recording
+from dreamdrive.data.recording import ABOUT, write_recording
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
 from dreamdrive.hub import find_weights
 from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.prior.protocol import Progress, silent
 from dreamdrive.scene.action import Action
+from dreamdrive.scene.atomic import check_free
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.stages import file_digest
@@ -44,7 +45,7 @@ def sample(
     Raises:
         InputError: The input, an option, the weights or ``out`` cannot be used.
     """
-    name = prior or prior_of(control.path)
+    name = prior or prior_of(control.path, weights is not None)
     control = control if weights is None else replace(control, weights=find_weights(weights))
     chosen = choose_prior(name)
     chosen.check(control)
@@ -54,6 +55,7 @@ def sample(
             raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
+    check_free(out, force, ABOUT)
     clip = chosen(control, progress)
     if clip.step[-1] < 1:
         raise InputError(f"--frames {control.frames}: a single frame is no recording; choose two or more")

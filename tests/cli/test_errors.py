@@ -78,6 +78,14 @@ def test_a_single_picture_names_the_prior_to_come(run: Run, tmp_path: Path) -> N
     photo = tmp_path / "photo.png"
     cv2.imwrite(str(photo), np.zeros((40, 64, 3), np.uint8))
     expect(run, tmp_path / "out", photo, message="single frame")
+    (tmp_path / "weights").mkdir()
+    expect(
+        run,
+        tmp_path / "out",
+        *(photo, "--weights", tmp_path / "weights"),
+        message=f"error: {photo} is a photo: name the video model of --weights with --prior "
+        "vista|svd|cosmos|diffusers",
+    )
 
 
 def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
@@ -93,6 +101,19 @@ def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
     expect(run, out, clip, "--fps", "-3", message="--fps -3")
     expect(run, out, clip, "--camera-height", "0", message="--camera-height")
     expect(run, out, clip, "--prior", "street-world", message="expected a layout as JSON")
+
+
+def test_a_clip_that_memory_cannot_hold_is_refused_before_it_is_read(
+    run: Run, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "free_bytes", lambda: 600_000_000)
+    expect(
+        run,
+        tmp_path / "out",
+        *(clip, "--size", "3200x2000"),
+        message="error: 4 frames at 3200x2000 need about 5.7 GB of memory, and 0.6 GB are free; give "
+        "--size 200x124",
+    )
 
 
 def test_frames_that_do_not_fit_together(run: Run, clip: Path, tmp_path: Path) -> None:

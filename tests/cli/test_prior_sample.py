@@ -32,6 +32,7 @@ def test_a_sample_is_written_and_says_how_to_go_on(run: Run, tmp_path: Path) -> 
     again = run("prior", "sample", "--prior", "street-world", *SMALL, "-o", out)
     assert again.code == 2
     assert "--force" in again.err
+    assert "prior:" not in again.out  # before anything is drawn
 
 
 def test_a_recording_is_sampled_with_its_files_named(run: Run, tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ def test_a_given_layout_is_drawn_by_all_cameras(run: Run, tmp_path: Path) -> Non
     again = run(*made, "-o", out)
     assert again.code == 2
     assert "exists already" in again.err
+    assert "front:" not in again.out  # before anything is drawn
 
 
 def test_corrupted_frames_have_a_clean_truth(run: Run, tmp_path: Path) -> None:
@@ -92,10 +93,29 @@ def test_mistakes_are_told(run: Run, tmp_path: Path) -> None:
         result = run("world", "make", *wrong, "-o", tmp_path / "w")
         assert result.code == 2
         assert "expected at least one frame" in result.err
+    for size in ("99999x99999", "32000x18000"):
+        result = run("world", "make", "--size", size, "-o", tmp_path / "w")
+        assert result.code == 2
+        assert result.err == (
+            f"error: --size {size}: too large for H.264 video; expected 8192 pixels a side and 8.9 million "
+            "in all at most, such as 3840x2160"
+        )
     (tmp_path / "bad.json").write_text('{"ego": {"track": 3}}')
     result = run("world", "make", "--layout", tmp_path / "bad.json", "-o", tmp_path / "w")
     assert result.code == 2
     assert "$.ego.track" in result.err
+
+
+def test_a_world_that_memory_cannot_hold_is_refused_before_it_is_drawn(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dreamdrive.memory.free_bytes", lambda: 1_000_000_000)
+    result = run("world", "make", "--size", "4000x2000", "--frames", 100, "-o", tmp_path / "w")
+    assert result.code == 2
+    assert result.err == (
+        "error: 100 frames of 4000x2000 need about 17.6 GB of memory with their truth, and 1.0 GB are free; "
+        "give fewer --frames or a smaller --size"
+    )
 
 
 @pytest.mark.slow

@@ -90,7 +90,13 @@ def test_another_shape_is_refused_with_the_nearest_sizes():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "words"), [((481, 270), "give 482x270"), ((8, 6), "at least 16"), ((0, 270), "at least 16")]
+    ("wanted", "words"),
+    [
+        ((481, 270), "give 482x270"),
+        ((8, 6), "at least 16"),
+        ((0, 270), "at least 16"),
+        ((32000, 18000), "too large for H.264"),
+    ],
 )
 def test_sizes_no_video_can_have_are_refused(wanted, words):
     with pytest.raises(InputError, match=words):

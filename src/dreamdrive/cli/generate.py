@@ -1,5 +1,6 @@
 """``dreamdrive generate``: from a recording to a scene and its videos."""
 
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +10,9 @@ from tyro.conf import Positional, arg
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.sizes import parse_size
+
+_ROUGH = 3
+"""Exit code of a result that is there and rough, for those who ask for one."""
 
 
 def generate(
@@ -57,6 +61,7 @@ def generate(
         arg(name="from", metavar="STAGE", help_behavior_hint=""),
     ] = None,
     force: bool = False,
+    strict: bool = False,
 ) -> None:
     """Make a 4D scene and its videos from a recording or a layout.
 
@@ -97,10 +102,12 @@ def generate(
         seed: Seed of everything random.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
+        strict: Exit with code 3 where the result is rough; it is kept.
     """
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.pipeline import generate as run
+    from dreamdrive.run.outcome import lines_of
     from dreamdrive.scene.control import Control
 
     stop_like_an_interruption()
@@ -120,9 +127,9 @@ def generate(
         hold_out=hold_out,
         seed=seed,
     )
-    console = Console()
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
-        made = run(
+        outcome = run(
             control,
             out,
             prior=prior,
@@ -137,8 +144,13 @@ def generate(
             recompute_from=recompute_from,
             force=force,
             progress=bars,
+            say=console.print,
         )
-    if not made:
+    if outcome.already_finished:
         console.print(f"{out} is already finished; --from STAGE computes it again from a stage on")
+    for line in lines_of(outcome):
+        console.print(line)
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
-        console.print(f"{what:<7} {out / name}", soft_wrap=True)
+        console.print(f"{what:<7} {out / name}")
+    if strict and outcome.rough:
+        sys.exit(_ROUGH)

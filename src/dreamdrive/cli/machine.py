@@ -4,14 +4,7 @@ import os
 import signal
 from types import FrameType
 
-from dreamdrive.memory import free_bytes
-
-
-def available_cores() -> int:
-    """Cores this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+from dreamdrive.memory import available_cores, free_bytes
 
 
 def available_memory_mb() -> int | None:

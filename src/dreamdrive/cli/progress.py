@@ -20,6 +20,7 @@ class Bars:
             TextColumn("{task.description:<11}"),
             BarColumn(),
             MofNCompleteColumn(),
+            TextColumn("elapsed"),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeLeftColumn(),

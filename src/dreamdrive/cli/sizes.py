@@ -9,9 +9,13 @@ def parse_size(text: str) -> tuple[int, int]:
     """Width and height from ``480x270``.
 
     Raises:
-        InputError: The text has another form.
+        InputError: The text has another form, or means more pixels than a video can have.
     """
     match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip())
     if match is None:
         raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")
-    return int(match[1]), int(match[2])
+    from dreamdrive.data.size import check_largest
+
+    size = int(match[1]), int(match[2])
+    check_largest(size, f"--size {text}")
+    return size

@@ -13,6 +13,9 @@ from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
 
+_PIXEL_BYTES = 22
+"""Of one frame and its truth: colour, depth, flow and labels."""
+
 
 def make(
     *,
@@ -46,7 +49,9 @@ def make(
     from dreamdrive.data import corruption
     from dreamdrive.data.layout_file import read_layout
     from dreamdrive.data.world import MOUNTS, Drive, Mount, StreetOptions, World, draw_street, drive
-    from dreamdrive.data.world.files import write_world
+    from dreamdrive.data.world.files import MARK, write_world
+    from dreamdrive.memory import free_bytes
+    from dreamdrive.scene.atomic import check_free
 
     wanted = parse_size(size)
     if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(wanted) < 16:
@@ -54,6 +59,9 @@ def make(
             f"--frames {frames} --fps {fps:g} --seed {seed} --size {size}: expected at least one frame, a "
             "positive rate, a seed of 0 or more and at least 16x16 pixels"
         )
+    check_free(out, force, MARK)
+    count = frames * (len(MOUNTS) if cameras == "surround" else 1)
+    _check_memory(count, wanted, free_bytes())
     street = draw_street(seed, StreetOptions(seconds=frames / fps)) if layout is None else read_layout(layout)
     wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
@@ -80,8 +88,17 @@ def make(
             for mount, made in drives.items()
         }
     write_world(drives, out, corruption=wrong, replace=force)
-    count = frames * len(drives)
     console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s", soft_wrap=True)
+
+
+def _check_memory(count: int, size: tuple[int, int], free: int | None) -> None:
+    """Refuse a world that memory cannot hold, before it is drawn."""
+    needed = count * size[0] * size[1] * _PIXEL_BYTES
+    if free is not None and needed > free:
+        raise InputError(
+            f"{count} frames of {size[0]}x{size[1]} need about {needed / 1e9:.1f} GB of memory with their "
+            f"truth, and {free / 1e9:.1f} GB are free; give fewer --frames or a smaller --size"
+        )
 
 
 # As tyro does for the commands themselves; a union needs a second member where there is one command only.

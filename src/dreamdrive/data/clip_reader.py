@@ -22,6 +22,7 @@ from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.data.source import Source, one_frame, open_source
 from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
+from dreamdrive.memory import free_bytes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.trajectory import Trajectory
@@ -186,15 +187,23 @@ def _gather(
     count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
     wanted = selection.resolve(count, str(source.path))
     picked: _Picked | None = None
+    most = MAX_FRAMES
     for raw in _limited(source, wanted):
         if picked is None:
             sampler = _Sampler.create(raw.size, size, intrinsics, hfov_deg)
             picked = _Picked(sampler, raw)
+            most = _most_frames(sampler.sizing.target)
         elif raw.size != picked.first.size:
             (w, h), (w2, h2) = picked.first.size, raw.size
             raise InputError(
                 f"{source.path}: {picked.first.name} is {w}x{h} but {raw.name} is {w2}x{h2}; "
                 "expected frames of one size"
+            )
+        if len(picked.index) == most:
+            width, height = picked.sampler.sizing.target
+            raise InputError(
+                f"{source.path}: memory holds {most} frames of {width}x{height} at most, and more are "
+                "selected; choose some with --frames START:STOP:STEP, or give a smaller --size"
             )
         picked.add(raw)
     if picked is None or len(picked.index) < 2:
@@ -205,6 +214,12 @@ def _gather(
             f"The frames are enlarged {1 / picked.sampler.sizing.shrink:.2f} times; they hold no more detail."
         )
     return picked
+
+
+def _most_frames(size: tuple[int, int]) -> int:
+    """Frames that free memory holds: four bytes a pixel with its validity, twice while they are stacked."""
+    free = free_bytes()
+    return MAX_FRAMES if free is None else max(1, free // (8 * size[0] * size[1]))
 
 
 def _limited(source: Source, wanted: range) -> Iterator[RawFrame]:

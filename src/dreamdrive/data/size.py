@@ -11,6 +11,8 @@ from dreamdrive.scene.camera import Camera
 
 DEFAULT_WIDTH_PX = 480
 MIN_SIDE_PX = 16
+MAX_SIDE_PX, MAX_PIXELS = 8192, 4096 * 2176
+"""Largest frames: a video with four of them, as ``panels.mp4`` is, is the largest that H.264 knows."""
 MAX_CROP = 0.02
 """Largest share of the width or height that is cut away to reach an asked size."""
 
@@ -60,6 +62,27 @@ class Sizing:
         return np.ascontiguousarray(self.crop(image))
 
 
+def check_largest(size: tuple[int, int], text: str) -> None:
+    """Refuse frames that no video could show.
+
+    Args:
+        size: Width and height in pixels.
+        text: How the message calls it.
+
+    Raises:
+        InputError: They are larger than ``MAX_SIDE_PX`` or ``MAX_PIXELS``.
+    """
+    if _too_large(size):
+        raise InputError(
+            f"{text}: too large for H.264 video; expected {MAX_SIDE_PX} pixels a side and "
+            f"{MAX_PIXELS / 1e6:.1f} million in all at most, such as 3840x2160"
+        )
+
+
+def _too_large(size: tuple[int, int]) -> bool:
+    return max(size) > MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS
+
+
 def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizing:
     """How frames of ``source`` become frames of ``wanted``.
 
@@ -67,11 +90,12 @@ def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizi
     number that keeps the aspect.
 
     Raises:
-        InputError: The size is odd (H.264 cannot hold it) or tiny, or more than 2 % would be cut away.
+        InputError: The size is odd (H.264 cannot hold it), tiny or huge, or more than 2 % would be cut away.
     """
     if wanted is None:
         return cover(source, _default(source))
     text = f"--size {wanted[0]}x{wanted[1]}"
+    check_largest(wanted, text)
     if min(wanted) < MIN_SIDE_PX:
         raise InputError(
             f"{text}: expected WIDTHxHEIGHT of at least {MIN_SIDE_PX} pixels each, such as 480x270"
@@ -84,10 +108,10 @@ def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizi
     if cut > MAX_CROP:
         by_width = (wanted[0], _even(wanted[0] * source[1] / source[0]))
         by_height = (_even(wanted[1] * source[0] / source[1]), wanted[1])
+        nearest = [f"{w}x{h}" for w, h in (by_width, by_height) if not _too_large((w, h))]
         raise InputError(
             f"{text} would cut away {100 * cut:.0f} % of the {source[0]}x{source[1]} frames (at most "
-            f"{100 * MAX_CROP:.0f} % is cropped); the nearest sizes are {by_width[0]}x{by_width[1]} "
-            f"and {by_height[0]}x{by_height[1]}"
+            f"{100 * MAX_CROP:.0f} % is cropped); the nearest sizes are {' and '.join(nearest)}"
         )
     return cover(source, wanted)
 

@@ -84,6 +84,23 @@ class Video:
         """
         return sum(1 for _ in self._decode())
 
+    def claimed_count(self) -> int | None:
+        """Number of frames by the file's own account, which may be wrong; None where it says nothing.
+
+        Raises:
+            InputError: The file cannot be opened any more.
+        """
+        try:
+            with av.open(str(self.path)) as container:
+                stream = container.streams.video[0]
+                if stream.frames:
+                    return stream.frames
+                duration, base = stream.duration, stream.time_base
+                seconds = None if duration is None or base is None else float(duration * base)
+        except FFmpegError as error:
+            raise InputError(f"{self.path} is not a readable video ({error.strerror})") from error
+        return None if seconds is None or self.rate_hz is None else round(seconds * self.rate_hz)
+
     def read(self, wanted: range) -> Iterator[RawFrame]:
         """The wanted frames in decode order, one at a time; decoding stops behind the last.
 

@@ -156,5 +156,8 @@ def _by_median_depth() -> Metric:
     problem = "no road plane was found, and the path shows no speed"
     words = f"a median depth of {_MEDIAN_DEPTH_M:.0f} m is assumed"
     return Metric(
-        1.0, None, Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD), (f"{problem}: {words}",)
+        1.0,
+        None,
+        Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD, basis="usual depth"),
+        (f"{problem}: {words}",),
     )

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from dreamdrive.data.images import SUFFIXES
 from dreamdrive.errors import InputError
 from dreamdrive.prior.cosmos import COSMOS
 from dreamdrive.prior.diffusers_i2v import DIFFUSERS
@@ -16,6 +17,8 @@ from dreamdrive.prior.vista import SVD, VISTA
 _ALL = (REPLAY, STREET_WORLD, SVD, VISTA, MAGICDRIVE, MAGICDRIVE_T, COSMOS, DIFFUSERS)
 PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in _ALL})
 """Every prior by the name that ``--prior`` takes."""
+OF_PHOTOS = tuple(prior.name for prior in (VISTA, SVD, COSMOS, DIFFUSERS))
+"""Those that go on from a photo."""
 
 
 def choose_prior(name: str) -> Prior:
@@ -29,8 +32,20 @@ def choose_prior(name: str) -> Prior:
     return PRIORS[name]
 
 
-def prior_of(path: Path | None) -> str:
-    """The prior for an input where none is named: a layout is drawn, anything else is a recording."""
+def prior_of(path: Path | None, with_weights: bool = False) -> str:
+    """The prior for an input where none is named: a layout is drawn, anything else is a recording.
+
+    Args:
+        path: The input.
+        with_weights: Whether a network is given, for the prior or the geometry.
+
+    Raises:
+        InputError: The input is a photo and a network is given: which model it is has to be named.
+    """
+    if with_weights and path is not None and path.is_file() and path.suffix.lower() in SUFFIXES:
+        raise InputError(
+            f"{path} is a photo: name the video model of --weights with --prior {'|'.join(OF_PHOTOS)}"
+        )
     return "street-world" if path is not None and path.suffix.lower() == ".json" else "replay"
 
 

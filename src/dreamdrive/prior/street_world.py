@@ -7,6 +7,7 @@ from jaxtyping import Bool
 
 from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.size import check_largest
 from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
@@ -40,6 +41,7 @@ def street_world(control: Control, progress: Progress = silent, *, truth: bool =
     size = control.size or SIZE
     if size[0] % 2 or size[1] % 2:
         raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
+    check_largest(size, f"--size {size[0]}x{size[1]}")
     selection = Selection.parse(control.frames)
     if selection.stop is None:
         selection = replace(selection, stop=max(FRAMES, selection.start + FRAMES))

@@ -46,7 +46,7 @@ def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None,
         if retired.exists() and not path.exists():
             # A kill between the two renames below left the old folder under this name.
             os.replace(retired, path)
-        _check_free(path, replace, mark)
+        check_free(path, replace, mark)
         remove(partial)
         partial.mkdir(parents=True)
         yield partial
@@ -57,7 +57,17 @@ def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None,
         remove(partial)
 
 
-def _check_free(path: Path, replace: bool, mark: str) -> None:
+def check_free(path: Path, replace: bool, mark: str) -> None:
+    """Fail before the work where ``new_folder`` would fail after it.
+
+    Args:
+        path: The folder to create.
+        replace: Whether an existing folder may be replaced.
+        mark: Name of the file by which a folder of this kind is known.
+
+    Raises:
+        InputError: Something is in the way.
+    """
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         return
     if not path.is_dir():

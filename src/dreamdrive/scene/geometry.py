@@ -1,12 +1,20 @@
 """What multi-view stereo hands over: cameras, depth and what is known about their trustworthiness."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.scene.camera import Camera
+
+Basis = Literal["given", "height", "usual height", "asked speed", "usual speed", "usual depth"]
+"""What the metre rests on: what was given in metres; the height of the camera above the road, given or
+assumed; a speed, asked for or assumed; an assumed distance."""
+
+Fallback = Literal["few", "blank", "standing", "refused"]
+"""Why the full reconstruction did not run: too few frames, nothing to follow in them, a camera that stands,
+or a path that nobody could believe."""
 
 
 @dataclass(frozen=True)
@@ -17,11 +25,13 @@ class Scale:
         source: ``"poses"``, ``"depth"``, ``"ground plane, camera height 1.50 m"``, ``"none: ..."``: in words.
         spread: Relative spread of the scale, as a fraction; infinite when there is no metric scale.
         others: What else tells metres, by its source: its metres for one of this scale, 1 where both agree.
+        basis: The kind of that source.
     """
 
     source: str
     spread: float
     others: dict[str, float] = field(default_factory=dict)
+    basis: Basis = "given"
 
     @property
     def disagreement(self) -> float | None:
@@ -91,6 +101,8 @@ class Geometry:
         detected: What was noticed about the clip, a sentence each.
         fallback: Why the fallback ran, in words, or None when the full reconstruction did.
         details: Figures for the report, as JSON values.
+        fallback_kind: The kind of that reason.
+        placed: Frames whose cameras were found, rather than put between their neighbours; None for all.
     """
 
     cameras: tuple[Camera, ...]
@@ -106,6 +118,8 @@ class Geometry:
     detected: tuple[str, ...] = ()
     fallback: str | None = None
     details: dict[str, Any] = field(default_factory=dict)
+    fallback_kind: Fallback | None = None
+    placed: int | None = None
 
     def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
         """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""

@@ -58,6 +58,9 @@ class _Hulls(msgspec.Struct):
     boxes: list[_Hull]
     world_from_map: _Pose
 
+MARK = "layout.json"
+"""By this file a world folder is known."""
+
 
 def write_world(
     drives: Mapping[Mount, Drive], path: Path, *, corruption: Corruption | None = None, replace: bool = False
@@ -84,7 +87,7 @@ def write_world(
     first = next(iter(drives.values()))
     if len(first.boxes) > MOST_BOXES:
         raise ValueError(f"world: {len(first.boxes)} boxes do not fit 8-bit labels")
-    with new_folder(path, replace=replace, mark="layout.json") as folder:
+    with new_folder(path, replace=replace, mark=MARK) as folder:
         write_layout(first.layout, folder / "layout.json")
         seconds = float(first.times_s[-1])
         _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])

@@ -1,11 +1,13 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from dreamdrive.geometry.classical.dense import Dense, densify
+from dreamdrive.geometry.classical.dense import PASSES, Dense, densify
 from dreamdrive.geometry.classical.known import in_metres
 from dreamdrive.geometry.classical.poses import Posed, pose_clip
+from dreamdrive.geometry.classical.reconstruct import STEPS
 from dreamdrive.geometry.classical.traffic import compared_with_traffic
 from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
 from dreamdrive.scene.clip import Clip
@@ -20,9 +22,32 @@ def reconstruct(
     weights: Path | None = None,
     progress: Progress = silent,
 ) -> Geometry:
-    """Pose a clip and find its depth, see ``geometry.protocol``; no network, and no steps to count."""
-    posed = pose_clip(clip, camera_height_m=camera_height_m, seed=seed)
-    return assemble(clip, posed, densify(in_metres(clip, posed.metres_per_unit), posed))
+    """Pose a clip and find its depth, see ``geometry.protocol``; no network.
+
+    Steps are counted in frames that are gone through once. A step of posing takes about as long as one pass
+    over all frames; what a clip does not need is jumped over.
+    """
+    passes, used = len(clip), int((~clip.held_out).sum())
+    posing, total = (1 + STEPS) * passes, (1 + STEPS) * passes + PASSES * used
+    posed = pose_clip(
+        clip, camera_height_m=camera_height_m, seed=seed, tell=_counted(progress, 0, passes, total)
+    )
+    dense = densify(in_metres(clip, posed.metres_per_unit), posed, tell=_counted(progress, posing, 1, total))
+    progress(total, total)
+    return assemble(clip, posed, dense)
+
+
+def _counted(progress: Progress, start: int, each: int, total: int) -> Callable[[], None]:
+    """What tells of steps of one size, from a start on; the last one is told of by who knows that it was."""
+    done = start
+
+    def tell() -> None:
+        nonlocal done
+        done = min(done + each, total - 1)
+        progress(done, total)
+
+    progress(start, total)
+    return tell
 
 
 def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
@@ -48,6 +73,8 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         detected=posed.detected,
         fallback=posed.fallback,
         details={**posed.details, **shares},
+        fallback_kind=posed.fallback_kind,
+        placed=posed.placed,
     )
     return replace(geometry, scale=compared_with_traffic(geometry))
 

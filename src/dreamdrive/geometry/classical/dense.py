@@ -12,10 +12,12 @@ from dreamdrive.geometry.classical.moving import FLAGGED, moving_evidence, stand
 from dreamdrive.geometry.classical.poses import Posed
 from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
 from dreamdrive.geometry.classical.upright import upright_depth
-from dreamdrive.geometry.classical.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.classical.view import Tell, View, make_view, single_threaded_opencv, unheard
 from dreamdrive.scene.clip import Clip
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
+PASSES = 8
+"""How often the frames are gone through one by one: the sweep, and seven times for what moves."""
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
@@ -45,7 +47,7 @@ class StaticDepth:
     confidence: Float[np.ndarray, "f h w"]
 
 
-def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None) -> Dense:
+def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell: Tell = unheard) -> Dense:
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
@@ -58,8 +60,9 @@ def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None) -> De
         clip: The frames.
         posed: Their cameras.
         measured: Depth to take in place of the plane sweep's, such as a network's.
+        tell: Called for each frame of each pass, of which there are ``PASSES`` at most.
     """
-    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground)
+    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
     with single_threaded_opencv():

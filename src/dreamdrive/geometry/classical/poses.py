@@ -14,9 +14,10 @@ from dreamdrive.geometry.classical.known import depth_points, depth_ratios
 from dreamdrive.geometry.classical.paths import fill, path_length, rebase
 from dreamdrive.geometry.classical.reconstruct import Outcome, reconstruct
 from dreamdrive.geometry.classical.scale import Metric, Street
+from dreamdrive.geometry.classical.view import Tell, unheard
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.geometry import Focal, Ground, Scale
+from dreamdrive.scene.geometry import Fallback, Focal, Ground, Scale
 
 MIN_TRACKS = 10
 FALLBACK_SPREAD, STANDING_SPREAD = 0.35, 0.5
@@ -38,6 +39,8 @@ class Posed:
         detected: What was noticed, a sentence each.
         details: Figures, as JSON values.
         metres_per_unit: What makes metres of known depth; ``None`` where its unit stays unknown.
+        fallback_kind: The kind of that reason.
+        placed: Frames that structure from motion placed; None for all.
     """
 
     cameras: tuple[Camera, ...]
@@ -51,9 +54,13 @@ class Posed:
     detected: tuple[str, ...]
     details: dict[str, Any] = field(default_factory=dict)
     metres_per_unit: float | None = 1.0
+    fallback_kind: Fallback | None = None
+    placed: int | None = None
 
 
-def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0) -> Posed:
+def pose_clip(
+    clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, tell: Tell = unheard
+) -> Posed:
     """Pose every frame of a clip.
 
     Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
@@ -64,6 +71,7 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
         clip: Frames of one camera.
         camera_height_m: Height of the camera above the road, when the user gave it; None assumes 1.5 m.
         seed: Seed of everything random; the same seed gives the same poses.
+        tell: Called for each step: the first look, and those of ``reconstruct.STEPS``.
 
     Raises:
         InputError: Without frames; for a camera height that is not positive; for known poses that contradict
@@ -72,18 +80,21 @@ def pose_clip(clip: Clip, *, camera_height_m: float | None = None, seed: int = 0
     _check(clip, camera_height_m)
     evidence = looking.look(clip)
     contradiction.check(clip, evidence)
+    tell()
     if clip.known.world_from_camera is not None:
         if not clip.known.metric:
             return _from_unscaled(clip, evidence, camera_height_m, seed)
         return _from_known(clip, evidence, camera_height_m, seed)
     if evidence.motion.tracks < MIN_TRACKS and len(clip) > 1:
         reason = "the frames are too dark or too blank to follow anything: the camera is taken to stand still"
-        return _standing(clip, evidence, camera_height_m, reason)
+        return replace(_standing(clip, evidence, camera_height_m, reason), fallback_kind="blank")
     if evidence.motion.standing:
         reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
         return _standing(clip, evidence, camera_height_m, reason)
     grey, usable = looking.working_frames(clip, evidence)
-    outcome = reconstruct(grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed)
+    outcome = reconstruct(
+        grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed, tell
+    )
     if outcome.settled is None:
         return _from_odometry(clip, evidence, outcome, camera_height_m)
     return _from_model(clip, evidence, outcome, camera_height_m, seed)
@@ -120,7 +131,8 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
     if placed < len(clip):
         notes.append(f"{len(clip) - placed} of {len(clip)} frames were placed between their neighbours")
     details = {**outcome.figures, "residual_radial": float(model.lens[4]), "metres_per_unit": metric.factor}
-    return as_posed(clip, evidence, poses, camera, metric, observed, notes, details)
+    posed = as_posed(clip, evidence, poses, camera, metric, observed, notes, details)
+    return replace(posed, placed=placed)
 
 
 def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
@@ -200,7 +212,7 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
             metric, ground=ground, scale=Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
         )
     posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
-    return replace(posed, standing=True, fallback=reason)
+    return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
 
 def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None) -> Posed:
@@ -216,19 +228,23 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
     if not path.measured:
         speed = odometry.DEFAULT_SPEED_M_S
         notes.append(f"the road shows no clear motion: a constant speed of {speed:.0f} m/s is assumed")
-        metric = replace(
-            metric, scale=Scale(f"none: a speed of {speed:.0f} m/s is assumed", scale.SPEED_SPREAD)
-        )
+        words = f"none: a speed of {speed:.0f} m/s is assumed"
+        metric = replace(metric, scale=Scale(words, scale.SPEED_SPREAD, basis="usual speed"))
     details = {**outcome.figures, "odometry_measured": path.measured}
     observed = clip.known.intrinsics
     posed = as_posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
-    return replace(posed, fallback=reason)
+    return replace(posed, fallback=reason, fallback_kind=outcome.refusal)
 
 
 def _level_road(height_m: float | None, spread: float) -> Metric:
     wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
     source = f"level road assumed, {scale.height_words(height_m)}"
-    return Metric(1.0, Ground(np.array([0.0, -1.0, 0.0]), wanted), Scale(source, spread), ())
+    return Metric(
+        1.0,
+        Ground(np.array([0.0, -1.0, 0.0]), wanted),
+        Scale(source, spread, basis=scale.height_basis(height_m)),
+        (),
+    )
 
 
 def as_posed(

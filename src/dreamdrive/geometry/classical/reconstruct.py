@@ -12,10 +12,14 @@ from dreamdrive.geometry.classical import features, gate, sfm
 from dreamdrive.geometry.classical.features import Features
 from dreamdrive.geometry.classical.focal import Settled, settle
 from dreamdrive.geometry.classical.sfm import Model
+from dreamdrive.geometry.classical.view import Tell, unheard
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Fallback
 
 MIN_FRAMES = 3
 MIN_FEATURES = 60
+STEPS = 3
+"""Steps that are told of."""
 STARTS = 6
 """Random starting positions of global mapping that are tried."""
 
@@ -29,12 +33,14 @@ class Outcome:
         reasons: Why there is none, in words.
         notes: What else was noticed, a sentence each.
         figures: Figures of the gate and the focal test, as JSON values.
+        refusal: The kind of those reasons; None with a model.
     """
 
     settled: Settled | None
     reasons: tuple[str, ...]
     notes: tuple[str, ...]
     figures: dict[str, Any]
+    refusal: Fallback | None = None
 
 
 def reconstruct(
@@ -44,6 +50,7 @@ def reconstruct(
     moving: Bool[np.ndarray, " s"],
     calibrated: bool,
     seed: int,
+    tell: Tell = unheard,
 ) -> Outcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
@@ -57,13 +64,15 @@ def reconstruct(
         moving: Steps in which the picture moves.
         calibrated: Whether the focal length is known.
         seed: Seed of everything random.
+        tell: Called after features, after matches, and with the model.
     """
     if len(grey) < MIN_FRAMES:
-        return _refused(f"{len(grey)} frames are too few for structure from motion")
+        return _refused(f"{len(grey)} frames are too few for structure from motion", "few")
     found = features.extract(grey, usable)
+    tell()
     typical = int(np.median([len(entry.keypoints_px) for entry in found]))
     if typical < MIN_FEATURES:
-        return _refused(f"the frames show too little: {typical} features in a typical one")
+        return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
     square, found = _square_pixels(camera, found)
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
@@ -71,6 +80,7 @@ def reconstruct(
     with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
         database = Path(folder) / "matches.db"
         sfm.match(database, found, square, seed)
+        tell()
         for name, again, start in _attempts(seed):
             mapper = sfm.map_globally if name == "global" else sfm.map_incrementally
             model = mapper(database, len(grey), start)
@@ -82,13 +92,14 @@ def reconstruct(
                 failed = verdict.reasons
                 figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
                 if not failed:
+                    tell()
                     notes += [settled.note] if settled.note else []
                     notes += ["the camera drives backwards"] if verdict.backwards else []
                     notes += [_wobbling(settled.model)] if verdict.wobbling else []
                     notes += [f"{reasons[0]}: mapped again, {again}"] if reasons else []
                     return Outcome(settled, (), tuple(notes), figures)
             reasons = reasons or failed
-    return Outcome(None, reasons, (), figures)
+    return Outcome(None, reasons, (), figures, "refused")
 
 
 def _attempts(seed: int) -> list[tuple[str, str, int]]:
@@ -97,8 +108,8 @@ def _attempts(seed: int) -> list[tuple[str, str, int]]:
     return [*others, ("incremental", "frame by frame", seed)]
 
 
-def _refused(reason: str) -> Outcome:
-    return Outcome(None, (reason,), (), {})
+def _refused(reason: str, refusal: Fallback) -> Outcome:
+    return Outcome(None, (reason,), (), {}, refusal)
 
 
 def _wobbling(model: Model) -> str:

@@ -10,7 +10,7 @@ from dreamdrive.geometry.classical.ground_sweep import Road, sweep
 from dreamdrive.geometry.classical.known import factor_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.geometry import Ground, Scale
+from dreamdrive.scene.geometry import Basis, Ground, Scale
 
 USUAL_HEIGHT_M = 1.5
 KNOWN_HEIGHTS_M = (0.6, 5.0)
@@ -111,9 +111,8 @@ def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, foc
         focal_spread,
     )
     source = f"ground plane ({how}), {height_words(height_m)}"
-    return Metric(
-        factor, Ground(plane.normal, plane.offset * factor), Scale(source, float(np.linalg.norm(terms))), ()
-    )
+    found = Scale(source, float(np.linalg.norm(terms)), basis=height_basis(height_m))
+    return Metric(factor, Ground(plane.normal, plane.offset * factor), found, ())
 
 
 def from_road_points(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric | None:
@@ -167,6 +166,11 @@ def height_words(height_m: float | None) -> str:
     return f"camera height {wanted:.2f} m ({word})"
 
 
+def height_basis(height_m: float | None) -> Basis:
+    """What a scale rests on that comes from the camera's height."""
+    return "usual height" if height_m is None else "height"
+
+
 def as_given(
     street: Street, source: str, spread: float, words: str, height_m: float | None, seed: int
 ) -> Metric:
@@ -197,7 +201,9 @@ def _from_speed(street: Street, problem: str) -> Metric:
         else ("taken as asked for", "the speed that was asked for")
     )
     words = f"none: {problem}; a speed of {speed:.3g} m/s is {word}"
-    return Metric(factor, None, Scale(words, SPEED_SPREAD), (f"{problem}: distances rest on {rest}",))
+    basis: Basis = "usual speed" if street.asked_m_s is None else "asked speed"
+    found = Scale(words, SPEED_SPREAD, basis=basis)
+    return Metric(factor, None, found, (f"{problem}: distances rest on {rest}",))
 
 
 def asked_m_s(clip: Clip) -> float | None:

@@ -16,8 +16,15 @@ from dreamdrive.scene.geometry import Ground
 
 THREADS = 2
 
+Tell = Callable[[], None]
+"""Called for each step that is done."""
+
 A = TypeVar("A")
 B = TypeVar("B")
+
+
+def unheard() -> None:
+    """For steps that nobody counts."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,7 @@ class View:
         cameras: One posed pinhole a frame.
         plane_inverse: Inverse depth of the road plane (F, H, W) in 1/m; 0 above the horizon or without one.
         ground: The road plane, where found.
+        tell: Called for each frame of each pass over the frames.
     """
 
     rgb: UInt8[np.ndarray, "f h w 3"]
@@ -41,6 +49,7 @@ class View:
     cameras: tuple[Camera, ...]
     plane_inverse: Float[np.ndarray, "f h w"]
     ground: Ground | None
+    tell: Tell = unheard
 
     @property
     def positions_m(self) -> Float[np.ndarray, "f 3"]:
@@ -54,7 +63,11 @@ class View:
 
 
 def make_view(
-    clip: Clip, cameras: tuple[Camera, ...], fixed_regions: Int[np.ndarray, "h w"], ground: Ground | None
+    clip: Clip,
+    cameras: tuple[Camera, ...],
+    fixed_regions: Int[np.ndarray, "h w"],
+    ground: Ground | None,
+    tell: Tell = unheard,
 ) -> View:
     """The clip with its poses; frames that are held out are blanked."""
     used = ~clip.held_out
@@ -64,7 +77,7 @@ def make_view(
     plane = np.zeros(grey.shape, np.float32)
     if ground is not None:
         plane = np.stack([1.0 / ground.depth_m(camera) for camera in cameras]).astype(np.float32)
-    return View(rgb, grey, usable, used, cameras, plane, ground)
+    return View(rgb, grey, usable, used, cameras, plane, ground, tell)
 
 
 @contextmanager
@@ -78,12 +91,16 @@ def single_threaded_opencv() -> Generator[None]:
         cv2.setNumThreads(before)
 
 
-def parallel(function: Callable[[A], B], items: Iterable[A]) -> list[B]:
+def parallel(function: Callable[[A], B], items: Iterable[A], tell: Tell = unheard) -> list[B]:
     """``function`` of each item, in order, two at a time; the result does not depend on the threads."""
+    done: list[B] = []
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(function, items))
+        for value in pool.map(function, items):
+            done.append(value)
+            tell()
+    return done
 
 
 def by_frame(view: View, function: Callable[[int], B]) -> dict[int, B]:
     """``function`` of the index of each used frame, by that index."""
-    return dict(zip(view.frames, parallel(function, view.frames), strict=True))
+    return dict(zip(view.frames, parallel(function, view.frames, view.tell), strict=True))

@@ -1,0 +1,174 @@
+"""How a run ended, from its report, and the lines that say so."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from dreamdrive.scene.json_file import of_type, read_json
+
+# A report may come from anywhere: what is printed of it is one line of plain characters.
+_Text = Annotated[str, msgspec.Meta(max_length=1000, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+_Count = Annotated[int, msgspec.Meta(ge=0)]
+_Seconds = Annotated[float, msgspec.Meta(ge=0)]
+_NAMED = 3
+_BLEND = "flow_interpolation"
+
+
+class _Frames(msgspec.Struct):
+    count: _Count
+    size: tuple[_Count, _Count]
+
+
+class _Gaussians(msgspec.Struct):
+    static: _Count
+    dynamic: _Count
+
+
+class _Stage(msgspec.Struct):
+    seconds: _Seconds
+
+
+class _Likeness(msgspec.Struct):
+    psnr: float
+
+
+class _Baseline(msgspec.Struct):
+    mean: _Likeness | None = None
+
+
+class _Report(msgspec.Struct):
+    frames: _Frames
+    gaussians: _Gaussians
+    stages: dict[_Text, _Stage]
+    actors: list[Any] = []
+    held_out: dict[str, Any] = {}
+    held_out_mean: _Likeness | None = None
+    baselines: dict[str, _Baseline] = {}
+    rough: list[_Text] = []
+    limits: list[_Text] = []
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        already_finished: Whether the result was there before, and nothing was computed.
+        frames: Number of frames.
+        size: Their width and height.
+        still: Gaussians of what stands.
+        moving: Gaussians of what moves.
+        things: Number of things that move.
+        seconds: What each stage took when it was computed.
+        withheld: Number of withheld frames.
+        psnr: Their mean likeness to what the scene shows, in decibels; None without any.
+        blended_psnr: The same of blending their neighbours along the motion in the picture.
+        rough: Why the result is rough and what helps, a sentence each; empty where it is not.
+        notes: How sure metres are, and how far beside the path views hold.
+    """
+
+    already_finished: bool
+    frames: int
+    size: tuple[int, int]
+    still: int
+    moving: int
+    things: int
+    seconds: dict[str, float]
+    withheld: int
+    psnr: float | None
+    blended_psnr: float | None
+    rough: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_outcome(report: Path, *, already_finished: bool) -> Outcome:
+    """The outcome that ``report.json`` tells of.
+
+    Raises:
+        InputError: The file is missing or holds something else.
+    """
+    return outcome_of(read_json(report), str(report), already_finished=already_finished)
+
+
+def outcome_of(document: dict[str, Any], where: str, *, already_finished: bool) -> Outcome:
+    """The outcome that a report tells of.
+
+    Args:
+        document: The report as JSON values.
+        where: How messages call it.
+        already_finished: Whether nothing was computed.
+
+    Raises:
+        InputError: The values are those of something else.
+    """
+    told = of_type(document, _Report, where)
+    blend = told.baselines.get(_BLEND, _Baseline()).mean
+    return Outcome(
+        already_finished,
+        told.frames.count,
+        told.frames.size,
+        told.gaussians.static,
+        told.gaussians.dynamic,
+        len(told.actors),
+        {name: stage.seconds for name, stage in told.stages.items()},
+        len(told.held_out),
+        None if told.held_out_mean is None else told.held_out_mean.psnr,
+        None if blend is None else blend.psnr,
+        tuple(told.rough),
+        tuple(told.limits),
+    )
+
+
+def lines_of(outcome: Outcome) -> tuple[str, ...]:
+    """Five lines at most that say how a run went, each with a first word that tells of what."""
+    lines = [("made", _made(outcome))]
+    if outcome.psnr is not None and outcome.blended_psnr is not None:
+        lines.append(("checked", _checked(outcome.withheld, outcome.psnr, outcome.blended_psnr)))
+    if outcome.rough:
+        lines.append(("rough", f"because {'. Also, '.join(outcome.rough)}."))
+    lines += [(word, f"{note}.") for word, note in zip(("metres", "aside"), outcome.notes, strict=False)]
+    return tuple(f"{word:<7} {text}" for word, text in lines)
+
+
+def _made(outcome: Outcome) -> str:
+    width, height = outcome.size
+    things = {0: "nothing that moves", 1: "1 moving thing"}.get(
+        outcome.things, f"{outcome.things} moving things"
+    )
+    if outcome.moving and not outcome.things:
+        things = "all of it free to move"
+    blobs = outcome.still + outcome.moving
+    return (
+        f"a scene of {blobs:,} Gaussians with {things}, from {outcome.frames} frames of {width}x{height}, in "
+        f"{_took(outcome.seconds)}"
+    )
+
+
+def _took(seconds: dict[str, float]) -> str:
+    """The whole and the longest stages."""
+    longest = sorted(seconds.items(), key=lambda stage: -stage[1])[:_NAMED]
+    parts = [f"{name} {duration(spent)}" for name, spent in longest if spent >= 1]
+    rest = sum(seconds.values()) - sum(spent for _, spent in longest if spent >= 1)
+    if parts and rest >= 1:
+        parts.append(f"the rest {duration(rest)}")
+    return duration(sum(seconds.values())) + (f" ({', '.join(parts)})" if parts else "")
+
+
+def duration(seconds: float) -> str:
+    """A time for people: ``8 s``, ``2 min 5 s``, ``1 h 20 min``."""
+    whole = max(1, round(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min" + (f" {whole % 60} s" if whole % 60 else "")
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def _checked(withheld: int, psnr: float, blended: float) -> str:
+    what = "1 withheld frame is" if withheld == 1 else f"{withheld} withheld frames are"
+    return (
+        f"{what} predicted with {psnr:.1f} dB; blending the frames beside gives {blended:.1f} dB (more is "
+        "better)"
+    )

@@ -1,0 +1,113 @@
+"""What is said before the work."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dreamdrive.data import read_clip
+from dreamdrive.data.video_writer import write_video
+from dreamdrive.errors import InputError
+from dreamdrive.run.cost import Planned, announcement, bytes_of, check_memory, plan, seconds_of
+from dreamdrive.scene.control import Control
+
+CLIP = Planned(24, 1, (480, 270), 10.0, 0, 1, chosen=True)
+
+# Frames, size, quality, seconds of one core, megabytes: runs of PandaSet 002 and Udacity's motorway.
+RUNS = [
+    (12, (320, 180), "draft", 18, 739),
+    (24, (320, 180), "draft", 36, 886),
+    (40, (320, 180), "draft", 60, 972),
+    (60, (320, 180), "draft", 84, 1358),
+    (80, (320, 180), "draft", 124, 1353),
+    (160, (320, 180), "draft", 228, 2307),
+    (24, (480, 270), "draft", 71, 1310),
+    (24, (320, 180), "standard", 81, 909),
+    (24, (480, 270), "standard", 156, 1310),
+]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_estimates_meet_what_was_measured(run: tuple) -> None:
+    frames, size, quality, seconds, megabytes = run
+    planned = replace(CLIP, frames=frames, size=size)
+    assert seconds_of(planned, quality, "hybrid", 1) == pytest.approx(seconds, rel=0.3)
+    assert bytes_of(planned) / 1e6 == pytest.approx(megabytes, rel=0.15)
+
+
+def test_more_cores_are_quicker_and_more_steps_slower() -> None:
+    one, two, many = (seconds_of(CLIP, "standard", "hybrid", cores) for cores in (1, 2, 64))
+    assert one > two > many > one / 4
+    assert seconds_of(CLIP, "high", "hybrid", 2) > 3 * two
+    assert seconds_of(CLIP, "standard", "deformable", 2) > 1.3 * two
+
+
+def test_a_short_clip_gets_one_line() -> None:
+    assert announcement(CLIP, "draft", "hybrid", 2) == (
+        "24 frames at 480x270 take about 45 s on 2 cores, and 1.2 GB of memory",
+    )
+
+
+def test_a_long_clip_that_nobody_shortened_gets_a_cheaper_choice() -> None:
+    long = replace(CLIP, frames=160, rate_hz=25.0, size=(480, 270), chosen=False)
+    first, second = announcement(long, "standard", "hybrid", 1)
+    assert first == "160 frames at 480x270 take about 12 min on 1 core, and 4.7 GB of memory"
+    assert second == ("That is a long clip: --frames 0:142:3 takes 48 of its frames, in about 4 min 30 s")
+    assert len(announcement(replace(long, chosen=True), "standard", "hybrid", 1)) == 1
+    assert len(announcement(replace(long, frames=60), "standard", "hybrid", 1)) == 1
+
+
+def test_what_memory_cannot_hold_is_refused_with_what_fits() -> None:
+    check_memory(CLIP, None)
+    check_memory(CLIP, 2_000_000_000)
+    with pytest.raises(InputError) as caught:
+        check_memory(replace(CLIP, frames=1000, chosen=False), 12_000_000_000)
+    assert str(caught.value) == (
+        "1000 frames at 480x270 need about 26.5 GB of memory, and 12.0 GB are free; give --frames 0:440 or "
+        "--size 318x178"
+    )
+    check_memory(replace(CLIP, frames=440), 12_000_000_000)
+    check_memory(replace(CLIP, frames=1000, size=(318, 178)), 12_000_000_000)
+    with pytest.raises(InputError) as caught:
+        check_memory(CLIP, 300_000_000)
+    assert str(caught.value) == (
+        "24 frames at 480x270 need about 1.2 GB of memory, and 0.3 GB are free; free some memory, or give a "
+        "smaller --size"
+    )
+
+
+def test_a_recording_is_planned_without_reading_it(tmp_path: Path) -> None:
+    frames = np.zeros((9, 64, 96, 3), np.uint8)
+    write_video(tmp_path / "clip.mp4", iter(frames), 25.0)
+    assert plan(Control(tmp_path / "clip.mp4"), "replay") == Planned(9, 1, (96, 64), 25.0, 0, 1, chosen=False)
+    chosen = plan(Control(tmp_path / "clip.mp4", frames="1:8:2", size=(48, 32), fps=5), "replay")
+    assert chosen == Planned(4, 1, (48, 32), 5, 1, 2, chosen=True)
+    folder = tmp_path / "images"
+    folder.mkdir()
+    for i in range(3):
+        cv2.imwrite(str(folder / f"{i}.png"), frames[i])
+    assert plan(Control(folder), "replay") == Planned(3, 1, (96, 64), None, 0, 1, chosen=False)
+    assert plan(Control(folder, frames="5:"), "replay") is None
+    assert plan(Control(folder), "vista") is None
+
+
+def test_a_drawn_street_is_planned() -> None:
+    assert plan(Control(), "street-world") == Planned(24, 1, (320, 192), None, 0, 1, chosen=True)
+    drawn = plan(Control(frames="2:12:2", size=(64, 40)), "street-world")
+    assert drawn == Planned(5, 1, (64, 40), None, 2, 2, chosen=True)
+
+
+def test_frames_that_memory_cannot_hold_are_not_all_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i in range(4):
+        cv2.imwrite(str(tmp_path / f"{i}.png"), np.zeros((40, 64, 3), np.uint8))
+    monkeypatch.setattr("dreamdrive.data.clip_reader.free_bytes", lambda: 3 * 8 * 64 * 40)
+    with pytest.raises(InputError) as caught:
+        read_clip(tmp_path)
+    assert str(caught.value) == (
+        f"{tmp_path}: memory holds 3 frames of 64x40 at most, and more are selected; choose some with "
+        "--frames START:STOP:STEP, or give a smaller --size"
+    )

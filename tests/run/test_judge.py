@@ -1,0 +1,167 @@
+"""What is said of results of every kind, word for word."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.streets import small_street, street_clip, true_geometry
+
+from dreamdrive.held_out import Likeness
+from dreamdrive.run.judge import Facts, facts_of, limits_of, rough_because
+from dreamdrive.scene.geometry import Scale
+
+GOOD = Facts(
+    frames=24,
+    placed=24,
+    interval_s=0.1,
+    fallback=None,
+    scenes=((0, 46),),
+    step=2,
+    psnr=28.9,
+    blended_psnr=25.6,
+    quality="draft",
+    focal_observed=True,
+    basis="height",
+    spread=0.04,
+)
+BLANK = (
+    "nothing in the frames could be followed from one to the next: they are too dark, too plain or too "
+    "noisy. The camera counts as standing still. Choose clearer frames with --frames"
+)
+REFUSED = (
+    "the frames did not show clearly how the camera moved; its path is a guess. Choose frames in which the "
+    "car drives along a street that is well seen, with --frames, or give the path with --poses"
+)
+ROUGH = {
+    "good": (GOOD, ()),
+    "nothing withheld": (replace(GOOD, psnr=None, blended_psnr=None), ()),
+    "black or noise": (replace(GOOD, fallback="blank"), (BLANK,)),
+    "standing": (
+        replace(GOOD, fallback="standing"),
+        (
+            "the camera stands still, which hides how far away things are. Choose frames in which the car "
+            "drives, with --frames",
+        ),
+    ),
+    "refused": (replace(GOOD, fallback="refused"), (REFUSED,)),
+    "one frame a second": (
+        replace(GOOD, fallback="refused", interval_s=1.0),
+        (
+            "the frames are 1.0 s apart, too far to tell how the camera moved; its path is a guess. Give a "
+            "recording with five frames a second or more, or a smaller step in --frames",
+        ),
+    ),
+    "three frames": (
+        replace(GOOD, frames=3, placed=3),
+        ("there are only 3 frames. Give 8 or more, better 24, with --frames or a longer recording",),
+    ),
+    "two frames": (
+        replace(GOOD, frames=2, placed=2, fallback="few"),
+        ("there are only 2 frames. Give 8 or more, better 24, with --frames or a longer recording",),
+    ),
+    "few placed": (
+        replace(GOOD, placed=6),
+        (
+            "only 6 of 24 frames found their place on the path. Choose frames in which the street is well "
+            "seen, with --frames",
+        ),
+    ),
+    "cut": (
+        replace(GOOD, scenes=((0, 10), (12, 46))),
+        (
+            "the recording jumps to another place at frame 12, and one scene was made of all. Choose one "
+            "place, such as --frames 12:47:2",
+        ),
+    ),
+    "worse than blending": (
+        replace(GOOD, psnr=21.2, blended_psnr=23.0),
+        (
+            "withheld frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
+            "dB): --quality standard takes more steps",
+        ),
+    ),
+    "worse although high": (
+        replace(GOOD, psnr=21.2, blended_psnr=23.0, quality="high"),
+        (
+            "withheld frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
+            "dB): a shorter stretch, chosen with --frames, is easier",
+        ),
+    ),
+}
+HOLD = "views up to 2 m beside the recorded path hold best; further away gaps show"
+METRES = {
+    "height given": (GOOD, "from the height of the camera, within 4 %"),
+    "height assumed": (
+        replace(GOOD, basis="usual height", spread=0.16),
+        "they may be off by 16 %, since the camera is taken to be 1.5 m above the road. Give --camera-height",
+    ),
+    "field of view assumed": (
+        replace(GOOD, focal_observed=False, spread=0.35),
+        "they may be off by 35 %, since the camera's field of view is a guess. Give --hfov or --intrinsics",
+    ),
+    "both assumed": (
+        replace(GOOD, basis="usual height", focal_observed=False, spread=0.38),
+        "they may be off by 38 %, since the camera is taken to be 1.5 m above the road and its field of view "
+        "is a guess. Give --camera-height and --hfov or --intrinsics",
+    ),
+    "poses": (replace(GOOD, basis="given", spread=0.0), "as given with the input"),
+    "depth": (replace(GOOD, basis="given", spread=0.05), "as given with the input, within 5 %"),
+    "speed": (
+        replace(GOOD, basis="usual speed", spread=0.6),
+        "nothing shows them; a speed of 8 m/s is assumed, so that all distances may be off by 60 % or more. "
+        "Frames in which the road is well seen help, and --poses",
+    ),
+    "speed asked for": (
+        replace(GOOD, basis="asked speed", spread=0.6),
+        "from the speed that was asked for; they may be off by 60 %",
+    ),
+    "unknown": (
+        replace(GOOD, basis="usual depth", spread=np.inf),
+        "nothing shows them; a distance of 12 m is assumed, so that all distances may be off by any factor "
+        "or more. Frames in which the road is well seen help, and --poses",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ROUGH)
+def test_reasons_and_advice(case: str) -> None:
+    facts, expected = ROUGH[case]
+    assert rough_because(facts) == expected
+
+
+@pytest.mark.parametrize("case", METRES)
+def test_how_sure_metres_are(case: str) -> None:
+    facts, expected = METRES[case]
+    assert limits_of(facts) == (expected, HOLD)
+
+
+def test_views_aside_are_not_promised_where_distances_are_a_guess() -> None:
+    expected = "views beside the recorded path cannot be trusted here, since distances are a guess"
+    assert limits_of(replace(GOOD, fallback="blank"))[1] == expected
+    assert limits_of(replace(GOOD, scenes=((0, 10), (12, 46))))[1] == expected
+
+
+def test_facts_are_those_of_the_result() -> None:
+    street = small_street(frames=6)
+    clip, geometry = street_clip(street), true_geometry(street)
+    clip = replace(clip, source_index=10 + 2 * np.arange(6), cuts=(4,))
+    found = replace(
+        geometry, fallback="words", fallback_kind="blank", placed=5, scale=Scale("x", 0.2, basis="height")
+    )
+    facts = facts_of(clip, found, "draft", {1: Likeness(20.0, 0.5), 2: Likeness(30.0, 0.5)}, {})
+    assert facts.interval_s == pytest.approx(0.1)
+    assert facts == Facts(
+        frames=6,
+        placed=5,
+        interval_s=facts.interval_s,
+        fallback="blank",
+        scenes=((10, 16), (18, 20)),
+        step=2,
+        psnr=25.0,
+        blended_psnr=None,
+        quality="draft",
+        focal_observed=True,
+        basis="height",
+        spread=0.2,
+    )
+    assert facts_of(clip, geometry, "draft", {}, {}).fallback is None
