@@ -1,5 +1,7 @@
 """What is wrong with a file of weights is said by name."""
 
+import os
+import zipfile
 from argparse import Namespace
 from pathlib import Path
 
@@ -7,8 +9,9 @@ import pytest
 import torch
 from torch import nn
 
+from dreamdrive import weights
 from dreamdrive.errors import InputError
-from dreamdrive.weights import fill, fill_network, load_network, read_torch
+from dreamdrive.weights import check_sizes, fill, fill_network, load_network, read_torch
 
 
 class Small(nn.Module):
@@ -106,3 +109,90 @@ def test_a_network_that_is_built_already_is_filled_and_shared_tensors_need_one_n
     assert network.index.tolist() == [0, 1, 2, 3]
     with pytest.raises(InputError, match=r"memory does not fit \(2 missing: layer.bias, same.bias\)"):
         fill(Twice(), {"layer.weight": torch.ones(3, 2)}, "memory", "twice.pth")
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        load(path)
+    return str(caught.value).replace(str(path), "FILE")
+
+
+DAMAGED = (
+    "FILE cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled object{}); "
+    "expected small.pth"
+)
+
+
+def test_a_compressed_archive_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    whole = saved(tmp_path)
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(tmp_path / "z.pth", "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name) if not name.endswith("data/0") else bytes(10_000_000))
+    assert refusal(tmp_path / "z.pth") == DAMAGED.format("; it is compressed, as torch.save never does")
+
+
+def test_an_archive_of_countless_parts_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(weights, "HEADER_BYTES", 100)
+    assert refusal(saved(tmp_path)) == DAMAGED.format("; it holds more parts than weights have")
+
+
+def test_an_archive_of_endless_values_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(weights, "_PICKLE_BYTES", 100)
+    assert refusal(saved(tmp_path)) == DAMAGED.format("; it holds more plain values than weights have")
+
+
+def test_a_pipe_is_no_weights(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "w.pth")
+    assert refusal(tmp_path / "w.pth") == "FILE does not exist or is no file; expected small.pth"
+    os.mkfifo(tmp_path / "w.safetensors")
+    assert refusal(tmp_path / "w.safetensors") == (
+        "FILE is missing or damaged (the file cannot be read: it is not a regular file); expected small.pth"
+    )
+
+
+@pytest.mark.parametrize("header", [0, 2**40, 2**63])
+def test_a_header_longer_than_the_file_is_refused(tmp_path: Path, header: int) -> None:
+    (tmp_path / "w.safetensors").write_bytes(header.to_bytes(8, "little") + b"{}")
+    assert refusal(tmp_path / "w.safetensors") == (
+        f"FILE is missing or damaged (it states a header of {header} bytes and has 10); expected small.pth"
+    )
+
+
+@pytest.mark.parametrize(
+    ("weight", "said"),
+    [
+        (torch.zeros(1).expand(3000, 2000), "claims the shape (3000, 2000), more than the file holds"),
+        (torch.zeros(3, 2).to_sparse(), "is no plain tensor"),
+        (torch.zeros(3, 2, device="meta"), "is no plain tensor"),
+        (torch.zeros(3, 2, dtype=torch.int32), "holds int32, not float32"),
+        (torch.zeros(3, 2, dtype=torch.complex64), "holds complex64, not float32"),
+    ],
+)
+def test_tensors_that_are_none_are_named(tmp_path: Path, weight: torch.Tensor, said: str) -> None:
+    path = saved(tmp_path, **{"layer.weight": weight})
+    assert refusal(path) == f"FILE: layer.weight {said}; expected small.pth"
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
+def test_weights_that_are_not_finite_are_refused(tmp_path: Path, bad: float) -> None:
+    weight = torch.zeros(3, 2, dtype=torch.bfloat16)
+    weight[2, 1] = bad
+    path = saved(tmp_path, **{"layer.weight": weight})
+    assert refusal(path) == "FILE: layer.weight holds numbers that are not finite; copy the file again"
+
+
+def test_a_network_too_large_for_any_memory_is_refused() -> None:
+    with pytest.raises(InputError, match=r"memory: no network is of these sizes \(.*\); expected small\.pth"):
+        fill_network(lambda: nn.Linear(2**40, 2**40), {}, "memory", "small.pth")
+
+
+def test_sizes_of_networks_are_bounded() -> None:
+    check_sizes({"a": [1024, {"num_layers": 24}], "eps": 1e30, "on": True, "none": None}, "config.json")
+    for values, said in (
+        ({"a": {"width": 10_000_000}}, "config.json: width is 10000000; expected at most 65536"),
+        ({"layers_per_block": [2, 1001]}, "config.json: layers_per_block is 1001; expected at most 1000"),
+        ({"depth": -2000}, "config.json: depth is -2000; expected at most 1000"),
+    ):
+        with pytest.raises(InputError) as caught:
+            check_sizes(values, "config.json")
+        assert str(caught.value) == said

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import is_inside, read_text
 
 _NAME = re.compile(r"[A-Za-z0-9][\w.-]*/[\w.-]+")
 
@@ -27,8 +28,9 @@ def find_weights(given: str | Path) -> Path:
         raise InputError(f"--weights {name} does not exist; expected a file of weights or its folder")
     folder = cache() / f"models--{name.replace('/', '--')}"
     current = folder / "refs" / "main"
-    snapshot = folder / "snapshots" / (current.read_text().strip() if current.is_file() else "none")
-    if not snapshot.is_dir():
+    commit = read_text(current, at_most=1000).strip() if current.is_file() else "none"
+    snapshot = folder / "snapshots" / commit
+    if not is_inside(commit) or not snapshot.is_dir():
         raise InputError(
             f"--weights {name} is neither a path nor a model in {cache()}; "
             f"to download it yourself: hf download {name}"

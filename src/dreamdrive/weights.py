@@ -1,14 +1,17 @@
 """Weights from a file into a network, or a message that says what is wrong with the file."""
 
 import hashlib
+import os
 import pickle
 import re
+import struct
 import warnings
 import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import torch
 from safetensors import SafetensorError
@@ -16,9 +19,19 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import open_file
+from dreamdrive.scene.tensor_file import HEADER_BYTES, briefly, header_problem
+from dreamdrive.scene.zip_file import directory_bytes
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4
+_PICKLE_BYTES = 4_000_000
+"""Most that ``torch.save`` may have written beside the tensors; 1000 tensors take 0.1 MB."""
+_WIDEST, _DEEPEST = 65_536, 1000
+"""Largest number that a configuration of a network may hold, and of what counts layers."""
+_LAYERS = re.compile("layers|depth|blocks_num|num_blocks")
+_STRETCHED = 1_000_000
+"""Numbers that a tensor may show although fewer are stored."""
 _REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
@@ -58,8 +71,13 @@ def fill_network(
     Raises:
         InputError: Keys are missing or left over, or shapes differ.
     """
-    with torch.device("meta"):
-        network = make()
+    try:
+        with torch.device("meta"):
+            network = make()
+    except (RuntimeError, OverflowError) as error:
+        raise InputError(
+            f"{source}: no network is of these sizes ({briefly(error)}); expected {expected}"
+        ) from None
     return fill(network, state, source, expected)
 
 
@@ -73,7 +91,7 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
         expected: Which file is expected, for messages.
 
     Raises:
-        InputError: Keys are missing or left over, or shapes differ.
+        InputError: Keys are missing or left over, shapes or types differ, or numbers are not finite.
     """
     wanted = network.state_dict()
     counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
@@ -81,6 +99,7 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
     wrong = misfits(*({key: value.shape for key, value in each.items()} for each in (wanted, state)))
     if wrong:
         raise InputError(f"{source} does not fit ({in_words(wrong)}); expected {expected}")
+    _check_numbers(wanted, state, source, expected)
     values = {key: value.float() if value.is_floating_point() else value for key, value in state.items()}
     network.load_state_dict(values, assign=True)
     return network.eval().requires_grad_(False)
@@ -95,9 +114,11 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
     if path.suffix != ".safetensors":
         return as_state(read_torch(path, expected), str(path), expected)
     try:
+        if problem := header_problem(path):
+            raise SafetensorError(problem)
         return load_file(path)
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"{path} is missing or damaged ({error}); expected {expected}") from None
+    except (OSError, SafetensorError, ValueError, RuntimeError, KeyError) as error:
+        raise InputError(f"{path} is missing or damaged ({briefly(error)}); expected {expected}") from None
 
 
 def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
@@ -114,6 +135,7 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {expected}")
     try:
+        _check_archive(path)
         with warnings.catch_warnings(), torch.serialization.safe_globals(list(allowed)):
             warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
             return torch.load(path, map_location="cpu", weights_only=True)
@@ -125,9 +147,19 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
         OSError,
         ValueError,
         KeyError,
+        # A damaged pickle builds what its classes do not take.
+        TypeError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        MemoryError,
+        AssertionError,
+        NotImplementedError,
+        struct.error,
     ) as error:
         refused = _REFUSED.search(str(error))
         about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
+        about = f"; {briefly(error)}" if isinstance(error, zipfile.BadZipFile) else about
         raise InputError(
             f"{path} cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled "
             f"object{about}); expected {expected}"
@@ -147,7 +179,23 @@ def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
     """
     if not isinstance(content, dict) or not all(isinstance(value, Tensor) for value in content.values()):
         raise InputError(f"{source} holds no table of tensors; expected {expected}")
+    for key, value in content.items():
+        if problem := _problem(value):
+            raise InputError(f"{source}: {briefly(key)} {problem}; expected {expected}")
     return {str(key): value for key, value in content.items()}
+
+
+def check_sizes(values: object, where: str) -> None:
+    """Whether whole numbers in a configuration are sizes that networks have, before one is built of them.
+
+    Args:
+        values: JSON values.
+        where: Where they come from, for messages.
+
+    Raises:
+        InputError: One is larger; of layers and depths there may be fewer.
+    """
+    _check_sizes(values, where, "", _WIDEST)
 
 
 def sha256(path: Path) -> str:
@@ -157,10 +205,72 @@ def sha256(path: Path) -> str:
         InputError: The file cannot be read.
     """
     try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        with open_file(path) as file:
+            return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _check_sizes(values: object, where: str, name: str, limit: int) -> None:
+    if isinstance(values, dict):
+        for key, value in cast("dict[str, object]", values).items():
+            _check_sizes(value, where, key, _DEEPEST if _LAYERS.search(key) else _WIDEST)
+    elif isinstance(values, list):
+        for value in cast("list[object]", values):
+            _check_sizes(value, where, name, limit)
+    elif isinstance(values, int) and abs(values) > limit:
+        raise InputError(f"{where}: {name} is {values}; expected at most {limit}")
+
+
+def _check_archive(path: Path) -> None:
+    """Refuse an archive that unpacks to more than it holds; ``torch.save`` never compresses."""
+    with open_file(path) as file:
+        if file.read(4) != b"PK\3\4":
+            return
+        size = os.fstat(file.fileno()).st_size
+        if directory_bytes(file) > HEADER_BYTES:
+            raise zipfile.BadZipFile("it holds more parts than weights have")
+        with zipfile.ZipFile(file) as archive:
+            parts = archive.infolist()
+    # TorchScript is compressed in part, and refused without being unpacked.
+    script = any(part.filename.endswith("/constants.pkl") for part in parts)
+    packed = any(part.compress_type != zipfile.ZIP_STORED for part in parts)
+    if any(part.filename.endswith("/data.pkl") and part.file_size > _PICKLE_BYTES for part in parts):
+        raise zipfile.BadZipFile("it holds more plain values than weights have")
+    if not script and (packed or sum(part.file_size for part in parts) > size):
+        raise zipfile.BadZipFile("it is compressed, as torch.save never does")
+
+
+def _problem(value: Tensor) -> str | None:
+    """What is wrong with a tensor from a file, whatever network it is for."""
+    if value.layout is not torch.strided or value.is_quantized or value.device.type != "cpu":
+        return "is no plain tensor"
+    if value.numel() > max(_STRETCHED, value.untyped_storage().nbytes() // max(value.element_size(), 1)):
+        return f"claims the shape {tuple(value.shape)}, more than the file holds"
+    return None
+
+
+def _check_numbers(
+    wanted: Mapping[str, Tensor], state: Mapping[str, Tensor], source: str, expected: str
+) -> None:
+    """Whether tensors of the right shapes hold numbers of the right kind, all of them finite."""
+    for key, value in state.items():
+        if value.is_floating_point() != wanted[key].is_floating_point() or value.is_complex():
+            raise InputError(
+                f"{source}: {briefly(key)} holds {_name(value)}, not {_name(wanted[key])}; expected "
+                f"{expected}"
+            )
+        # The extremes tell without a copy; what is not a number is its own extreme.
+        if value.is_floating_point() and value.numel():
+            low, high = torch.aminmax(value if value.element_size() > 1 else value.float())
+            if not (torch.isfinite(low) and torch.isfinite(high)):
+                raise InputError(
+                    f"{source}: {briefly(key)} holds numbers that are not finite; copy the file again"
+                )
+
+
+def _name(value: Tensor) -> str:
+    return str(value.dtype).removeprefix("torch.")
 
 
 def _shared(wanted: dict[str, Tensor], state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -199,4 +309,4 @@ def in_words(found: Mapping[str, list[str]]) -> str:
 
 def some(keys: Sequence[str]) -> str:
     """The first few keys, for a message."""
-    return ", ".join(keys[:_SHOWN]) + (", ..." if len(keys) > _SHOWN else "")
+    return ", ".join(map(briefly, keys[:_SHOWN])) + (", ..." if len(keys) > _SHOWN else "")

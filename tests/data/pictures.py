@@ -10,3 +10,13 @@ def texture(height: int, width: int, seed: int = 0) -> np.ndarray:
         0, 256, (height // 12 + 2, width // 12 + 2, 3), dtype=np.uint8
     )
     return cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+
+
+def approach(seed: int = 0, count: int = 6, size: tuple[int, int] = (160, 96)) -> np.ndarray:
+    """A drive towards a picture: 3 % nearer with each frame."""
+    picture = texture(size[1], size[0], seed)
+    middle = (size[0] / 2, size[1] / 2)
+    nearer = [cv2.getRotationMatrix2D(middle, 0, 1.03**index) for index in range(count)]
+    return np.stack(
+        [cv2.warpAffine(picture, matrix, size, borderMode=cv2.BORDER_REFLECT) for matrix in nearer]
+    )

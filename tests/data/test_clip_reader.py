@@ -233,3 +233,26 @@ def test_golden_a_distorted_video_survives_there_and_back(data_dir):
     error = (again - plain.frames[0] / 255.0)[seen]
     assert seen.mean() > 0.85
     assert -10 * np.log10(np.mean(error**2)) > 35
+
+
+def test_a_clock_of_no_camera_asks_for_a_rate(make_video):
+    path = make_video(6, rate=1_000_000)
+    with pytest.raises(InputError) as caught:
+        read_clip(path)
+    assert str(caught.value) == f"{path} has no usable times; give its rate with --fps"
+    np.testing.assert_allclose(read_clip(path, fps=10).times_s, np.arange(6) / 10)
+
+
+def test_black_frames_are_refused(make_folder):
+    noise = np.abs(np.random.default_rng(0).normal(0, 3, (4, 48, 64, 3)))
+    folder = make_folder(list(noise.astype(np.uint8)))
+    with pytest.raises(InputError) as refused:
+        read_clip(folder, fps=10)
+    assert str(refused.value) == (
+        f"{folder}: every selected frame is black; expected pictures of a street, choose others with --frames"
+    )
+
+
+def test_frames_of_one_colour_are_said_to_show_nothing(make_folder):
+    clip = read_clip(make_folder([np.full((48, 64, 3), 120, np.uint8)] * 3), fps=10)
+    assert "No frame shows anything that could be recognised." in clip.provenance["notes"]

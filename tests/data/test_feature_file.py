@@ -1,6 +1,7 @@
 """Features from files."""
 
 import json
+import os
 from pathlib import Path
 
 import cv2
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from safetensors.numpy import save_file
 from tests.data.pictures import texture
 
-from dreamdrive.data import read_clip
+from dreamdrive.data import feature_file, read_clip
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.errors import InputError
 from dreamdrive.prior.replay import REPLAY
@@ -87,14 +88,18 @@ def test_rubbish_is_refused_by_name(tmp_path, rubbish, at, cut):
     ("arrays", "metadata", "problem"),
     [
         ({}, {"provenance": "{}"}, "holds no array"),
-        ({"a": features().astype(np.float64)}, {"provenance": "{}"}, "'a' holds float64"),
+        (
+            {"a": features().astype(np.float64)},
+            {"provenance": "{}"},
+            "'a' holds F64; expected float16 or float32",
+        ),
         ({"a": features()[0]}, {"provenance": "{}"}, r"'a' has the shape \(4, 8, 2\)"),
         ({"a": features(channels=640)}, {"provenance": "{}"}, "640 channels; expected at most 128"),
         ({"a": features() * np.float32("nan")}, {"provenance": "{}"}, "NaN or infinite"),
         ({"a": features(), "b": features(3)}, {"provenance": "{}"}, "numbers of frames: 'a' 6, 'b' 3"),
         ({"a": features()}, None, "does not say where it comes from"),
         ({"a": features()}, {"provenance": "[1]"}, "no JSON object"),
-        ({"a": features()}, {"provenance": "model"}, "no JSON object"),
+        ({"a": features()}, {"provenance": "model"}, "'provenance' is not JSON"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, arrays, metadata, problem):
@@ -121,7 +126,7 @@ def test_rows_are_those_of_the_frames_that_the_file_names(tmp_path):
 def test_a_missing_file_and_unusable_arrays(tmp_path):
     with pytest.raises(InputError, match=r"none.safetensors cannot be read"):
         read_features(tmp_path / "none.safetensors")
-    with pytest.raises(ValueError, match="'a' holds float64"):
+    with pytest.raises(ValueError, match="'a' holds float64; expected float16 or float32"):
         written(tmp_path / "f.safetensors", a=features().astype(np.float64))
 
 
@@ -165,3 +170,29 @@ def test_features_of_distorted_pictures_are_refused(folder, tmp_path):
     path = written(tmp_path / "f.safetensors", deep=features())
     with pytest.raises(InputError, match="undistort the input first"):
         read_clip(folder, intrinsics=tmp_path / "lens.json", features=path)
+
+
+def test_a_file_is_judged_by_its_header(tmp_path, monkeypatch):
+    path = tmp_path / "f.safetensors"
+    expected = (
+        "expected a .safetensors file with arrays (frames, rows, columns, channels), see docs/replay.md"
+    )
+
+    def refusal() -> str:
+        with pytest.raises(InputError) as caught:
+            read_features(path)
+        return str(caught.value).replace(str(path), "FILE")
+
+    path.write_bytes((2**40).to_bytes(8, "little") + b"{}")
+    assert refusal() == (
+        f"--features FILE cannot be read (it states a header of 1099511627776 bytes and has 10); {expected}"
+    )
+    path.unlink()
+    os.mkfifo(path)
+    assert refusal() == (
+        f"--features FILE cannot be read (the file cannot be read: it is not a regular file); {expected}"
+    )
+    path.unlink()
+    written(path, a=features())
+    monkeypatch.setattr(feature_file, "FEATURE_BYTES", 1000)
+    assert refusal().startswith("--features FILE cannot be read (it holds 0 MB, more than 0)")

@@ -140,7 +140,10 @@ def test_bad_poses_are_refused_with_their_row(write, change, words):
     with pytest.raises(InputError, match=rf"line 3.*{words}"):
         read(write(kitti(poses)), [0, 1, 2, 3], 4)
     values = {"world_from_camera": poses.tolist(), "times_s": [0, 1, 2, 3]}
-    with pytest.raises(InputError, match=rf"pose 2 \(counted from 0\).*{words}"):
+    in_json = (
+        "NaN or Infinity, which JSON has not" if change == "nan" else rf"pose 2 \(counted from 0\).*{words}"
+    )
+    with pytest.raises(InputError, match=in_json):
         read(write(values, "t.json"), [0, 1, 2, 3], 4)
 
 
@@ -181,7 +184,7 @@ def test_a_trajectory_needs_times(write):
 def test_files_that_are_not_text_are_refused(tmp_path):
     (tmp_path / "p.txt").write_bytes(b"\xff\xfe\x00\x81")
     for path in (tmp_path / "p.txt", tmp_path / "none.txt"):
-        with pytest.raises(InputError, match="cannot be read as text"):
+        with pytest.raises(InputError, match="cannot be read"):
             read(path, [0, 1], 2)
 
 

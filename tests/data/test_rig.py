@@ -4,10 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.data.pictures import approach
 from tests.rigs import drives, rig_clip, true_poses
 
 from dreamdrive.data.rig import RIG, is_rig, read_rig, read_rig_clip
@@ -39,6 +41,25 @@ def test_poses_of_the_first_place_all(world: Path) -> None:
     assert clip.known.world_from_camera is not None
     np.testing.assert_allclose(
         clip.known.world_from_camera[clip.of_camera(1)], true_poses("front_left"), atol=1e-6
+    )
+
+
+def test_cuts_are_those_of_each_camera(tmp_path: Path) -> None:
+    first, second = approach(0), approach(1)
+    for name, frames in {"a": first, "b": np.concatenate([first[:3], second[:3]])}.items():
+        (tmp_path / name).mkdir()
+        for index, frame in enumerate(frames):
+            assert cv2.imwrite(str(tmp_path / name / f"{index}.png"), frame)
+    pose = np.eye(4).tolist()
+    listed = [{"frames": name, "intrinsics": None, "car_from_camera": pose} for name in ("a", "b")]
+    (tmp_path / RIG).write_text(json.dumps({"cameras": listed}))
+    clip = read_rig_clip(tmp_path)
+    assert clip.cuts == (7,)
+    assert (clip.camera[7], clip.step[7]) == (1, 3)
+    assert (clip.only(0).cuts, clip.only(1).cuts) == ((), (3,))
+    assert (
+        "The picture cuts to another scene at frame 3 of the source; --frames 0:3:1 or 3:6:1 keeps to one."
+        in clip.provenance["notes"]
     )
 
 

@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,6 +51,48 @@ def test_float_frames_equal_byte_frames_and_equal_input_gives_equal_bytes(tmp_pa
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
+# Frames that move and fade, which x264 predicts from each other both ways; says what the files hash to.
+DRIFTING = """
+import hashlib, sys
+from pathlib import Path
+import cv2, numpy as np
+from dreamdrive.data.video_writer import write_video
+path, width, height, times = Path(sys.argv[1]), *map(int, sys.argv[2:])
+noise = np.random.default_rng(0).integers(0, 255, (height // 16 + 2, width // 16 + 3, 3), np.uint8)
+wide = cv2.resize(noise, None, fx=16, fy=16)
+frames = [wide[:height, i : i + width] * ((1 - i / 32) / 255) for i in range(16)]
+for _ in range(times):
+    write_video(path, frames, 10.0)
+    print(hashlib.sha256(path.read_bytes()).hexdigest())
+"""
+
+
+def hashes(path: Path, size: tuple[int, int], times: int, fill: int) -> set[str]:
+    """What equal frames hash to in a process of its own, where the C library fills new memory with a byte."""
+    command = [sys.executable, "-c", DRIFTING, str(path), *map(str, size), str(times)]
+    environment = {**os.environ, "MALLOC_PERTURB_": str(fill)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_bytes_do_not_depend_on_what_memory_held_before(tmp_path: Path) -> None:
+    found = [hashes(tmp_path / "a.mp4", (162, 98), 2, fill) for fill in (1, 128)]
+    assert len(set.union(*found)) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(480, 270), (320, 192), (162, 98)])
+def test_twenty_writes_beside_busy_processes_give_one_file(tmp_path: Path, size: tuple[int, int]) -> None:
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: bytearray(10**6)"]) for _ in range(2)]
+    try:
+        found = [hashes(tmp_path / "a.mp4", size, 5, fill) for fill in (0, 1, 128, 255)]
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    assert len(set.union(*found)) == 1
+
+
 @pytest.mark.parametrize("size", [(47, 65), (48, 65), (47, 64), (1, 1), (2, 3)])
 def test_odd_sizes_are_padded_to_even(tmp_path: Path, size: tuple[int, int]) -> None:
     write_video(tmp_path / "a.mp4", frames(2, *size), 10.0)
@@ -67,6 +112,14 @@ def test_a_failure_half_way_leaves_what_was_there(tmp_path: Path) -> None:
         write_video(tmp_path / "a.mp4", failing(), 10.0)
     assert (tmp_path / "a.mp4").read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
+
+
+def test_what_a_link_at_the_temporary_name_points_to_stays(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / ".a.partial.mp4").symlink_to(tmp_path / "mine")
+    write_video(tmp_path / "a.mp4", frames(), 10.0)
+    assert (tmp_path / "mine").read_text() == "mine"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mp4", "mine"]
 
 
 def test_unwritable_places_are_said(tmp_path: Path) -> None:

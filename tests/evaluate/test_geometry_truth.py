@@ -168,13 +168,13 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no size": (
         lambda folder: (recording(folder) / "meta.json").write_text("{}"),
-        "--truth PLACE/meta.json is unusable (KeyError('width')); expected JSON with width, height and, "
+        "--truth PLACE/meta.json is unusable (calibration: Object missing required field `width`); expected "
+        "JSON with width, height and, "
         'where known, intrinsics {"fx", "fy", "cx", "cy"} in pixels',
     ),
     "no depth in a file": (
         lambda folder: np.savez(recording(folder) / "lidar_depth" / "0001.npz", u=np.zeros(2), v=np.zeros(2)),
-        "PLACE/lidar_depth/0001.npz cannot be read ('depth is not a file in the archive'); expected arrays "
-        "u, v and depth",
+        "PLACE/lidar_depth/0001.npz lacks the array 'depth'; expected arrays u, v and depth",
     ),
     "lists of different lengths": (
         lambda folder: write_points(recording(folder) / "lidar_depth" / "0001.npz", [1], [1, 2], [3]),
@@ -200,12 +200,14 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no matrix": (
         lambda folder: edit(pandaset(folder) / "cameras.json", '"K"', '"k"'),
-        "--truth PLACE/cameras.json: side_camera has no usable width, height and K (KeyError('K')); expected "
+        "--truth PLACE/cameras.json: side_camera has no usable width, height and K (calibration: "
+        "Object missing required field `K`); expected "
         "pixels and a 3x3 matrix",
     ),
     "boxes without a place": (
         lambda folder: edit(pandaset(folder) / "cuboids.json", "position", "place"),
-        "--truth PLACE/cuboids.json is damaged (KeyError('position')); expected frames, each a list of boxes "
+        "--truth PLACE/cuboids.json is damaged (cuboids: Object missing required field "
+        "`position` - at `$.frames[5][0]`); expected frames, each a list of boxes "
         "with motion, position, size_wlh and yaw: take it away to do without what moves",
     ),
 }

@@ -1,4 +1,5 @@
 import contextlib
+import os
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,20 @@ def test_bad_files_are_explained(tmp_path: Path) -> None:
     write_ply(gaussians(6), tmp_path / "a.ply")
     (tmp_path / "a.ply").write_bytes((tmp_path / "a.ply").read_bytes()[:-5])
     with pytest.raises(InputError, match="cut off"):
+        read_ply(tmp_path / "a.ply")
+
+
+def test_what_is_no_plain_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.ply")
+    with pytest.raises(InputError, match=r"a\.ply cannot be read: it is not a regular file"):
+        read_ply(tmp_path / "a.ply")
+
+
+def test_a_count_of_countless_digits_is_refused(tmp_path: Path) -> None:
+    write_ply(gaussians(3), tmp_path / "a.ply")
+    data = (tmp_path / "a.ply").read_bytes().replace(b"vertex 3\n", b"vertex " + b"9" * 5000 + b"\n")
+    (tmp_path / "a.ply").write_bytes(data)
+    with pytest.raises(InputError, match="expected one element vertex with float properties only"):
         read_ply(tmp_path / "a.ply")
 
 

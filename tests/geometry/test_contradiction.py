@@ -72,3 +72,16 @@ def test_frames_that_show_nothing_contradict_nothing(clip: Clip) -> None:
     still = straight([0.0] * 7)
     evidence = look(clip)
     assert explain(evidence.grey, evidence.street, evidence.small, still).pairs == 0
+
+
+def test_poses_that_stand_are_refused_where_the_camera_moves(clip: Clip) -> None:
+    standing = np.tile(np.eye(4), (len(clip), 1, 1))
+    given = replace(clip, known=Known(world_from_camera=standing, intrinsics=True))
+    with pytest.raises(InputError) as refused:
+        check(given, look(given))
+    assert str(refused.value) == (
+        "the given poses are all the same, but the camera moves in the frames: with them nothing has a "
+        "depth. Give the pose of each frame, or none to have them found"
+    )
+    still = replace(given, frames=np.repeat(clip.frames[:1], len(clip), axis=0))
+    check(still, look(still))

@@ -104,3 +104,11 @@ def test_a_scene_without_dynamic_things_or_sky() -> None:
     assert not view.dynamic.any()
     assert view.colour[2, 32].max() == 0
     assert render_scene(scene(dynamic=empty), CAMERA, 0.0, part="dynamic").alpha.max() == 0
+
+
+def test_the_black_behind_what_moves_is_not_exposed() -> None:
+    """An exposure that brightens everything by 0.2 brightens the ball and leaves the black."""
+    brighter = Exposure(torch.cat([torch.eye(3), torch.full((3, 1), 0.2)], dim=1)[None], np.array([0.0]))
+    view = render_scene(scene(exposure=brighter), CAMERA, 0.0, part="dynamic")
+    assert view.colour[view.alpha == 0].abs().max() == 0
+    torch.testing.assert_close(view.colour[24, 47], torch.tensor([0.2, 1, 0.2]), atol=0.03, rtol=0)

@@ -24,6 +24,9 @@ def export(
             everything at each recorded time, frames/NNNN.ply.
     """
     from dreamdrive.export import export as write
+    from dreamdrive.export import left_out_of_ply
 
-    write(open_scene(out), to, output)
-    Console().print(str(output), soft_wrap=True)
+    scene, console = open_scene(out), Console(highlight=False, markup=False)
+    write(scene, to, output)
+    console.print(str(output), soft_wrap=True)
+    console.print(left_out_of_ply(scene, output), soft_wrap=True)

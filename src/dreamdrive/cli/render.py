@@ -1,74 +1,66 @@
-"""``dreamdrive render``: a new drive through a scene as a video."""
+"""``dreamdrive render``: new drives through a scene as videos, pictures or arrays."""
 
 import time
-from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Literal
 
 from rich.console import Console
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
-
-if TYPE_CHECKING:
-    from dreamdrive.scene.scene import Scene
-    from dreamdrive.scene.trajectory import Trajectory
 
 
 def render(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
-    trajectory: Annotated[str, arg(metavar="NAME|FILE")],
+    trajectory: Annotated[
+        UseAppendAction[tuple[str, ...]], arg(metavar="NAME|FILE", help_behavior_hint="(required)")
+    ],
     shift_m: Annotated[float, arg(metavar="M")] = 2.0,
-    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4")] = None,
+    show: Literal["colour", "depth", "dynamic", "static"] = "colour",
+    format: Literal["mp4", "png", "npz"] = "mp4",
+    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
+    fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
+    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
-    """Drive through a scene and write a video.
+    """Drive through a scene and write videos, pictures or arrays.
 
     Args:
         out: The folder that generate wrote.
-        trajectory: forward, left, right, stop, lane-left, lane-right, shift, or a file with a trajectory.
+        trajectory: forward, left, right, stop, lane-left, lane-right, shift, or a file with a trajectory. It
+            may be given several times.
         shift_m: How far shift goes to the right in metres; negative is to the left.
-        output: The video; without it OUT/video/NAME.mp4.
+        show: Everything, its depth, or what moves or what stands alone.
+        format: A video, or a folder with a picture or with exact arrays a frame.
+        size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
+        fps: Frames a second; without it a file's own, and for the others 20 at least.
+        output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
+    if not trajectory:
+        raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
     use_all_cores()
-    from dreamdrive.data.video_writer import write_video
-    from dreamdrive.pictures import drive_frames, frame_rate
+    from dreamdrive.drives import check_numbers, drives_of
+    from dreamdrive.rendering import Look, check_size, video_rate, write_drive
+    from dreamdrive.rendering_places import places
 
+    look = Look(show, format, None if size is None else parse_size(size), fps)
+    check_numbers(shift_m, fps)
+    check_size(look)
     scene = open_scene(out)
-    name, drive = _drive(scene, trajectory, shift_m)
-    target = out / "video" / f"{name}.mp4" if output is None else output
-    if target.suffix.lower() != ".mp4":
-        raise InputError(f"-o {target}: expected a name that ends in .mp4")
+    drives = drives_of(scene, trajectory, shift_m, fps)
+    if format == "mp4":
+        for drive in drives:
+            video_rate(drive, look)
     console = Console()
-    start = time.perf_counter()
-    with Bars(console) as bars:
-
-        def shown() -> Iterator[object]:
-            for done, frame in enumerate(drive_frames(scene, drive)):
-                yield frame
-                bars("render", done + 1, len(drive))
-
-        count = write_video(target, shown(), frame_rate(drive))  # pyright: ignore[reportArgumentType]
-    seconds = time.perf_counter() - start
-    rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
-    console.print(f"{target}: {rate}", soft_wrap=True)
-
-
-def _drive(scene: "Scene", trajectory: str, shift_m: float) -> tuple[str, "Trajectory"]:
-    """Name and poses of what ``--trajectory`` asks for; manoeuvres run at the smooth rate of ``generate``."""
-    from dreamdrive.data import read_trajectory
-    from dreamdrive.drive import MANOEUVRES, manoeuvre
-    from dreamdrive.pictures import smooth, up_of
-
-    if trajectory in MANOEUVRES:
-        return trajectory, manoeuvre(trajectory, smooth(scene.trajectory), up_of(scene), shift_m)
-    path = Path(trajectory)
-    if not path.exists():
-        raise InputError(
-            f"--trajectory {trajectory}: no such file; expected a file with a trajectory or one of "
-            f"{', '.join(MANOEUVRES)}"
-        )
-    return path.stem, read_trajectory(path)
+    for drive, place in zip(drives, places(out, output, drives, look), strict=True):
+        start, count = time.perf_counter(), len(drive.path)
+        with Bars(console) as bars:
+            write_drive(place, scene, drive, look, partial(bars, "render", total=count))
+        seconds = time.perf_counter() - start
+        rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
+        console.print(f"{place}: {rate}", soft_wrap=True, markup=False)

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, tan
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
+
+import msgspec
 
 from dreamdrive.data.colmap_binary import check_binary
-from dreamdrive.data.distortion import Distortion
+from dreamdrive.data.distortion import Distortion, check_bend
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.json_file import read_json
@@ -46,6 +48,55 @@ class LensCamera:
     distortion: Distortion | None
 
 
+class Intrinsics(msgspec.Struct):
+    """Focal lengths and principal point in pixels, the centre of the first pixel at 0."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+class IndexedPinhole(msgspec.Struct):
+    """A calibration that counts pixels by integer index."""
+
+    width: int
+    height: int
+    intrinsics: Intrinsics
+
+    def camera(self) -> Camera:
+        """The pinhole as we count: the centre of the first pixel at 0.5.
+
+        Raises:
+            ValueError: Its numbers are those of no camera.
+        """
+        k = self.intrinsics
+        return Camera(k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, self.width, self.height)
+
+
+class MatrixPinhole(msgspec.Struct):
+    """A calibration as PandaSet's cameras have it, which counts pixels by integer index, too."""
+
+    width: int
+    height: int
+    K: Annotated[list[tuple[float, float, float]], msgspec.Meta(min_length=3, max_length=3)]
+
+    def camera(self) -> Camera:
+        """The pinhole as we count: the centre of the first pixel at 0.5.
+
+        Raises:
+            ValueError: Its numbers are those of no camera.
+        """
+        (fx, _, cx), (_, fy, cy), _ = self.K
+        return Camera(fx, fy, cx + 0.5, cy + 0.5, self.width, self.height)
+
+
+class NamedFrames(msgspec.Struct):
+    """Which pictures poses are of, where a file says that."""
+
+    frames: list[int] | None = None
+
+
 def find_colmap(folder: Path) -> Path | None:
     """The folder of a COLMAP model: this one, or where COLMAP and nerfstudio put it inside a project."""
     for inner in (".", "sparse/0", "sparse", "colmap/sparse/0"):
@@ -78,6 +129,8 @@ def read_colmap(folder: Path) -> Any:
     model = pycolmap.Reconstruction()
     try:
         (model.read_binary if ending == ".bin" else model.read_text)(str(folder))
+        for image in model.images.values():
+            str(image.name)  # which it decodes here
     except (ValueError, IndexError, KeyError, RuntimeError, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{folder}: the COLMAP model is damaged ({reason}); export it again") from error
@@ -110,7 +163,7 @@ def from_nerfstudio(values: Mapping[str, Any], where: str) -> LensCamera:
     Raises:
         InputError: A number is missing or none, or the lens is of a kind that is not known here.
     """
-    name = values.get("camera_model", "OPENCV")
+    name = str(values.get("camera_model", "OPENCV"))
     if name not in _NERFSTUDIO:
         raise InputError(
             f"{where}: camera_model {name!r} is not known; expected {', '.join(_NERFSTUDIO)}: undistort the "
@@ -147,6 +200,7 @@ def _lens_camera(
     numbers = {key: float(value) for key, value in values.items() if value is not None}
     if not all(map(isfinite, numbers.values())):
         raise InputError(f"{where}: the intrinsics hold NaN or infinite numbers")
+    check_bend([numbers[key] for key in numbers if key[0] in "kp"], where)
     try:
         fx, fy, cx, cy = (numbers[key] for key in ("fx", "fy", "cx", "cy"))
         camera = Camera(fx, fy, cx, cy, *size)

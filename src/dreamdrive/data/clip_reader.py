@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.data.cuts import find_cuts
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import ImageFolder
 from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.poses import read_poses
+from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.data.source import Source, one_frame, open_source
-from dreamdrive.data.video import Video
+from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
 from dreamdrive.memory import free_bytes
 from dreamdrive.scene.camera import Camera
@@ -27,6 +29,8 @@ from dreamdrive.scene.trajectory import Trajectory
 
 FOLDER_RATE_HZ = 10.0
 """Rate at which the images of a folder count unless told."""
+BLACK, BLACK_SPREAD = 16.0, 4.0
+"""Grey levels: mean and standard deviation below which frames show nothing."""
 MAX_FRAMES = 1000
 """Frames a clip may have: all are in memory, 0.4 MB each at 480x270, and every stage adds its own."""
 
@@ -48,7 +52,8 @@ def read_clip(
 
     The frames are undistorted to a pinhole with the source's focal length and axis, scaled and cropped, in
     one resampling; ``provenance["lens"]`` holds what gives a render the source's distortion back
-    (``Lens.from_json``), or ``None``. Time 0 and the world are those of the first selected frame.
+    (``Lens.from_json``), or ``None``. Time 0 and the world are those of the first selected frame. Changes to
+    another scene are ``cuts``; ``provenance["notes"]`` says in words what was noticed.
 
     Args:
         path: Video or folder of images.
@@ -88,10 +93,14 @@ def read_clip(
         raise InputError(
             f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
         )
+    frames_rgb = np.stack(picked.frames)
+    _check_pictures(frames_rgb, valid, path)
+    found = find_cuts(frames_rgb, valid)
+    notes += [*of_damage(picked.damaged), *_gaps(source, index, picked.times_s, fps), *of_cuts(found, index)]
     sampler = picked.sampler
     given = None if features is None else read_features(features).of_frames(index, source.count, features)
     return Clip(
-        frames=np.stack(picked.frames),
+        frames=frames_rgb,
         times_s=times_s - times_s[0],
         camera=np.zeros(len(index), dtype=np.int64),
         rig=(sampler.camera,),
@@ -101,6 +110,7 @@ def read_clip(
         features={} if given is None else given.cropped(sampler.sizing, sampler.lens, features),
         known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
         requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
+        cuts=tuple(cut.first for cut in found.cuts),
         provenance=_provenance(source, picked, notes)
         | ({} if given is None else {"features": given.provenance}),
     )
@@ -153,6 +163,7 @@ class _Picked:
     times_s: list[float | None] = field(default_factory=list)
     frames: list[UInt8[np.ndarray, "h w 3"]] = field(default_factory=list)
     valid: list[Bool[np.ndarray, "h w"]] = field(default_factory=list)
+    damaged: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def add(self, raw: RawFrame) -> None:
@@ -161,6 +172,7 @@ class _Picked:
         self.times_s.append(raw.time_s)
         self.frames.append(frame)
         self.valid.append(valid)
+        self.damaged += [raw.index] if raw.damaged else []
         self.notes += [note for note in raw.notes if note not in self.notes]
 
 
@@ -230,13 +242,37 @@ def _times(
         return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if all(t is not None for t in clock_s):
         times_s = np.array(clock_s, dtype=np.float64)
-        if (np.diff(times_s) > 0).all():
+        rate = (index[-1] - index[0]) / max(times_s[-1] - times_s[0], 1e-12)
+        if (np.diff(times_s) > 0).all() and RATES_HZ[0] <= rate <= RATES_HZ[1]:
             return times_s, ()
     if source.rate_hz is None:
         raise InputError(f"{source.path} has no usable times; give its rate with --fps")
     return index / source.rate_hz, (
         f"The video's own times are unusable: its frames count as {source.rate_hz:g} Hz.",
     )
+
+
+def _check_pictures(
+    frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"], path: Path
+) -> None:
+    """Refuse a recording of nothing: a lens cap, a camera that failed."""
+    shown = (frame[where] for frame, where in zip(frames, valid, strict=True) if where.any())
+    if all(pixels.mean() < BLACK and pixels.std() < BLACK_SPREAD for pixels in shown):
+        raise InputError(
+            f"{path}: every selected frame is black; expected pictures of a street, choose others with "
+            "--frames"
+        )
+
+
+def _gaps(
+    source: Source, index: Int[np.ndarray, " f"], clock_s: list[float | None], fps: float | None
+) -> list[str]:
+    """What to say about frames that are missing inside the selection."""
+    if isinstance(source, ImageFolder):
+        return of_missing_images(source.files[index[0] : index[-1] + 1])
+    if fps is not None or any(t is None for t in clock_s):
+        return []
+    return of_time_jumps(index, np.array(clock_s, dtype=np.float64))
 
 
 def _provenance(source: Source, picked: _Picked, notes: list[str]) -> dict[str, Any]:

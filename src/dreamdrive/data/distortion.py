@@ -1,5 +1,6 @@
 """Lens distortion of points: OpenCV's polynomial models and its fisheye model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -7,10 +8,30 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from dreamdrive.errors import InputError
+
 _NEWTON_STEPS = 20
 _STEP = 1e-6
 _TOLERANCE = 1e-7
 """Largest error of an inverted point, in units of the focal length: under a thousandth of a pixel."""
+
+
+MOST_BEND = 1e4
+"""Largest coefficient: calibrations of narrow lenses have hundreds."""
+
+
+def check_bend(coefficients: Sequence[float], where: str) -> None:
+    """Whether the coefficients can be those of a lens.
+
+    Raises:
+        InputError: One is too large.
+    """
+    for each in coefficients:
+        if abs(each) > MOST_BEND:
+            raise InputError(
+                f"{where}: the distortion coefficient {each:g} is that of no lens; expected numbers of "
+                f"OpenCV's models, at most {MOST_BEND:g}"
+            )
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,17 @@ from dreamdrive.data.lens import Lens
 from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file
+from dreamdrive.scene.json_file import parse_json
+from dreamdrive.scene.tensor_file import briefly, header_problem
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
+FEATURE_BYTES = 600_000_000
+"""Largest file: 1000 frames at an eighth of 480x270 in half precision, with as many channels as may be."""
 INDEX = "frame_index"
 """Where the provenance may list the frames of the input that the rows are of."""
 _KEY = "provenance"
+_TYPES = {"F16": "float16", "F32": "float32"}
 _EXPECTED = "a .safetensors file with arrays (frames, rows, columns, channels), see docs/replay.md"
 
 
@@ -113,16 +118,27 @@ def read_features(path: Path) -> FeatureFile:
     """
     where = f"--features {path}"
     try:
+        if problem := header_problem(path):
+            raise SafetensorError(problem)
+        if (size := path.stat().st_size) > FEATURE_BYTES:
+            raise SafetensorError(f"it holds {size / 1e6:.0f} MB, more than {FEATURE_BYTES // 10**6}")
         with safe_open(path, framework="numpy") as file:
             metadata = file.metadata() or {}
+            for name in file.keys():  # noqa: SIM118
+                stated = file.get_slice(name)
+                kind = _TYPES.get(str(stated.get_dtype()), str(stated.get_dtype()))
+                if problem := _misfit(tuple(stated.get_shape()), kind):
+                    raise InputError(f"{where}: {briefly(repr(name))} {problem}")
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except InputError:
+        raise
     except (OSError, SafetensorError, TypeError, ValueError, AttributeError, KeyError) as error:
-        raise InputError(f"{where} cannot be read ({error}); expected {_EXPECTED}") from None
+        raise InputError(f"{where} cannot be read ({briefly(error)}); expected {_EXPECTED}") from None
     if not arrays:
         raise InputError(f"{where} holds no array; expected {_EXPECTED}")
     for name, array in arrays.items():
         if problem := _problem(array):
-            raise InputError(f"{where}: {name!r} {problem}")
+            raise InputError(f"{where}: {briefly(repr(name))} {problem}")
     if len({len(array) for array in arrays.values()}) > 1:
         counts = ", ".join(f"{name!r} {len(array)}" for name, array in arrays.items())
         raise InputError(f"{where}: its arrays have different numbers of frames: {counts}")
@@ -138,7 +154,7 @@ def write_features(path: Path, features: FeatureFile) -> None:
     """
     for name, array in features.arrays.items():
         if problem := _problem(array):
-            raise ValueError(f"features {name!r} {problem}")
+            raise ValueError(f"features {briefly(repr(name))} {problem}")
     arrays = {name: np.ascontiguousarray(array) for name, array in features.arrays.items()}
     blob = save(arrays, metadata={_KEY: json.dumps(features.provenance)})
     with new_file(path) as partial:
@@ -150,16 +166,22 @@ def _is_index(values: Any) -> TypeGuard[list[int]]:
 
 
 def _problem(array: np.ndarray) -> str | None:
-    if array.dtype.name not in ("float16", "float32"):
-        return f"holds {array.dtype}; expected float16 or float32"
-    if array.ndim != 4 or 0 in array.shape:
-        return f"has the shape {array.shape}; expected (frames, rows, columns, channels)"
-    if array.shape[3] > MAX_CHANNELS:
+    wrong = _misfit(array.shape, array.dtype.name)
+    return wrong or (None if np.isfinite(array).all() else "holds NaN or infinite numbers")
+
+
+def _misfit(shape: tuple[int, ...], kind: str) -> str | None:
+    """What is wrong with an array by what its header says."""
+    if kind not in _TYPES.values():
+        return f"holds {kind}; expected float16 or float32"
+    if len(shape) != 4 or 0 in shape:
+        return f"has the shape {shape}; expected (frames, rows, columns, channels)"
+    if shape[3] > MAX_CHANNELS:
         return (
-            f"has {array.shape[3]} channels; expected at most {MAX_CHANNELS}: keep the first principal "
+            f"has {shape[3]} channels; expected at most {MAX_CHANNELS}: keep the first principal "
             "components, 16 to 32 of them"
         )
-    return None if np.isfinite(array).all() else "holds NaN or infinite numbers"
+    return None
 
 
 def _provenance(metadata: dict[str, str], where: str) -> dict[str, Any]:
@@ -167,10 +189,7 @@ def _provenance(metadata: dict[str, str], where: str) -> dict[str, Any]:
         raise InputError(
             f"{where} does not say where it comes from: expected a JSON object in its metadata under {_KEY!r}"
         )
-    try:
-        values = json.loads(metadata[_KEY])
-    except (ValueError, RecursionError):
-        values = None
+    values = parse_json(metadata[_KEY], f"{where}: its metadata under {_KEY!r}")
     if not isinstance(values, dict):
         raise InputError(f"{where}: its metadata under {_KEY!r} is no JSON object")
     return cast("dict[str, Any]", values)

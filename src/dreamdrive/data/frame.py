@@ -17,6 +17,7 @@ class RawFrame:
         opaque: False where the file marks the pixel as transparent (H, W); ``None`` where nothing is.
         time_s: Seconds since frame 0 of the source, or ``None`` where the file has no clock.
         notes: What the report should say about the file, a sentence each.
+        damaged: Whether the decoder patched it up, or built it upon a frame that it patched up.
     """
 
     index: int
@@ -25,6 +26,7 @@ class RawFrame:
     opaque: Bool[np.ndarray, "h w"] | None = None
     time_s: float | None = None
     notes: tuple[str, ...] = ()
+    damaged: bool = False
 
     @property
     def size(self) -> tuple[int, int]:

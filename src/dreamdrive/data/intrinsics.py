@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from dreamdrive.data.camera_models import LensCamera, model_cameras
-from dreamdrive.data.distortion import Distortion
+from dreamdrive.data.distortion import Distortion, check_bend
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.json_file import read_json
@@ -91,7 +91,10 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         )
     notes = _scaled(path, (width, height), size)
     sx, sy = size[0] / width, size[1] / height
-    camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
+    try:
+        camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
+    except ValueError as error:
+        raise InputError(f"--intrinsics {path}: {error}") from None
     distortion = _distortion(path, values.get("distortion"), notes)
     return Calibration(camera, distortion, True, tuple(notes))
 
@@ -104,7 +107,11 @@ def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> C
         )
     camera = cameras[0].camera
     notes = _scaled(path, (camera.width_px, camera.height_px), size)
-    return Calibration(camera.resized(*size), cameras[0].distortion, True, tuple(notes))
+    try:
+        camera = camera.resized(*size)
+    except ValueError as error:
+        raise InputError(f"--intrinsics {path}: {error}") from None
+    return Calibration(camera, cameras[0].distortion, True, tuple(notes))
 
 
 def _scaled(path: Path, made_for: tuple[float, float], size: tuple[int, int]) -> list[str]:
@@ -140,6 +147,7 @@ def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | Non
         _number(path, {"distortion coefficients": n}, "distortion coefficients")
         for n in cast("list[object]", numbers)
     )
+    check_bend(coefficients, f"--intrinsics {path}")
     model, order = _model(path, name)
     allowed = (4,) if model == "fisheye" else (4, 5, 8, 12, 14)
     if len(coefficients) not in allowed or (order and len(order) != len(coefficients)):

@@ -8,6 +8,7 @@ import shapely
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file
+from dreamdrive.scene.json_file import of_type, read_json
 from dreamdrive.scene.layout import Layout, Ring
 
 MOST_BOXES = 255
@@ -22,13 +23,9 @@ def read_layout(path: Path) -> Layout:
             message names the field, as in ``$.boxes[2].size_m[0]``.
     """
     try:
-        layout = msgspec.json.decode(path.read_bytes(), type=Layout)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; expected a layout as JSON") from error
-    except msgspec.ValidationError as error:
-        raise InputError(f"{path}: {error}; docs/layout.md says what a layout holds") from error
-    except msgspec.DecodeError as error:
-        raise InputError(f"{path} is no JSON: {error}") from error
+        layout = of_type(read_json(path), Layout, str(path))
+    except InputError as error:
+        raise InputError(f"{error}; docs/layout.md says what a layout holds") from error
     for problem in problems(layout):
         raise InputError(f"{path}: {problem}")
     return layout

@@ -10,6 +10,7 @@ from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import SUFFIXES, read_image
 from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
 from dreamdrive.data.lens import Lens, Undistorter
+from dreamdrive.data.remarks import of_damage
 from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.size import cover
 from dreamdrive.data.source import open_source
@@ -109,7 +110,8 @@ def leading_frames(path: Path, count: int, rate_hz: float = 1.0) -> tuple[list[R
         return [read_image(path)], []
     source = open_source(path)
     if isinstance(source, Video):
-        return _nearest(source, count, rate_hz)
+        frames, notes = _nearest(source, count, rate_hz)
+        return frames, [*notes, *of_damage([frame.index for frame in frames if frame.damaged])]
     return list(source.read(range(min(count, source.count())))), []
 
 

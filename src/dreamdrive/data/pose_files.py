@@ -11,7 +11,10 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import FARTHEST_M
+from dreamdrive.scene.files import read_text
 from dreamdrive.scene.json_file import read_json
+from dreamdrive.scene.trajectory import LATEST_S
 
 FORMATS = (
     "Trajectory JSON (world_from_camera, times_s), TUM (timestamp tx ty tz qx qy qz qw), "
@@ -48,11 +51,8 @@ def read_pose_file(path: Path, option: str, camera: str | None = None) -> PoseRo
     Raises:
         InputError: The file is missing or malformed, or a pose holds NaN or is not rigid.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{option} {path} cannot be read as text: {error}") from error
     where = f"{option} {path}"
+    text = read_text(path, where)
     if not text.lstrip().startswith(("{", "[")):
         return _table(text, where)
     values = read_json(path, option)
@@ -117,7 +117,7 @@ def _table(text: str, where: str) -> PoseRows:
 def _from_quaternions(
     table: Float[np.ndarray, "n 7"], where: str, name: Callable[[int], str]
 ) -> Float[np.ndarray, "n 4 4"]:
-    length = np.linalg.norm(table[:, 3:], axis=1)
+    length = np.linalg.norm(np.clip(table[:, 3:], -10, 10), axis=1)
     for index in np.flatnonzero(~(np.abs(length - 1) <= _RIGID_TOLERANCE)).tolist():
         raise InputError(f"{where}: {name(index)}: the quaternion has length {length[index]:.4g}; expected 1")
     poses = np.tile(np.eye(4), (len(table), 1, 1))
@@ -163,9 +163,11 @@ def _pose_name(index: int) -> str:
 
 
 def _times(times: Float[np.ndarray, " n"], where: str, name: Callable[[int], str]) -> Float[np.ndarray, " n"]:
-    steps = np.diff(times, prepend=-np.inf)
-    for index in np.flatnonzero(~(np.isfinite(times) & (steps > 0))).tolist():
-        raise InputError(f"{where}: {name(index)}: time {times[index]:g}; expected finite, increasing times")
+    later = np.concatenate([[True], times[1:] > times[:-1]])
+    for index in np.flatnonzero(~((np.abs(times) <= LATEST_S) & later)).tolist():
+        raise InputError(
+            f"{where}: {name(index)}: time {times[index]:g}; expected finite, increasing times in seconds"
+        )
     return times
 
 
@@ -186,6 +188,12 @@ def clean_poses(
         raise InputError(f"{where}: the poses have the shape {poses.shape}; expected (N, 4, 4), N at least 1")
     for index in np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2))).tolist():
         raise InputError(f"{where}: {name(index)} holds NaN or infinite numbers")
+    most = np.abs(poses).max(axis=(1, 2))
+    for index in np.flatnonzero(most > FARTHEST_M).tolist():
+        raise InputError(
+            f"{where}: {name(index)} holds {most[index]:.4g}; expected places within {FARTHEST_M:g} m of the "
+            "origin: take the same offset from all of them"
+        )
     rotation = poses[:, :3, :3]
     error = np.abs(rotation @ rotation.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     last = np.abs(poses[:, 3] - (0, 0, 0, 1)).max(axis=1)

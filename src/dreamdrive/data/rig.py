@@ -13,6 +13,7 @@ from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.files import is_path
 from dreamdrive.scene.json_file import read_json
 
 RIG = "rig.json"
@@ -123,10 +124,10 @@ def read_rig_clip(
 
 def _mounted(path: Path, index: int, entry: Any) -> Mounted:
     name = f"{path / RIG}: camera {index}"
-    if not isinstance(entry, dict) or not isinstance(entry.get("frames"), str):
+    if not isinstance(entry, dict) or not is_path(entry.get("frames")):
         raise InputError(f"{name} names no frames; {_EXPECTED}")
     given = entry.get("intrinsics")
-    if given is not None and not isinstance(given, str):
+    if given is not None and not is_path(given):
         raise InputError(f"{name} has intrinsics that are no file name; {_EXPECTED}")
     try:
         pose = np.array(entry.get("car_from_camera"), dtype=np.float64)
@@ -161,6 +162,7 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
         source_index=parts[0].source_index[row],
         known=known,
         requested=parts[0].requested,
+        cuts=tuple(sorted(step * count + p for p, each in enumerate(parts) for step in each.cuts)),
         provenance={
             **parts[0].provenance,
             "input": str(path),

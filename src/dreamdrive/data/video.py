@@ -1,20 +1,37 @@
 """A video file as a source of frames."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import av
 import numpy as np
+from av.container import InputContainer
 from av.error import FFmpegError
+from av.stream import Disposition
 from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
 
 from dreamdrive.data.frame import RawFrame
+from dreamdrive.data.mp4_tables import check_tables
 from dreamdrive.data.select import UNBOUNDED, out_of_range
 from dreamdrive.errors import InputError
+from dreamdrive.scene.files import open_file
 
-_NOT_VIDEO = ("tty", "image2")
-"""Formats that FFmpeg plays as video although they are text or a single picture."""
+MAX_PIXELS = 36_000_000
+"""Pixels that a frame may have, those of 8K video: a decoder keeps up to 16 frames of a video."""
+RATES_HZ = (0.01, 1000.0)
+"""Rates that a video may have, from time lapse to slow motion; others are damage."""
+_FORMATS = (
+    "mov,mp4,m4a,3gp,3g2,mj2",
+    "matroska,webm",
+    *("avi", "asf", "flv", "mpegts", "mpeg", "mpegvideo", "m4v", "h264", "hevc", "ivf", "obu", "mxf", "ogg"),
+    *("dv", "gif", "rm", "dhav", "yuv4mpegpipe", "wav", "mp3", "aac", "flac"),
+)
+"""Formats that FFmpeg may take a file for. Others play text, single pictures, or whatever a list names."""
+_CODEC = {"max_pixels": str(MAX_PIXELS)}
+_OPTIONS = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file", **_CODEC}
 
 
 @dataclass(frozen=True)
@@ -36,21 +53,28 @@ class Video:
         Raises:
             InputError: It is empty, cut short before its index, or no video.
         """
-        if path.stat().st_size == 0:
-            raise InputError(f"{path} is empty; expected a video")
+        _check_file(path)
         try:
-            with av.open(str(path)) as container:
-                if container.format.name in _NOT_VIDEO or container.format.name.endswith("_pipe"):
-                    raise InputError(f"{path} is not a video ({container.format.long_name})")
-                if not container.streams.video:
-                    raise InputError(f"{path} holds no picture track; expected a video")
-                rate = container.streams.video[0].average_rate
+            with _opened(path) as container:
+                stream = _pictures(container, path)
+                coded = stream.codec_context
+                if coded is None:  # pyright: ignore[reportUnnecessaryComparison]
+                    raise InputError(
+                        f"{path} holds pictures of a kind that cannot be decoded; expected H.264 or the like"
+                    )
+                size = coded.width, coded.height
+                rate = stream.average_rate
         except FFmpegError as error:
             raise InputError(
                 f"{path} is not a readable video ({error.strerror}): it is cut short, damaged or of another "
                 "kind; expected a video such as MP4, or a folder of images"
             ) from error
-        return Video(path, float(rate) if rate else None)
+        if size[0] * size[1] > MAX_PIXELS:
+            raise InputError(
+                f"{path} has frames of {size[0]}x{size[1]} pixels; expected at most {MAX_PIXELS // 10**6} "
+                "megapixels: scale it down"
+            )
+        return Video(path, float(rate) if rate and RATES_HZ[0] <= rate <= RATES_HZ[1] else None)
 
     def count(self) -> int:
         """Number of frames, by decoding them all: what the file itself claims is often wrong.
@@ -83,11 +107,13 @@ class Video:
         Raises:
             InputError: The file ends or breaks off before the last wanted frame.
         """
-        index, first_s = -1, None
+        index, first_s, damaged = -1, None, False
         for index, frame in enumerate(self._decode(wanted)):
             first_s = _time_s(frame) if index == 0 else first_s
+            # Only the frame that could not be read is marked; those that refer to it are as bad.
+            damaged = frame.is_corrupt or (damaged and not frame.key_frame)
             if index in wanted:
-                yield _raw(frame, index, first_s)
+                yield _raw(frame, index, first_s, damaged)
             if index >= wanted[-1]:
                 return
         if index < 0:
@@ -99,8 +125,10 @@ class Video:
     def _decode(self, wanted: range | None = None) -> Iterator[VideoFrame]:
         done = 0
         try:
-            with av.open(str(self.path)) as container:
-                for frame in container.decode(video=0):
+            with _opened(self.path) as container:
+                stream = _pictures(container, self.path)
+                stream.codec_context.options = _CODEC
+                for frame in container.decode(stream):
                     yield frame
                     done += 1
         except FFmpegError as error:
@@ -114,18 +142,38 @@ class Video:
             ) from error
 
 
-def _raw(frame: VideoFrame, index: int, first_s: float | None) -> RawFrame:
+def _check_file(path: Path) -> None:
+    """Refuse what is no plain file, is empty, or claims what would fill memory."""
+    with open_file(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size == 0:
+            raise InputError(f"{path} is empty; expected a video")
+        check_tables(file, size, str(path))
+
+
+def _opened(path: Path) -> InputContainer:
+    # Without the prefix a name such as concat:a would be taken for an address.
+    return av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace")
+
+
+def _pictures(container: InputContainer, path: Path) -> VideoStream:
+    """The first track of pictures that is no cover."""
+    for stream in container.streams.video:
+        if not stream.disposition & Disposition.attached_pic:
+            return stream
+    raise InputError(f"{path} holds no picture track; expected a video")
+
+
+def _raw(frame: VideoFrame, index: int, first_s: float | None, damaged: bool) -> RawFrame:
     rgb = frame.to_ndarray(format="rgb24")
     quarters = round(frame.rotation / 90) % 4
     notes: list[str] = []
-    if frame.is_corrupt:
-        notes.append(f"Frame {index} of the video is damaged.")
     if quarters:
         rgb = np.ascontiguousarray(np.rot90(rgb, quarters))
         notes.append("The video is turned upright as its header asks.")
     now_s = _time_s(frame)
     time_s = None if now_s is None or first_s is None else now_s - first_s
-    return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes))
+    return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes), damaged)
 
 
 def _time_s(frame: VideoFrame) -> float | None:

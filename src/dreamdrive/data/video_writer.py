@@ -16,10 +16,12 @@ from dreamdrive.scene.atomic import new_file
 
 Frame = UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"]
 
-# Constant rate factor of x264: 18 is commonly taken as visually lossless.
-_QUALITY = "18"
-# One thread: x264's output depends on how many there are.
-_OPTIONS = {"crf": _QUALITY, "preset": "medium", "threads": "1"}
+# Constant rate factor of x264; 18 is commonly taken as visually lossless. Without the macroblock tree 17.5
+# has the PSNR of 18 with it (43.6 and 43.7 dB recorded, 43.2 and 43.1 dB drawn), in files 2 to 3 % larger.
+_QUALITY = "17.5"
+# One thread: x264's output depends on how many there are. No macroblock tree: with AVX-512 it reads memory
+# that nothing was written to, and five writes of the same frames gave four files.
+_OPTIONS = {"crf": _QUALITY, "preset": "medium", "threads": "1", "x264-params": "mbtree=0"}
 
 
 def write_video(path: Path, frames: Iterable[Frame], fps: float) -> int:

@@ -3,20 +3,58 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
+from typing import Annotated, Any
 
-import cv2
+import msgspec
 import numpy as np
 from jaxtyping import Bool, Float
+from msgspec import Meta
 
+from dreamdrive.data.array_file import read_npz
+from dreamdrive.data.camera_models import IndexedPinhole, MatrixPinhole, NamedFrames
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.pose_files import read_pose_file
 from dreamdrive.errors import InputError
-from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.json_file import read_json
+from dreamdrive.scene.camera import FARTHEST_M, MAX_SIDE_PX, Camera
+from dreamdrive.scene.json_file import of_type, read_json
 
 _PNG_PER_M = 256.0
 """Grey levels a metre in KITTI's 16-bit depth pictures."""
+
+
+Place = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+
+
+class Cuboid(msgspec.Struct):
+    """A box of one frame as PandaSet has it; its yaw turns about the vertical.
+
+    Attributes:
+        position: Its middle in the world, z up, in metres.
+        size_wlh: Width, length and height in metres.
+        yaw: In radians.
+        motion: PandaSet's label, such as ``Moving``.
+        stationary: What is told where there is no label of motion.
+    """
+
+    position: tuple[Place, Place, Place]
+    size_wlh: tuple[Place, Place, Place]
+    yaw: Place
+    motion: str | None = None
+    stationary: bool | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is labelled as moving, or without a label of motion is not stationary."""
+        return self.motion == "Moving" or (self.motion is None and self.stationary is False)
+
+
+class _Cuboids(msgspec.Struct):
+    frames: list[list[Cuboid]]
+
+
+class _Sides(msgspec.Struct):
+    width: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
+    height: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
 
 
 @dataclass(frozen=True)
@@ -50,7 +88,7 @@ class Recorded:
     size: tuple[int, int]
     pinhole: Camera | None
     depth_files: Mapping[int, Path]
-    boxes: Mapping[int, Sequence[Mapping[str, Any]]] | None
+    boxes: Mapping[int, Sequence[Cuboid]] | None
 
     def points(self, frame: int) -> Points:
         """The points of a frame, from its file.
@@ -82,20 +120,21 @@ def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
     """
     file = folder / "cameras.json"
     poses = read_pose_file(file, "--truth", camera).world_from_camera
+    # The poses were found under this name.
+    entry: dict[str, Any] = read_json(file, "--truth")["cameras"][camera]
     try:
-        entry: dict[str, Any] = read_json(file, "--truth")["cameras"][camera]
-        size = int(entry["width"]), int(entry["height"])
-        (fx, _, cx), (_, fy, cy), _ = np.array(entry["K"], dtype=np.float64).tolist()
-        pinhole = _pinhole(fx, fy, cx, cy, size)
-        sweeps = [int(i) for i in entry.get("frames", range(len(poses)))]
-    except (KeyError, TypeError, ValueError) as error:
+        pinhole = of_type(entry, MatrixPinhole, "calibration").camera()
+        named = of_type(entry, NamedFrames, "calibration").frames
+    except ValueError as error:
         raise InputError(
-            f"--truth {file}: {camera} has no usable width, height and K ({error!r}); expected pixels and a "
+            f"--truth {file}: {camera} has no usable width, height and K ({error}); expected pixels and a "
             "3x3 matrix"
         ) from error
+    sweeps = list(range(len(poses))) if named is None else named
     place = {sweep: frame for frame, sweep in enumerate(sweeps)}
     lidar = _numbered(folder / f"lidar_depth_{str(camera).removesuffix('_camera')}")
     files = {place[sweep]: path for sweep, path in lidar.items() if sweep in place}
+    size = pinhole.width_px, pinhole.height_px
     return Recorded(poses, size, pinhole, files, _boxes(folder / "cuboids.json", sweeps))
 
 
@@ -109,19 +148,16 @@ def read_poses_txt(folder: Path) -> Recorded:
     file = folder / "meta.json"
     meta = read_json(file, "--truth")
     try:
-        size, k = (int(meta["width"]), int(meta["height"])), meta.get("intrinsics")
-        pinhole = None if k is None else _pinhole(k["fx"], k["fy"], k["cx"], k["cy"], size)
-    except (KeyError, TypeError, ValueError) as error:
+        size = of_type(meta, _Sides, "calibration")
+        known = meta.get("intrinsics") is not None
+        pinhole = of_type(meta, IndexedPinhole, "calibration").camera() if known else None
+    except ValueError as error:
         raise InputError(
-            f"--truth {file} is unusable ({error!r}); expected JSON with width, height and, where known, "
+            f"--truth {file} is unusable ({error}); expected JSON with width, height and, where known, "
             'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
         ) from error
-    return Recorded(poses, size, pinhole, _numbered(folder / "lidar_depth"), None)
-
-
-def _pinhole(fx: float, fy: float, cx: float, cy: float, size: tuple[int, int]) -> Camera:
-    """Files count pixels by integer index: the centre of the first one is 0."""
-    return Camera(float(fx), float(fy), float(cx) + 0.5, float(cy) + 0.5, *size)
+    numbered = _numbered(folder / "lidar_depth")
+    return Recorded(poses, (size.width, size.height), pinhole, numbered, None)
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
@@ -130,34 +166,27 @@ def _numbered(folder: Path) -> dict[int, Path]:
     return {int(f.stem): f for f in files if f.suffix in (".npz", ".png") and f.stem.isdecimal()}
 
 
-def _boxes(path: Path, sweeps: Sequence[int]) -> dict[int, list[dict[str, Any]]] | None:
+def _boxes(path: Path, sweeps: Sequence[int]) -> dict[int, list[Cuboid]] | None:
     """Boxes of what moves, by frame: so labelled, or without a label of motion but not stationary."""
     if not path.is_file():
         return None
     try:
-        frames = read_json(path, "--truth")["frames"]
-        found = {frame: [b for b in frames[sweep] if _moves(b)] for frame, sweep in enumerate(sweeps)}
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+        frames = of_type(read_json(path, "--truth"), _Cuboids, "cuboids").frames
+        found = {frame: [b for b in frames[sweep] if b.moves] for frame, sweep in enumerate(sweeps)}
+    except (InputError, IndexError) as error:
         raise InputError(
-            f"--truth {path} is damaged ({error!r}); expected frames, each a list of boxes with motion, "
+            f"--truth {path} is damaged ({error}); expected frames, each a list of boxes with motion, "
             "position, size_wlh and yaw: take it away to do without what moves"
         ) from error
     return found
 
 
-def _moves(box: Mapping[str, Any]) -> bool:
-    for name in ("position", "size_wlh", "yaw"):
-        np.asarray(box[name], dtype=np.float64)
-    motion = box.get("motion")
-    return motion == "Moving" or (motion is None and box.get("stationary") is False)
-
-
-def _inside(points: Float[np.ndarray, "n 3"], box: Mapping[str, Any]) -> Bool[np.ndarray, " n"]:
+def _inside(points: Float[np.ndarray, "n 3"], box: Cuboid) -> Bool[np.ndarray, " n"]:
     """Which points in the world, z up, lie in a box; its length lies along y at yaw 0."""
-    c, s = np.cos(box["yaw"]), np.sin(box["yaw"])
+    c, s = np.cos(box.yaw), np.sin(box.yaw)
     world_from_box = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    local = (points - np.asarray(box["position"])) @ world_from_box
-    within = np.abs(local) <= np.asarray(box["size_wlh"]) / 2
+    local = (points - np.asarray(box.position)) @ world_from_box
+    within = np.abs(local) <= np.asarray(box.size_wlh) / 2
     return within[:, 0] & within[:, 1] & within[:, 2]
 
 
@@ -174,12 +203,16 @@ def _lifted(
 def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns, rows and depths as stored, places by integer pixel index."""
     try:
-        with np.load(path) as stored:
-            u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
-    except (OSError, KeyError, ValueError, BadZipFile) as error:
-        raise InputError(f"{path} cannot be read ({error}); expected arrays u, v and depth") from error
-    usable = u.ndim == 1 and u.shape == v.shape == depth.shape and np.isfinite([u, v, depth]).all()
-    if not usable or not (depth > 0).all():
+        stored = read_npz(path, ("u", "v", "depth"))
+        u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
+    except KeyError as error:
+        raise InputError(f"{path} lacks the array {error}; expected arrays u, v and depth") from None
+    usable = u.ndim == 1 and u.shape == v.shape == depth.shape
+    if (
+        not usable
+        or not (np.abs([u, v]) <= MAX_SIDE_PX).all()
+        or not ((depth > 0) & (depth <= FARTHEST_M)).all()
+    ):
         raise InputError(
             f"{path} holds u, v and depth of shapes {u.shape}, {v.shape} and {depth.shape}; expected three "
             "equally long lists of finite numbers, depths above 0"
@@ -189,11 +222,11 @@ def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _picture(path: Path, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same of a picture of depth, 0 where there is none."""
-    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if picture is None or picture.dtype != np.uint16 or picture.shape != (size[1], size[0]):
-        got = "nothing readable" if picture is None else f"{picture.dtype} of shape {picture.shape}"
+    picture = read_picture(path)
+    if picture.dtype != np.uint16 or picture.shape != (size[1], size[0]):
         raise InputError(
-            f"{path} holds {got}; expected 16 bits of grey, 256 levels a metre, {size[0]}x{size[1]} pixels"
+            f"{path} holds {picture.dtype} of shape {picture.shape}; expected 16 bits of grey, 256 levels a "
+            f"metre, {size[0]}x{size[1]} pixels"
         )
     v, u = np.nonzero(picture)
     return u.astype(np.float64), v.astype(np.float64), picture[v, u] / _PNG_PER_M

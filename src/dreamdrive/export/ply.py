@@ -1,5 +1,6 @@
 """Gaussians as PLY, in the layout that 3DGS viewers read."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +8,13 @@ import torch
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file, new_folder
+from dreamdrive.scene.files import read_bytes
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 
 _COEFFICIENTS = (1, 4, 9, 16)
+_BYTES = 4_000_000_000
+"""Largest PLY that is read: 17 million Gaussians of degree 3."""
 
 
 def write_ply(gaussians: Gaussians, path: Path) -> None:
@@ -34,10 +38,7 @@ def read_ply(path: Path) -> Gaussians:
     Raises:
         InputError: The file is missing, damaged or holds no Gaussians.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    data = read_bytes(path, at_most=_BYTES)
     names, count, start = _header(path, data)
     size = 4 * len(names) * count
     if len(data) < start + size:
@@ -45,7 +46,10 @@ def read_ply(path: Path) -> Gaussians:
     table = np.frombuffer(data, dtype="<f4", count=len(names) * count, offset=start).reshape(
         count, len(names)
     )
-    rest = sorted((n for n in names if n.startswith("f_rest_")), key=lambda n: int(n.removeprefix("f_rest_")))
+    rest = sorted(
+        (n for n in names if re.fullmatch(r"f_rest_[0-9]{1,4}", n)),
+        key=lambda n: int(n.removeprefix("f_rest_")),
+    )
     coefficients = 1 + len(rest) // 3
     if coefficients not in _COEFFICIENTS or len(rest) % 3:
         raise InputError(f"{path} has {len(rest)} f_rest fields; expected 0, 9, 24 or 45")
@@ -86,6 +90,19 @@ def export_ply(scene: Scene, path: Path) -> None:
             (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
 
 
+def left_out_of_ply(scene: Scene, path: Path) -> str:
+    """What of a scene ``export_ply`` finds no place for, in a sentence."""
+    alone = path.suffix.lower() == ".ply"
+    shown = f"the scene at {float(scene.times_s[0]):.3g} s" if alone else "the scene at its recorded times"
+    parts = {
+        "sky": scene.sky is not None,
+        "exposure of the recording": scene.exposure is not None,
+        "motion" if alone else "motion in between": len(scene.dynamic) > 0,
+    }
+    missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
+    return f"PLY holds {shown}{': ' if missing else ''}{missing}."
+
+
 def _fields(coefficients: int) -> list[str]:
     names = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
     names += [f"f_rest_{i}" for i in range(3 * (coefficients - 1))]
@@ -122,7 +139,7 @@ def _header(path: Path, data: bytes) -> tuple[list[str], int, int]:
     is_plain = len(elements) == 1 and len(elements[0]) == 3 and elements[0][1] == "vertex"
     if (
         not is_plain
-        or not elements[0][2].isdigit()
+        or not re.fullmatch(r"[0-9]{1,12}", elements[0][2])
         or any(f[1:2] != ["float"] or len(f) != 3 for f in fields)
     ):
         raise InputError(f"{path}: expected one element vertex with float properties only")

@@ -5,6 +5,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+FARTHEST_M = 1e7
+"""Largest coordinate of a place: northings of UTM reach it."""
+MAX_SIDE_PX = 65_535
+"""Longest side of a picture, as long as JPEG has them."""
+MIN_FOCAL_PX, MAX_FOCAL_PX = 0.01, 1e7
+"""Focal lengths, and distances of the principal point, that a lens may have."""
+
 
 def check_rigid(matrix: np.ndarray, name: str, tolerance: float = 1e-4) -> None:
     """Raise ``ValueError`` unless ``matrix`` (..., 4, 4) is a finite rigid transform."""
@@ -12,6 +19,8 @@ def check_rigid(matrix: np.ndarray, name: str, tolerance: float = 1e-4) -> None:
         raise ValueError(f"{name}: expected 4x4 matrices, got shape {matrix.shape}")
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: holds NaN or infinite numbers")
+    if np.abs(matrix).max(initial=0.0) > FARTHEST_M:
+        raise ValueError(f"{name}: holds {np.abs(matrix).max():.4g}; expected places within {FARTHEST_M:g} m")
     rotation = matrix[..., :3, :3]
     error = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0)
     if error > tolerance or (np.linalg.det(rotation) < 0).any():
@@ -46,10 +55,20 @@ class Camera:
     world_from_camera: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
-        if not (self.fx_px > 0 and self.fy_px > 0):
-            raise ValueError(f"focal lengths must be positive, got fx {self.fx_px}, fy {self.fy_px}")
-        if self.width_px < 1 or self.height_px < 1:
-            raise ValueError(f"image size must be positive, got {self.width_px}x{self.height_px}")
+        if not all(MIN_FOCAL_PX <= each <= MAX_FOCAL_PX for each in (self.fx_px, self.fy_px)):
+            raise ValueError(
+                f"focal lengths must be positive, {MIN_FOCAL_PX} to {MAX_FOCAL_PX:g} px, "
+                f"got fx {self.fx_px:g}, fy {self.fy_px:g}"
+            )
+        if not all(abs(each) <= MAX_FOCAL_PX for each in (self.cx_px, self.cy_px)):
+            raise ValueError(
+                f"the principal point must lie within {MAX_FOCAL_PX:g} px, got {self.cx_px:g}, {self.cy_px:g}"
+            )
+        if not all(1 <= each <= MAX_SIDE_PX for each in (self.width_px, self.height_px)):
+            raise ValueError(
+                f"image size must be positive, {MAX_SIDE_PX} px a side at most, "
+                f"got {self.width_px}x{self.height_px}"
+            )
         check_rigid(self.world_from_camera, "world_from_camera")
 
     @property

@@ -13,6 +13,7 @@ from dreamdrive.errors import InputError
 TEXT_BYTES = 16_000_000
 """Most that a JSON or text file may hold: 1000 frames take 1 MB, and Python needs thirty times as much."""
 MAX_NAME = 255
+_LONGEST_PATH = 4000
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -74,7 +75,8 @@ def read_bytes(path: Path, where: str = "", *, at_most: int, follow: bool = True
         if size > at_most:
             raise InputError(f"{where} holds {size / 1e6:.1f} MB; expected at most {at_most / 1e6:.0f} MB")
         try:
-            return file.read(at_most)
+            # Not ``at_most``: so much memory would be taken, however short the file.
+            return file.read(size)
         except OSError as error:
             raise InputError(f"{where} cannot be read: {error.strerror}") from error
 
@@ -90,6 +92,16 @@ def read_text(path: Path, where: str = "", *, at_most: int = TEXT_BYTES) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{where or path} cannot be read as text: {error}") from None
+
+
+def is_path(name: object) -> bool:
+    """Whether what a file says can be the name of a file anywhere; asking for others raises ``OSError``."""
+    if not isinstance(name, str) or not name or "\0" in name or len(name) > _LONGEST_PATH:
+        return False
+    try:
+        return all(len(os.fsencode(part)) <= MAX_NAME for part in name.split("/"))
+    except UnicodeEncodeError:
+        return False
 
 
 def is_inside(name: object) -> bool:

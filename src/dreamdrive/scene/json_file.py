@@ -10,7 +10,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.scene.files import TEXT_BYTES, read_bytes
 
 MAX_DEPTH = 32
-"""How deep objects and lists may lie in each other; what dreamdrive reads and writes has ten levels."""
+"""How deep objects and lists may lie in each other; what is read and written has ten levels at most."""
 _LARGEST = 2**63
 # What some programs write for a number that is none.
 _NO_NUMBER = re.compile(rb"[\s:,\[]-?(?:NaN|Infinity)\b")

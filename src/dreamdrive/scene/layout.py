@@ -12,11 +12,18 @@ from jaxtyping import Float
 from msgspec import Meta
 from scipy.interpolate import CubicSpline
 
-Positive = Annotated[float, Meta(gt=0)]
+Metres = Annotated[float, Meta(ge=-100_000, le=100_000)]
+Size = Annotated[float, Meta(gt=0, le=1000)]
+Seconds = Annotated[float, Meta(ge=-1_000_000, le=1_000_000)]
+Angle = Annotated[float, Meta(ge=-1000, le=1000)]
 Share = Annotated[float, Meta(ge=0, le=1)]
-Look = Annotated[int, Meta(ge=0, description="Appearance: equal numbers of one kind look the same.")]
-Point = Annotated[tuple[float, float], Meta(description="x and y in metres.")]
-Ring = Annotated[list[Point], Meta(min_length=3, description="Corners of a polygon, not repeated.")]
+Look = Annotated[
+    int, Meta(ge=0, le=1_000_000, description="Appearance: equal numbers of one kind look the same.")
+]
+Point = Annotated[tuple[Metres, Metres], Meta(description="x and y in metres.")]
+Ring = Annotated[
+    list[Point], Meta(min_length=3, max_length=10_000, description="Corners of a polygon, not repeated.")
+]
 
 AreaKind = Literal["road", "sidewalk", "crossing", "parking", "grass"]
 LineKind = Literal["lane_divider", "road_divider", "road_edge", "stop_line"]
@@ -41,26 +48,28 @@ class Area(_Part, frozen=True):
 
     kind: AreaKind
     polygon: Ring
-    holes: list[Ring] = []
+    holes: Annotated[list[Ring], Meta(max_length=100)] = []
 
 
 class Line(_Part, frozen=True):
     """A painted line of the map."""
 
     kind: LineKind
-    points: Annotated[list[Point], Meta(min_length=2)]
+    points: Annotated[list[Point], Meta(min_length=2, max_length=10_000)]
 
 
 class TrackPoint(_Part, frozen=True):
     """Where something is at a time: the middle of its footprint and its heading."""
 
-    t_s: float
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    t_s: Seconds
+    x_m: Metres
+    y_m: Metres
+    yaw_rad: Angle
 
 
-Track = Annotated[list[TrackPoint], Meta(min_length=1, description="In the order of time.")]
+Track = Annotated[
+    list[TrackPoint], Meta(min_length=1, max_length=10_000, description="In the order of time.")
+]
 
 
 class Box(_Part, frozen=True):
@@ -74,9 +83,9 @@ class Box(_Part, frozen=True):
         look: Its appearance.
     """
 
-    id: str
+    id: Annotated[str, Meta(max_length=100)]
     kind: BoxKind
-    size_m: tuple[Positive, Positive, Positive]
+    size_m: tuple[Size, Size, Size]
     track: Track
     look: Look = 0
 
@@ -85,7 +94,7 @@ class Building(_Part, frozen=True):
     """A house with upright walls."""
 
     polygon: Ring
-    height_m: Positive
+    height_m: Size
     look: Look = 0
 
 
@@ -94,8 +103,8 @@ class Prop(_Part, frozen=True):
 
     kind: PropKind
     at_m: Point
-    height_m: Positive
-    yaw_rad: float = 0.0
+    height_m: Size
+    yaw_rad: Angle = 0.0
     look: Look = 0
 
 
@@ -111,10 +120,10 @@ class Light(_Part, frozen=True):
         exposure_drift: Largest relative change of brightness over the drive.
     """
 
-    sun_azimuth_rad: float = 0.9
+    sun_azimuth_rad: Angle = 0.9
     sun_elevation_rad: Annotated[float, Meta(gt=0, le=1.5708)] = 0.8
     sun: Share = 0.6
-    haze_per_m: Annotated[float, Meta(ge=0)] = 0.002
+    haze_per_m: Annotated[float, Meta(ge=0, le=1)] = 0.002
     clouds: Share = 0.4
     exposure_drift: Annotated[float, Meta(ge=0, lt=1)] = 0.0
 
@@ -129,7 +138,7 @@ class Ego(_Part, frozen=True):
     """
 
     track: Track
-    camera_height_m: Positive = 1.5
+    camera_height_m: Size = 1.5
     shake_rad: Annotated[float, Meta(ge=0, lt=0.2)] = 0.0
 
 
@@ -149,13 +158,13 @@ class Layout(_Part, frozen=True):
     """
 
     ego: Ego
-    areas: list[Area] = []
-    lines: list[Line] = []
+    areas: Annotated[list[Area], Meta(max_length=10_000)] = []
+    lines: Annotated[list[Line], Meta(max_length=10_000)] = []
     boxes: list[Box] = []
-    buildings: list[Building] = []
-    props: list[Prop] = []
+    buildings: Annotated[list[Building], Meta(max_length=10_000)] = []
+    props: Annotated[list[Prop], Meta(max_length=10_000)] = []
     light: Light = Light()
-    seed: Annotated[int, Meta(ge=0)] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     format: Literal[1] = FORMAT
 
 

@@ -8,6 +8,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from dreamdrive.scene.camera import check_rigid
 
+LATEST_S = 1e12
+"""Largest time: clocks that count from 1970 are at 1.8e9 seconds."""
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -25,8 +28,8 @@ class Trajectory:
         check_rigid(self.world_from_camera, "world_from_camera")
         if len(self.times_s) == 0:
             raise ValueError("a trajectory needs at least one pose")
-        if not np.isfinite(self.times_s).all() or (np.diff(self.times_s) <= 0).any():
-            raise ValueError("times_s must be finite and strictly increasing")
+        if not (np.abs(self.times_s) <= LATEST_S).all() or (np.diff(self.times_s) <= 0).any():
+            raise ValueError(f"times_s must be finite, at most {LATEST_S:g}, and strictly increasing")
 
     def __len__(self) -> int:
         return len(self.times_s)

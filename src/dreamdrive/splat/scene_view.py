@@ -71,6 +71,9 @@ def render_scene(
         colour = colour + (1 - drawn.alpha)[..., None] * scene.sky.colour(camera)
     if exposure and scene.exposure is not None:
         colour = scene.exposure.apply(colour, t_s, of_rig)
+        if part == "dynamic":
+            # Black stays black: the exposure's offset counts for what is in front of it.
+            colour = colour - (1 - drawn.alpha)[..., None] * scene.exposure.at(t_s, of_rig)[:, 3]
     return SceneView(
         colour=colour.clamp(0, 1),
         alpha=drawn.alpha,

@@ -1,5 +1,8 @@
 """Depth files: every kind, its unit, and the pixel that it lands on."""
 
+import os
+import struct
+
 import cv2
 import numpy as np
 import pytest
@@ -60,6 +63,42 @@ def test_rubbish_exr_is_refused(tmp_path):
     (tmp_path / "a.exr").write_bytes(b"no picture")
     with pytest.raises(InputError, match="cannot be read as EXR"):
         read_depth(tmp_path / "a.exr", None)
+
+
+def test_an_exr_is_judged_by_its_header(tmp_path):
+    exr = pytest.importorskip("OpenEXR")
+    path = tmp_path / "a.exr"
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+    exr.File(header, {"Z": DEPTH}).write(str(path))
+    data = bytearray(path.read_bytes())
+    path.write_bytes(data[:-20])
+    with pytest.raises(InputError, match=r"a\.exr: cannot be read as EXR"):
+        read_depth(path, None)
+    at = data.index(b"dataWindow") + len("dataWindow\0box2i\0") + 4
+    data[at : at + 16] = struct.pack("<4i", 0, 0, 99_999, 99_999)
+    path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        read_depth(path, None)
+    assert str(caught.value) == f"{path}: states 10000 million numbers; expected at most 32 million"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError) as caught:
+        read_depth(path, None)
+    assert str(caught.value) == f"{path} cannot be read: it is not a regular file"
+
+
+def test_whole_numbers_of_an_exr_need_a_unit(tmp_path):
+    exr = pytest.importorskip("OpenEXR")
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+    exr.File(header, {"Z": DEPTH.astype(np.uint32)}).write(str(tmp_path / "a.exr"))
+    with pytest.raises(InputError, match=r"holds whole numbers \(uint32\)"):
+        read_depth(tmp_path / "a.exr", None)
+
+
+def test_depth_too_large_for_single_precision_is_refused(tmp_path):
+    np.save(tmp_path / "a.npy", np.full((6, 10), 1e300))
+    with pytest.raises(InputError, match="holds negative, NaN or infinite depth"):
+        read_depth(tmp_path / "a.npy", None)
 
 
 def test_whole_numbers_need_a_unit(tmp_path):

@@ -48,7 +48,7 @@ def test_a_single_camera_needs_no_name(tmp_path):
     ("change", "words"),
     [
         ({"K": [[1, 2], [3]]}, "front: expected width, height and K"),
-        ({"K": np.full((3, 3), np.nan).tolist()}, "front: expected width, height and K"),
+        ({"K": np.full((3, 3), np.nan).tolist()}, "NaN or Infinity, which JSON has not"),
         ({"K": None}, "front: expected width, height and K"),
         ({"width": "wide"}, "front: expected width, height and K"),
         ({"width": 96}, "another aspect"),

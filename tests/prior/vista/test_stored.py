@@ -97,7 +97,17 @@ def test_wrong_and_damaged_files_are_refused(tmp_path: Path, vista_file: Path, v
         ("{", "is not JSON"),
         ("[]", "expected a JSON object"),
         ('{"size": 3}', "does not tell block_out_channels"),
-        ('{"block_out_channels": [32], "down_block_types": ["None"]}', "is of no use"),
+        ('{"block_out_channels": [32, 32, 32, 32], "down_block_types": ["None"]}', "is of no use"),
+        (
+            '{"block_out_channels": [320, 320, 320, 320]}',
+            r"config\.json of the VAE states block_out_channels \[320, 320, 320, 320\], the tensors have "
+            r"\[32, 32, 32, 32\]; take both from one model",
+        ),
+        ('{"block_out_channels": [32, 10000000]}', "block_out_channels is 10000000; expected at most 65536"),
+        (
+            '{"block_out_channels": [32, 32], "layers_per_block": 9999}',
+            "layers_per_block is 9999; expected at most 1000",
+        ),
     ):
         config.write_text(text)
         with pytest.raises(InputError, match=said):

@@ -1,25 +1,62 @@
 """Worlds on disk: what each camera records, and all truth beside it."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
+from typing import Annotated, Any
 
 import cv2
+import msgspec
 import numpy as np
+from msgspec import Meta
 
+from dreamdrive.data.array_file import read_npz
+from dreamdrive.data.camera_models import IndexedPinhole
 from dreamdrive.data.corruption import Corruption
 from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
 from dreamdrive.data.layout_picture import draw_layout
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
 from dreamdrive.data.world.materials import Semantic
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_folder
-from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.layout import Layout
+from dreamdrive.scene.camera import check_rigid
+from dreamdrive.scene.json_file import of_type, read_json
+from dreamdrive.scene.layout import Layout, Size
+from dreamdrive.scene.trajectory import Trajectory
+
+_MOST_PIXELS = 500_000_000
+"""More pixels of all frames would take more than 20 GB with their depth, flow and labels."""
+_Row = tuple[float, float, float, float]
+_Pose = tuple[_Row, _Row, _Row, _Row]
+
+
+class _Hull(msgspec.Struct):
+    """A road user of boxes.json."""
+
+    instance: Annotated[int, Meta(ge=1, le=MOST_BOXES)]
+    id: str
+    kind: str
+    moving: bool
+    size_m: tuple[Size, Size, Size]
+    world_from_box: list[_Pose]
+
+
+class _Path(msgspec.Struct):
+    """What poses.json holds."""
+
+    world_from_camera: Annotated[list[_Pose], Meta(min_length=1)]
+    times_s: Annotated[list[float], Meta(min_length=1)]
+
+
+class _Hulls(msgspec.Struct):
+    """What boxes.json holds."""
+
+    boxes: list[_Hull]
+    world_from_map: _Pose
 
 MARK = "layout.json"
 """By this file a world folder is known."""
@@ -83,36 +120,46 @@ def read_world(path: Path, camera: str = "front") -> Drive:
         raise InputError(f"{path} holds neither frames nor a camera {camera!r}; make the world again")
     try:
         return _read_camera(folder, layout)
-    except (OSError, KeyError, TypeError, ValueError, BadZipFile) as error:
+    except (OSError, ValueError, MemoryError) as error:
         raise InputError(f"{folder} is not a complete world ({error}); make it again") from error
 
 
 def _read_camera(folder: Path, layout: Layout) -> Drive:
-    pinhole = _pinhole(json.loads((folder / "cameras.json").read_text(encoding="utf-8")))
-    path = json.loads((folder / "poses.json").read_text(encoding="utf-8"))
-    hulls = json.loads((folder / "boxes.json").read_text(encoding="utf-8"))
-    times_s = np.array(path["times_s"], dtype=np.float64)
+    calibration = folder / "cameras.json"
+    pinhole = of_type(read_json(calibration), IndexedPinhole, str(calibration)).camera()
+    stored = of_type(read_json(folder / "poses.json"), _Path, str(folder / "poses.json"))
+    path = Trajectory(np.array(stored.world_from_camera), np.array(stored.times_s))
+    hulls = of_type(read_json(folder / "boxes.json"), _Hulls, str(folder / "boxes.json"))
+    if len(stored.world_from_camera) != len(path.times_s):
+        raise ValueError(
+            f"poses.json has {len(stored.world_from_camera)} poses for {len(path.times_s)} times"
+        )
+    times_s = path.times_s
     shape = len(times_s), pinhole.height_px, pinhole.width_px
-    world_from_map = np.array(hulls["world_from_map"], dtype=np.float64)
+    world_from_map = np.array(hulls.world_from_map)
+    check_rigid(world_from_map, "world_from_map of boxes.json")
+    _check_size(shape)
     return Drive(
         frames=_images(folder / "frames", (*shape, 3))[..., ::-1].copy(),
         times_s=times_s,
-        cameras=tuple(pinhole.at(np.array(pose)) for pose in path["world_from_camera"]),
+        cameras=tuple(pinhole.at(pose) for pose in path.world_from_camera),
         depth_m=np.stack([_array(path, "depth_m", shape[1:]) for path in _depth_files(folder, len(times_s))]),
         instance=_images(folder / "instances", shape).astype(np.int32),
         semantic=_images(folder / "semantics", shape),
         moving=_images(folder / "moving", shape) > 0,
         flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
-        boxes=tuple(_box(values, len(times_s)) for values in hulls["boxes"]),
+        boxes=tuple(_box(values, len(times_s)) for values in hulls.boxes),
         ground=road_plane(world_from_map),
         layout=layout,
         world_from_map=world_from_map,
     )
 
 
-def _pinhole(record: dict[str, Any]) -> Camera:
-    k = record["intrinsics"]
-    return Camera(k["fx"], k["fy"], k["cx"] + 0.5, k["cy"] + 0.5, record["width"], record["height"])
+def _check_size(shape: tuple[int, int, int]) -> None:
+    """Whether the frames fit into memory with all that is known of each pixel, before any of it is taken."""
+    count, height, width = shape
+    if count * height * width > _MOST_PIXELS:
+        raise ValueError(f"{count} frames of {width}x{height} are more than {_MOST_PIXELS:g} pixels")
 
 
 def _depth_files(folder: Path, count: int) -> list[Path]:
@@ -123,29 +170,29 @@ def _images(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
     images = np.zeros(shape, dtype=np.uint8)
     for i in range(len(images)):
         path = folder / f"{i:04d}.png"
-        image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
-        images[i] = _of_shape(path, image, shape[1:])
+        images[i] = _of_shape(path, read_picture(path, f"{path.parent.name}/{path.name}"), shape[1:])
     return images
 
 
 def _array(path: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    with np.load(path) as stored:
-        return _of_shape(path, stored[name], shape)
+    # At most of doubles.
+    stored = read_npz(path, [name], at_most=8 * math.prod(shape))
+    return _of_shape(path, stored.get(name), shape)
 
 
 def _of_shape(path: Path, values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     if values is None or values.shape != shape:
-        got = "nothing readable" if values is None else f"shape {values.shape}"
+        got = "no such array" if values is None else f"shape {values.shape}"
         raise ValueError(f"{path.name} of {path.parent.name} holds {got}, expected {shape}")
     return values
 
 
-def _box(values: dict[str, Any], frames: int) -> WorldBox:
-    poses = np.array(values["world_from_box"], dtype=np.float64)
-    if poses.shape != (frames, 4, 4):
-        raise ValueError(f"box {values['id']} has poses of shape {poses.shape} for {frames} frames")
-    size_m = np.array(values["size_m"], dtype=np.float64)
-    return WorldBox(values["instance"], values["id"], values["kind"], values["moving"], size_m, poses)
+def _box(values: "_Hull", frames: int) -> WorldBox:
+    poses = np.array(values.world_from_box)
+    if len(poses) != frames:
+        raise ValueError(f"box {values.id} of boxes.json has {len(poses)} poses for {frames} frames")
+    check_rigid(poses, f"world_from_box of {values.id} in boxes.json")
+    return WorldBox(values.instance, values.id, values.kind, values.moving, np.array(values.size_m), poses)
 
 
 def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> None:

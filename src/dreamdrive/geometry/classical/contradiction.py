@@ -25,6 +25,7 @@ _MIN_TRACKS = 30
 _WITHIN_PX = 2.0  # at 320 px width
 _MIN_FLOW_PX = 3.0
 _STANDING = 1e-3  # of the path
+_SAME_POSE = 0.01  # metres, and in the entries of the rotation
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,13 @@ def check(clip: Clip, evidence: Evidence) -> None:
     """
     if clip.known.world_from_camera is None or clip.known.generated:
         return
-    found = explain(evidence.grey, evidence.street, evidence.small, clip.known.world_from_camera)
+    poses = clip.known.world_from_camera
+    if _stand(poses, clip.known.metric) and _moves(evidence.grey, evidence.street, evidence.small):
+        raise InputError(
+            "the given poses are all the same, but the camera moves in the frames: with them nothing has a "
+            "depth. Give the pose of each frame, or none to have them found"
+        )
+    found = explain(evidence.grey, evidence.street, evidence.small, poses)
     if not found.contradictory:
         return
     focal = "" if clip.known.intrinsics else "; the focal length is a guess: if it is known, give it too"
@@ -89,9 +96,8 @@ def explain(
         world_from_camera: Poses to be checked, in any unit.
     """
     path = path_length(world_from_camera)
-    apart = min(_APART, len(grey) - 1)
     given, own = [], []
-    for first in np.unique(np.linspace(0, len(grey) - 1 - apart, _PAIRS).round().astype(int)).tolist():
+    for first, apart in _pairs(len(grey)):
         relative = np.linalg.inv(world_from_camera[first + apart]) @ world_from_camera[first]
         here, there = track(grey[first], grey[first + apart], usable[first])
         stands = np.linalg.norm(relative[:3, 3]) <= _STANDING * path
@@ -102,6 +108,28 @@ def explain(
     if not own:
         return Explained(0.0, 0.0, 0)
     return Explained(float(np.median(given)), float(np.median(own)), len(own))
+
+
+def _pairs(count: int) -> list[tuple[int, int]]:
+    """First frames of pairs all over a clip, and how far apart the two are."""
+    apart = min(_APART, count - 1)
+    firsts = np.unique(np.linspace(0, count - 1 - apart, _PAIRS).round().astype(int))
+    return [(first, apart) for first in firsts.tolist()]
+
+
+def _stand(world_from_camera: Float[np.ndarray, "f 4 4"], metric: bool) -> bool:
+    """Whether all poses are one, up to rounding."""
+    return bool(np.abs(world_from_camera - world_from_camera[0]).max() < (_SAME_POSE if metric else 1e-9))
+
+
+def _moves(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], camera: Camera) -> bool:
+    """Whether most pairs of frames show one clear motion of the camera."""
+    shares: list[float] = []
+    for first, apart in _pairs(len(grey)):
+        here, there = track(grey[first], grey[first + apart], usable[first])
+        clear = len(here) >= _MIN_TRACKS and _flow_px(here, there) >= _MIN_FLOW_PX
+        shares.append(_share(here, there, camera, _own(here, there, camera)) if clear else 0.0)
+    return float(np.median(shares)) >= MIN_OWN
 
 
 def _flow_px(here: Float[np.ndarray, "n 2"], there: Float[np.ndarray, "n 2"]) -> float:

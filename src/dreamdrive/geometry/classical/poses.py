@@ -189,8 +189,11 @@ def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]
     poses, _ = rebase(clip.known.world_from_camera.astype(np.float64), np.zeros((0, 3)))
     poses[:, :3, 3] *= metric.factor
     details = {} if clip.known.metric else {"metres_per_unit": metric.factor}
+    standing = evidence.motion.standing and path_length(poses) < 0.5
+    if standing:
+        notes = [*notes, "the camera stands still: depth cannot be seen from motion"]
     posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, details)
-    return replace(posed, standing=evidence.motion.standing and path_length(poses) < 0.5)
+    return replace(posed, standing=standing)
 
 
 def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:

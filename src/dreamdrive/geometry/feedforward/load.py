@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from dreamdrive.errors import InputError
 from dreamdrive.memory import best_device
 from dreamdrive.scene.json_file import read_json
-from dreamdrive.weights import as_state, fill, read_state, read_torch
+from dreamdrive.weights import as_state, check_sizes, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)
 _NAMES = ("model.safetensors", "model.pt", "model.pth")
@@ -72,7 +72,11 @@ def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
 
 
 def _read_config(file: Path) -> dict[str, Any]:
-    return read_json(file, "--weights") if file.is_file() else {}
+    if not file.is_file():
+        return {}
+    config = read_json(file, "--weights")
+    check_sizes(config, f"--weights {file}")
+    return config
 
 
 def upstream(module: str, install: str) -> Any:
@@ -105,7 +109,7 @@ def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             network = make()
-    except (TypeError, KeyError, AttributeError, ValueError) as error:
+    except (TypeError, KeyError, AttributeError, ValueError, RuntimeError) as error:
         raise InputError(
             f"{stored.source}: the installed package does not build this network "
             f"({type(error).__name__}: {error}); expected {stored.expected}"

@@ -3,21 +3,25 @@
 All hold depth along z (not along the ray), 0 where it is unknown, the first row at the top.
 """
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import Float, Shaped
 
+from dreamdrive.data.array_file import read_npy, read_npz
+from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import NAME, Declared
 from dreamdrive.geometry.files.given import DepthFiles
+from dreamdrive.scene.files import check_file, is_path
+from dreamdrive.scene.tensor_file import briefly
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
-_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R", "RGB", "RGBA")
+_EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R")
+_EXR_NUMBERS = 32_000_000
+"""Numbers that an EXR may have over all its channels; its library holds them twice."""
 _MILLIMETRE, _KITTI_M = 0.001, 1 / 256
 
 
@@ -25,7 +29,9 @@ def find_depth(folder: Path, labels: Sequence[str], declared: Declared) -> Depth
     """The depth files in ``folder``, called like ``labels``, one label for each selected frame."""
     of: dict[int, Path] = {}
     for row, label in enumerate(labels):
-        found = next((path for end in ENDINGS if (path := folder / f"{label}{end}").is_file()), None)
+        # Pictures of a model may have any name, also one that no file has.
+        named = [folder / f"{label}{end}" for end in ENDINGS if is_path(f"{label}{end}")]
+        found = next((path for path in named if path.is_file()), None)
         if found is not None:
             of[row] = found
     return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit)
@@ -52,10 +58,12 @@ def read_depth(
         unit = 1.0
     elif unit is None:
         unit, said = _usual_unit(path, stored, kitti)
-    depth = stored.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        depth = stored.astype(np.float32, copy=not stored.flags.writeable)
+        depth *= np.float32(unit)
     if not np.isfinite(depth).all() or (depth < 0).any():
         raise InputError(f"{path}: holds negative, NaN or infinite depth; write 0 where there is none")
-    return depth * np.float32(unit), said
+    return depth, said
 
 
 def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"], kitti: bool) -> tuple[float, str]:
@@ -71,31 +79,22 @@ def _usual_unit(path: Path, stored: Shaped[np.ndarray, "h w"], kitti: bool) -> t
 
 def _read_npz(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
     """The array ``depth_m`` (in metres for sure) or ``depth``."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            name = "depth" if "depth" in archive and "depth_m" not in archive else "depth_m"
-            return np.asarray(archive[name]), name == "depth_m"
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: cannot be read as an npz with an array depth_m or depth ({error})"
-        ) from error
+    stored = read_npz(path, ("depth_m", "depth"))
+    for name, array in stored.items():
+        return array, name == "depth_m"
+    raise InputError(f"{path}: holds neither an array depth_m nor depth")
 
 
 def _read_npy(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
-    try:
-        stored = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read as an npy ({error})") from error
-    if not isinstance(stored, np.ndarray):
-        raise InputError(f"{path}: is an npz called npy; call it .npz")
+    stored = read_npy(path)
     return (stored[..., 0] if stored.ndim == 3 and stored.shape[2] == 1 else stored), False
 
 
 def _read_png(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None or image.dtype != np.uint16 or image.ndim != 2:
+    image = read_picture(path)
+    if image.dtype != np.uint16 or image.ndim != 2:
         raise InputError(f"{path}: expected a grey PNG of 16 bits with depth, 0 where unknown")
-    return np.asarray(image), False
+    return image, False
 
 
 def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
@@ -107,18 +106,37 @@ def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
             f"{path}: EXR files are read by the package OpenEXR, which is not installed; "
             "pip install 'dreamdrive[exr]', or give the depth as .npz"
         ) from None
+    check_file(path)
     try:
-        with OpenEXR.File(str(path)) as file:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            _check_exr(path, file)
+        with OpenEXR.File(str(path), separate_channels=True) as file:
             channels: dict[str, Any] = {name: each.pixels for name, each in file.channels().items()}
-    except (OSError, RuntimeError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: cannot be read as EXR ({error})") from error
+    except InputError:
+        raise
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
+        raise InputError(f"{path}: cannot be read as EXR ({briefly(error)})") from error
     name = next((name for name in _EXR_CHANNELS if name in channels), None)
     if name is None and len(channels) == 1:
         name = next(iter(channels))
     if name is None:
-        raise InputError(f"{path}: has the channels {', '.join(channels)}; expected Z, V, Y or a single one")
-    pixels = np.asarray(channels[name])
-    return (pixels[..., 0] if pixels.ndim == 3 else pixels), False
+        named = briefly(", ".join(channels))
+        raise InputError(f"{path}: has the channels {named}; expected Z, V, Y or a single one")
+    return np.asarray(channels[name]), False
+
+
+def _check_exr(path: Path, file: Any) -> None:
+    """Whether the header of an EXR says that it fits into memory."""
+    numbers = 0
+    for part in file.parts:
+        low, high = part.header["dataWindow"]
+        width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
+        numbers += max(width, 0) * max(height, 0) * len(part.header["channels"])
+    if numbers > _EXR_NUMBERS:
+        raise InputError(
+            f"{path}: states {numbers / 1e6:.0f} million numbers; expected at most "
+            f"{_EXR_NUMBERS // 10**6} million"
+        )
 
 
 _READERS = {".npz": _read_npz, ".npy": _read_npy, ".exr": _read_exr, ".png": _read_png}

@@ -14,6 +14,7 @@ from dreamdrive.geometry.files.pandaset import read_pandaset
 from dreamdrive.geometry.files.plain import read_plain
 from dreamdrive.geometry.files.pose_lists import CALIBRATION, read_pose_list
 from dreamdrive.geometry.files.wanted import Wanted
+from dreamdrive.scene.files import open_file
 
 EXPECTED = (
     "cameras.json (ours or PandaSet's), transforms.json (nerfstudio), a COLMAP model (cameras, images and "
@@ -52,7 +53,7 @@ def recognise(path: Path) -> tuple[Reader, Path]:
 
 
 def _is_json(path: Path) -> bool:
-    with path.open("rb") as file:
+    with open_file(path, f"{OPTION} {path}") as file:
         return path.suffix.lower() == ".json" or file.read(64).lstrip()[:1] in (b"{", b"[")
 
 

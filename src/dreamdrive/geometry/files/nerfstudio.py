@@ -22,6 +22,7 @@ from dreamdrive.geometry.files.depth import ENDINGS
 from dreamdrive.geometry.files.given import DepthFiles, Given
 from dreamdrive.geometry.files.json_record import read_record
 from dreamdrive.geometry.files.wanted import Wanted
+from dreamdrive.scene.files import is_path
 
 _OURS_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 _USUAL_FACTOR = 1e-3
@@ -58,7 +59,14 @@ def read_transforms(path: Path, wanted: Wanted) -> Given:
 def depth_files(path: Path) -> list[Path]:
     """All depth files that a ``transforms.json`` names, whether they are there or not."""
     frames = transforms_frames(read_record(path), str(path))
-    return [path.parent / str(frame["depth_file_path"]) for frame in frames if frame.get("depth_file_path")]
+    return [_beside(path, frame["depth_file_path"]) for frame in frames if frame.get("depth_file_path")]
+
+
+def _beside(path: Path, name: object) -> Path:
+    """The file that a name means, which counts from the folder of ``path``."""
+    if not is_path(name):
+        raise InputError(f"{path}: depth_file_path {name!r} is no name of a file")
+    return path.parent / str(name)
 
 
 def _poses(frames: list[dict[str, Any]], path: Path) -> Float[np.ndarray, "f 4 4"]:
@@ -86,7 +94,7 @@ def _depth(
         name = frame.get("depth_file_path")
         if name is None:
             continue
-        file = path.parent / str(name)
+        file = _beside(path, name)
         if not file.is_file() or file.suffix.lower() not in ENDINGS:
             raise InputError(
                 f"{path}: depth_file_path {name} of {frame['file_path']} is no file that can be read "

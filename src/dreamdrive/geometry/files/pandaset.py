@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.camera_models import LensCamera, MatrixPinhole
 from dreamdrive.data.poses import read_poses
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import NAME, read_declared
@@ -19,6 +19,7 @@ from dreamdrive.geometry.files.given import Given
 from dreamdrive.geometry.files.json_record import OPTION, read_record
 from dreamdrive.geometry.files.wanted import Wanted
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.json_file import of_type
 
 
 def read_pandaset(path: Path, wanted: Wanted) -> Given:
@@ -50,11 +51,6 @@ def read_pandaset(path: Path, wanted: Wanted) -> Given:
 
 def _camera(entry: Any, where: str) -> Camera:
     try:
-        matrix = np.array(entry["K"], np.float64)
-        size = int(entry["width"]), int(entry["height"])
-        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-            raise ValueError(f"K is no 3x3 matrix of finite numbers: {entry['K']}")
-        fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
-        return Camera(fx, fy, cx + 0.5, cy + 0.5, *size)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        return of_type(entry, MatrixPinhole, where).camera()
+    except ValueError as error:
         raise InputError(f"{where}: expected width, height and K, a 3x3 matrix ({error})") from error

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.camera_models import IndexedPinhole, LensCamera, NamedFrames
 from dreamdrive.data.pose_files import clean_poses
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.files.declared import read_declared
@@ -25,6 +25,7 @@ from dreamdrive.geometry.files.given import Given
 from dreamdrive.geometry.files.json_record import read_record
 from dreamdrive.geometry.files.wanted import Wanted
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.json_file import of_type
 
 _NEEDED = ("width", "height", "intrinsics", "world_from_camera")
 
@@ -50,22 +51,19 @@ def read_plain(path: Path, wanted: Wanted) -> Given:
 
 def _camera(record: dict[str, Any], path: Path) -> Camera:
     try:
-        width, height = int(record["width"]), int(record["height"])
-        fx, fy, cx, cy = (float(record["intrinsics"][key]) for key in ("fx", "fy", "cx", "cy"))
-        camera = Camera(fx, fy, cx + 0.5, cy + 0.5, width, height)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        return of_type(record, IndexedPinhole, str(path)).camera()
+    except ValueError as error:
         raise InputError(f"{path}: width, height and intrinsics fx, fy, cx, cy expected ({error})") from error
-    if not np.isfinite([fx, fy, cx, cy]).all():
-        raise InputError(f"{path}: the intrinsics hold NaN or infinite numbers")
-    return camera
 
 
 def _poses(record: dict[str, Any], wanted: Wanted, path: Path) -> Float[np.ndarray, "f 4 4"]:
     try:
         matrices = np.asarray(record["world_from_camera"], np.float64)
-        frames = [int(i) for i in record.get("frames", range(len(matrices)))]
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{path}: world_from_camera is no list of 4x4 matrices ({error})") from error
+    frames = list(range(len(matrices))) if matrices.ndim else []
+    named = of_type(record, NamedFrames, str(path)).frames
+    frames = frames if named is None else named
     if matrices.ndim != 3 or len(frames) != len(matrices):
         raise InputError(f"{path}: {len(frames)} frames for world_from_camera of shape {matrices.shape}")
     poses = clean_poses(matrices, f"{path}: world_from_camera", lambda row: f"pose {row} (counted from 0)")

@@ -22,7 +22,8 @@ from dreamdrive.geometry.files.depth import find_depth
 from dreamdrive.geometry.files.given import Given
 from dreamdrive.geometry.files.json_record import OPTION
 from dreamdrive.geometry.files.wanted import Wanted
-from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.camera import Camera, check_rigid
+from dreamdrive.scene.files import read_text
 
 CALIBRATION = "calib.txt"
 
@@ -65,9 +66,11 @@ def _camera_name(said: str) -> str:
 def _calibrated(path: Path, name: str, picture: tuple[int, int]) -> tuple[Camera, Float[np.ndarray, "4 4"]]:
     """The pinhole of a camera, and camera_0_from_camera."""
     try:
-        lines = [line.partition(":") for line in path.read_text(encoding="utf-8").splitlines()]
+        lines = [line.partition(":") for line in read_text(path).splitlines()]
         rows = {key.strip(): [float(word) for word in rest.split()] for key, _, rest in lines if key.strip()}
-    except (OSError, ValueError) as error:
+    except InputError:
+        raise
+    except ValueError as error:
         raise InputError(f"{path}: cannot be read as KITTI's calibration ({error})") from error
     matrix = np.array(rows.get(name, []))
     if matrix.shape != (12,) or not np.isfinite(matrix).all():
@@ -79,5 +82,10 @@ def _calibrated(path: Path, name: str, picture: tuple[int, int]) -> tuple[Camera
     except ValueError as error:
         raise InputError(f"{path}: {name}: {error}") from error
     beside = np.eye(4)
-    beside[:3, 3] = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused below
+            beside[:3, 3] = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
+        check_rigid(beside, "its place beside camera 0")
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise InputError(f"{path}: {name} is no projection of a camera: {error}") from error
     return camera, beside

@@ -1,5 +1,6 @@
 """The selected frames of a clip, as readers look for them in a file."""
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -81,7 +82,16 @@ class Wanted:
         Raises:
             InputError: Some frames are not in the list, or it has neither of these lengths.
         """
-        found = [self._named(names, name, where) for name in self.names or ()]
+        paths = [PurePosixPath(name.replace("\\", "/")) for name in names]
+        by_name: dict[str, list[int]] = defaultdict(list)
+        by_stem: dict[str, list[int]] = defaultdict(list)
+        for row, path in enumerate(paths):
+            by_name[path.name].append(row)
+            by_stem[path.stem].append(row)
+        found: list[int | None] = []
+        for name in self.names or ():
+            rows = by_name.get(name) or by_stem.get(PurePosixPath(name).stem) or []
+            found.append(self._one(rows, paths, name, where))
         if not any(row is not None for row in found):
             return self._in_order(names, where)
         missing = [name for name, row in zip(self.names or (), found, strict=True) if row is None]
@@ -93,16 +103,14 @@ class Wanted:
             )
         return np.array(found, np.intp), ()
 
-    def _named(self, names: Sequence[str], wanted: str, where: str) -> int | None:
-        paths = [PurePosixPath(name.replace("\\", "/")) for name in names]
-        rows = [row for row, path in enumerate(paths) if path.name == wanted]
-        stem = PurePosixPath(wanted).stem
-        rows = rows or [row for row, path in enumerate(paths) if path.stem == stem]
+    def _one(self, rows: list[int], paths: Sequence[PurePosixPath], wanted: str, where: str) -> int | None:
+        """The one of several rows that lies in a folder like the source's."""
         if len(rows) > 1:
             rows = [row for row in rows if paths[row].parent.name == self.folder] or rows
         if len(rows) > 1:
+            same = ", ".join(str(paths[row]) for row in rows[:4])
             raise InputError(
-                f"{where} has several pictures called {wanted}: {', '.join(names[row] for row in rows[:4])}; "
+                f"{where} has several pictures called {wanted}: {same}; "
                 "name the input folder like one of their folders"
             )
         return rows[0] if rows else None

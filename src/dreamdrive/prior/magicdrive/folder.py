@@ -18,7 +18,7 @@ from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings
 from dreamdrive.scene.json_file import read_json
-from dreamdrive.weights import fill, read_state, sha256
+from dreamdrive.weights import check_sizes, fill, read_state, sha256
 
 _DIFFUSERS = tuple(f"diffusion_pytorch_model.{end}" for end in ("safetensors", "fp16.safetensors", "bin"))
 _TEXT = ("model.safetensors", "model.fp16.safetensors", "pytorch_model.bin")
@@ -107,6 +107,8 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
         for part in _PARTS
         if part != "tokenizer"
     }
+    for part, config in configs.items():
+        check_sizes(config, f"--weights {folder / part / _PARTS[part][0]}")
     settings = read_settings(configs["unet"], configs["controlnet"])
     _check_variant(settings, temporal)
     device = device or best_device()
@@ -196,7 +198,7 @@ def _check_fit(
 def _built(part: str, make: Callable[[], Any]) -> Any:
     try:
         return make()
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
+    except (TypeError, ValueError, KeyError, AttributeError, RuntimeError) as error:
         what = f"{type(error).__name__}: {error}"
         raise InputError(f"{part}/config.json builds no network ({what}); expected {EXPECTED}") from None
 

@@ -48,6 +48,7 @@ def _unet(shapes: Shapes, head: int) -> dict[str, Any]:
         "down_block_types": [names[a].format("Down") for a in attends],
         "up_block_types": [names[a].format("Up") for a in reversed(attends)],
         "layers_per_block": _levels(shapes, "down_blocks.0.resnets."),
+        "transformer_layers_per_block": _levels(shapes, "mid_block.attentions.0.transformer_blocks."),
         "cross_attention_dim": context,
         "num_attention_heads": [width // head for width in widths],
         "addition_time_embed_dim": ids // 3,

@@ -15,7 +15,8 @@ from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.scene.json_file import read_json
-from dreamdrive.weights import in_words, misfits, some
+from dreamdrive.scene.tensor_file import briefly, header_problem
+from dreamdrive.weights import check_sizes, in_words, misfits, some
 
 EXPECTED = (
     "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert "
@@ -35,6 +36,14 @@ _NEEDED: dict[Part, tuple[str, ...]] = {
     "image_encoder": ("projection_dim", "image_size"),
 }
 """What of the configuration is used beside the network's making."""
+_SHOWN: dict[Part, tuple[str, ...]] = {
+    "unet": ("block_out_channels", "layers_per_block", "transformer_layers_per_block", "cross_attention_dim"),
+    "vae": ("block_out_channels", "layers_per_block"),
+    "image_encoder": ("hidden_size", "intermediate_size", "num_hidden_layers", "patch_size", "image_size"),
+}
+"""What of the configuration the tensors show too."""
+# What the classes of networks raise on sizes that do not fit each other.
+_NO_NETWORK = (TypeError, ValueError, KeyError, AttributeError, IndexError, ArithmeticError, RuntimeError)
 _SECOND_TIME = "cond_time_embedding."
 
 
@@ -129,13 +138,23 @@ def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {EXPECTED}")
     try:
+        if problem := header_problem(path):
+            raise SafetensorError(problem)
         file = safe_open(path, "pt")
         shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
     except (OSError, SafetensorError) as error:
         raise InputError(
-            f"{path} is no .safetensors or is cut short ({error}); copy it again, expected {EXPECTED}"
+            f"{path} is no .safetensors or is cut short ({briefly(error)}); copy it again, expected "
+            f"{EXPECTED}"
         ) from None
-    return shapes, file.get_tensor
+
+    def read(key: str) -> Tensor:
+        value = file.get_tensor(key)
+        if not value.is_floating_point():
+            raise InputError(f"{path}: {briefly(key)} holds {value.dtype}; expected floating-point numbers")
+        return value
+
+    return shapes, read
 
 
 def _open_file(path: Path) -> Stored:
@@ -168,10 +187,12 @@ def _part(
         config = config_of(part, own)
     except KeyError as error:
         raise InputError(
-            f"{path}: the {TITLES[part]} lacks {error.args[0]} and more; expected {EXPECTED}"
+            f"{path}: the {TITLES[part]} lacks {briefly(error.args[0])} and more; expected {EXPECTED}"
         ) from None
-    except RuntimeError as error:
-        raise InputError(f"{path}: tensors of the {TITLES[part]} do not fit together ({error})") from None
+    except (RuntimeError, ValueError, IndexError, ArithmeticError) as error:
+        raise InputError(
+            f"{path}: tensors of the {TITLES[part]} do not fit together ({briefly(error)})"
+        ) from None
     return StoredPart(config, own, lambda name: chosen[name].make(read))
 
 
@@ -200,15 +221,39 @@ def _check(stored: Stored, part: Part) -> None:
     own = stored.parts[part]
     if lacking := [name for name in _NEEDED[part] if name not in own.config]:
         raise InputError(f"{stored.path}: config.json of the {TITLES[part]} does not tell {lacking[0]}")
+    _check_config(stored, part)
     try:
         network = make_empty(part, own.config, stored.kind)
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise InputError(f"{stored.path}: config.json of the {TITLES[part]} is of no use ({error})") from None
+    except _NO_NETWORK as error:
+        raise InputError(
+            f"{stored.path}: config.json of the {TITLES[part]} is of no use ({briefly(error)})"
+        ) from None
     wanted = {name: tuple(value.shape) for name, value in network.state_dict().items()}
     if wrong := misfits(wanted, own.shapes):
         raise InputError(
             f"{stored.path}: the {_blamed(part, wrong)} does not fit ({in_words(wrong)}); expected {EXPECTED}"
         )
+
+
+def _check_config(stored: Stored, part: Part) -> None:
+    """Whether the sizes in a configuration are those of the tensors, before a network is built of them.
+
+    Raises:
+        InputError: They differ, or are beyond what networks have.
+    """
+    own = stored.parts[part]
+    where = f"{stored.path}: config.json of the {TITLES[part]}"
+    check_sizes(own.config, where)
+    try:
+        shown = config_of(part, own.shapes)
+    except (KeyError, ValueError, IndexError):
+        return  # the network's own names tell better what is missing
+    for name in _SHOWN[part]:
+        stated = own.config.get(name, shown[name])
+        if stated != shown[name] and stated != [shown[name]] * len(shown.get("block_out_channels", [])):
+            raise InputError(
+                f"{where} states {name} {stated}, the tensors have {shown[name]}; take both from one model"
+            )
 
 
 def _blamed(part: Part, groups: dict[str, list[str]]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.geometry.dust3r.network.golden import Golden
+from tests.geometry.dust3r.network.golden import Golden, tiny
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.dust3r.network.config import (
@@ -14,6 +14,7 @@ from dreamdrive.geometry.dust3r.network.config import (
     check_agreement,
     config_from_call,
     config_from_json,
+    config_from_keywords,
     config_from_shapes,
 )
 
@@ -111,3 +112,27 @@ def test_disagreement_is_named() -> None:
         InputError, match=r"enc_depth is stated as 24, the tensors have 23; head is stated as 'dpt'"
     ):
         check_agreement(NetworkConfig(), NetworkConfig(enc_depth=23, head="linear"), "m")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"img_size": [10**6, 512]},
+            r"m: img_size \[1000000, 512\]; expected one or two positive numbers up to 4096",
+        ),
+        ({"mlp_ratio": 1e30}, r"m: mlp_ratio 1e\+30; expected more than 0 and at most 64"),
+        ({"mlp_ratio": -4}, "m: mlp_ratio -4; expected more than 0 and at most 64"),
+        ({"pos_embed": "RoPE" + "9" * 400}, "is not supported; expected RoPE100"),
+    ],
+)
+def test_sizes_beyond_all_networks_are_refused(changes, said):
+    with pytest.raises(InputError, match=said):
+        config_from_keywords({"pos_embed": "RoPE100", **changes}, "m")
+
+
+def test_the_number_of_a_layer_does_not_make_layers():
+    shapes = {key: tuple(value.shape) for key, value in tiny().state_dict().items()}
+    depth = config_from_shapes(shapes, "m").enc_depth
+    for number in (10**9, 9999):
+        assert config_from_shapes({**shapes, f"enc_blocks.{number}.x": (1,)}, "m").enc_depth <= 2 * depth + 2

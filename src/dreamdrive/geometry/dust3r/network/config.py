@@ -41,6 +41,7 @@ _DEFAULTS: dict[str, Any] = {
     "depth_mode": ("exp", -math.inf, math.inf),
     "conf_mode": ("exp", 1, math.inf),
 }
+_LARGEST_PX, _LARGEST_RATIO = 4096, 64.0
 _FROM_SHAPES = ("enc_dim", "enc_depth", "dec_dim", "dec_depth", "patch", "head")
 
 
@@ -148,7 +149,7 @@ def config_from_json(text: str, source: str) -> NetworkConfig:
     """
     try:
         values = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{source} is not JSON ({error})") from None
     if not isinstance(values, dict):
         raise InputError(f"{source} holds no JSON object; expected the keywords of {CLASS}")
@@ -169,7 +170,7 @@ def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig
         raise InputError(f"{source}: depth_mode with bounds {depth_range} is not supported; expected none")
     conf_mode, conf_range = _mode(values, "conf_mode", get_args(ConfidenceMode), source)
     if values["head_type"] not in get_args(HeadKind):
-        raise InputError(f"{source}: head_type {values['head_type']!r}; expected 'dpt' or 'linear'")
+        raise InputError(f"{source}: head_type {_short(values['head_type'])}; expected 'dpt' or 'linear'")
     return _make(
         source,
         enc_dim=_integer(values, "enc_embed_dim", source),
@@ -179,7 +180,7 @@ def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig
         dec_depth=_integer(values, "dec_depth", source),
         dec_heads=_integer(values, "dec_num_heads", source),
         patch=_integer(values, "patch_size", source),
-        mlp_ratio=_number(values["mlp_ratio"], "mlp_ratio", source),
+        mlp_ratio=_ratio(values, source),
         head=values["head_type"],
         depth_mode=depth_mode,
         conf_mode=conf_mode,
@@ -261,8 +262,9 @@ def _make(source: str, **values: Any) -> NetworkConfig:
 
 
 def _depth(shapes: Mapping[str, tuple[int, ...]], blocks: str) -> int:
-    numbers = [int(m.group(1)) for key in shapes if (m := re.match(rf"{blocks}\.(\d+)\.", key))]
-    return max(numbers, default=-1) + 1
+    numbers = {int(m.group(1)) for key in shapes if (m := re.match(rf"{blocks}\.(\d{{1,4}})\.", key))}
+    # Where one is left out the last number says more than there are, and what is missing is then named.
+    return min(max(numbers, default=-1) + 1, 2 * len(numbers))
 
 
 def _value(node: ast.expr, name: str, source: str) -> Any:
@@ -282,7 +284,7 @@ def _value(node: ast.expr, name: str, source: str) -> Any:
 
 def _only(values: Mapping[str, Any], name: str, supported: object, source: str) -> None:
     if values[name] != supported:
-        raise InputError(f"{source}: {name} {values[name]!r} is not supported; expected {supported!r}")
+        raise InputError(f"{source}: {name} {_short(values[name])} is not supported; expected {supported!r}")
 
 
 def _mode(
@@ -290,36 +292,54 @@ def _mode(
 ) -> tuple[str, tuple[float, float]]:
     value = values[name]
     if not isinstance(value, tuple | list) or len(value) != 3 or value[0] not in kinds:
-        raise InputError(f"{source}: {name} {value!r}; expected a kind of {', '.join(kinds)} and two bounds")
+        raise InputError(
+            f"{source}: {name} {_short(value)}; expected a kind of {', '.join(kinds)} and two bounds"
+        )
     return value[0], (_number(value[1], name, source), _number(value[2], name, source))
 
 
 def _rope_base(value: object, source: str) -> float:
     match = re.fullmatch(r"RoPE(\d+(?:\.\d+)?)", str(value))
-    if match is None or not float(match.group(1)) > 0:
-        raise InputError(f"{source}: pos_embed {value!r} is not supported; expected RoPE100 or the like")
+    if match is None or not 0 < float(match.group(1)) < math.inf:
+        raise InputError(
+            f"{source}: pos_embed {_short(value)} is not supported; expected RoPE100 or the like"
+        )
     return float(match.group(1))
 
 
 def _image_size(value: Any, source: str) -> int:
     sides: Sequence[Any] = value if isinstance(value, tuple | list) else (value,)
-    if not sides or not all(isinstance(side, int) and side > 0 for side in sides):
-        raise InputError(f"{source}: img_size {value!r}; expected one or two positive numbers")
+    if not sides or not all(isinstance(side, int) and 0 < side <= _LARGEST_PX for side in sides):
+        raise InputError(
+            f"{source}: img_size {_short(value)}; expected one or two positive numbers up to {_LARGEST_PX}"
+        )
     return max(sides)
 
 
 def _integer(values: Mapping[str, Any], name: str, source: str) -> int:
     value = values[name]
     if not isinstance(value, int) or isinstance(value, bool):
-        raise InputError(f"{source}: {name} {value!r}; expected a whole number")
+        raise InputError(f"{source}: {name} {_short(value)}; expected a whole number")
     return value
+
+
+def _ratio(values: Mapping[str, Any], source: str) -> float:
+    ratio = _number(values["mlp_ratio"], "mlp_ratio", source)
+    if not 0 < ratio <= _LARGEST_RATIO:
+        raise InputError(
+            f"{source}: mlp_ratio {ratio:g}; expected more than 0 and at most {_LARGEST_RATIO:g}"
+        )
+    return ratio
 
 
 def _number(value: object, name: str, source: str) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
-        raise InputError(f"{source}: {name} holds {value!r}; expected a number")
+        raise InputError(f"{source}: {name} holds {_short(value)}; expected a number")
     return float(value)
 
 
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 60 else text[:57] + "...")
+def _short(value: object) -> str:
+    if isinstance(value, str):
+        return repr(value if len(value) <= 60 else value[:57] + "...")
+    said = repr(value)
+    return said if len(said) <= 60 else said[:57] + "..."

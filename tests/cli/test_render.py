@@ -1,0 +1,121 @@
+"""What ``render`` and ``export`` leave and say."""
+
+import json
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from tests.cli.conftest import Run
+from tests.cli.test_commands import driving, frames
+from tests.scene.scenes import make_scene
+
+from dreamdrive.scene.folder import save_scene
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    save_scene(driving(make_scene()), tmp_path / "out" / "scene")
+    return tmp_path / "out"
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+
+
+def test_several_drives_in_one_call(run: Run, out: Path, tmp_path: Path) -> None:
+    wanted = (
+        "render",
+        out,
+        "--trajectory",
+        "stop",
+        "--trajectory",
+        "shift",
+        "--size",
+        "64x40",
+        "--fps",
+        "10",
+    )
+    result = run(*wanted)
+    assert result.code == 0, result
+    assert re.findall(r"(\S+): 3 frames in", result.out) == [
+        f"{out}/video/stop.mp4",
+        f"{out}/video/shift.mp4",
+    ]
+    assert frames(out / "video" / "shift.mp4") == (3, pytest.approx(10))
+    result = run(*wanted, "--format", "png", "--show", "depth", "-o", tmp_path / "all")
+    assert result.code == 0, result
+    each = ["0000.png", "0001.png", "0002.png", "render.json"]
+    assert names(tmp_path / "all") == [f"{d}_depth/{f}" for d in ("shift", "stop") for f in each]
+    picture = cv2.imread(str(tmp_path / "all" / "stop_depth" / "0000.png"), cv2.IMREAD_UNCHANGED)
+    assert picture is not None
+    assert (picture.dtype, picture.shape) == (np.uint16, (40, 64))
+
+
+def test_results_in_the_folder_have_names_of_their_own(run: Run, out: Path) -> None:
+    for options in ((), ("--show", "static"), ("--format", "npz"), ("--format", "png", "--show", "dynamic")):
+        assert run("render", out, "--trajectory", "stop", "--fps", "5", *options).code == 0
+    assert names(out / "video") == [
+        "stop.mp4",
+        "stop_dynamic/0000.png",
+        "stop_dynamic/0001.png",
+        "stop_dynamic/render.json",
+        "stop_npz/0000.npz",
+        "stop_npz/0001.npz",
+        "stop_npz/render.json",
+        "stop_static.mp4",
+    ]
+    assert json.loads((out / "video" / "stop_dynamic" / "render.json").read_text())["show"] == "dynamic"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ("--size", "99999x99999"),
+            "--size 99999x99999: expected sides of 16 to 8192 pixels, the largest that H.264 knows",
+        ),
+        (("--size", "33x24"), "--size 33x24: a video has even sides; choose 32x24, or --format png"),
+        (("--size", "9" * 5000 + "x2"), "expected WIDTHxHEIGHT in pixels, such as 480x270"),
+        (("--fps", "nan"), "--fps nan: expected 0.1 to 240 frames a second"),
+        (("--fps", "0"), "--fps 0: expected 0.1 to 240 frames a second"),
+        (("--shift-m", "nan"), "--shift-m nan: expected metres to the right, such as 2 or -2"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_a_scene_is_looked_for(
+    run: Run, tmp_path: Path, options: tuple[str, ...], message: str
+) -> None:
+    result = run("render", tmp_path / "none", "--trajectory", "shift", *options)
+    assert result.code == 2
+    assert result.err.endswith(message)
+
+
+def test_without_a_trajectory_one_is_asked_for(run: Run, out: Path) -> None:
+    result = run("render", out)
+    assert result.code == 2
+    assert result.err == (
+        "error: render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift"
+    )
+
+
+def test_nothing_is_written_where_the_scene_shows_nothing(run: Run, out: Path) -> None:
+    result = run("render", out, "--trajectory", "stop", "--trajectory", "shift", "--shift-m", "500")
+    assert result.code == 2
+    assert result.err.startswith("error: --shift-m 500 goes 500 m from the recorded path and sees 0% of what")
+    assert not (out / "video").exists()
+
+
+def test_export_says_what_is_left_out(run: Run, out: Path, tmp_path: Path) -> None:
+    said = run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").out
+    assert said == (
+        f"{tmp_path}/all.ply PLY holds the scene at 0.333 s: no sky, no exposure of the recording, no motion."
+    )
+    said = run("export", out, "--to", "ply", "-o", tmp_path / "all").out
+    assert said == (
+        f"{tmp_path}/all PLY holds the scene at its recorded times: no sky, no exposure of the recording, no "
+        "motion in between."
+    )
+    save_scene(driving(make_scene(dynamic=0, full=False)), tmp_path / "bare")
+    said = run("export", tmp_path / "bare", "--to", "ply", "-o", tmp_path / "bare.ply").out
+    assert said == f"{tmp_path}/bare.ply PLY holds the scene at 0.333 s."
