@@ -159,3 +159,21 @@ def test_missing_poses_are_interpolated_and_carried_on() -> None:
     np.testing.assert_allclose(fill(holes, 0.1 * np.arange(6)), path, atol=1e-9)
     with pytest.raises(ValueError, match="interpolate"):
         fill(np.full((3, 4, 4), np.nan), np.arange(3.0))
+
+
+def test_given_poses_that_stand_leave_depth_a_guess() -> None:
+    still = make_clip(straight([0.0] * 7))
+    known = Known(world_from_camera=np.tile(np.eye(4), (8, 1, 1)), intrinsics=True)
+    posed = pose_clip(replace(still, known=known))
+    assert (posed.standing, posed.fallback, posed.fallback_kind) == (True, None, "standing")
+    depth = np.ones(still.valid.shape, np.float32)
+    assert pose_clip(replace(still, known=replace(known, depth_m=depth))).fallback_kind is None
+
+
+def test_the_kind_of_a_fallback_and_of_the_metre_are_told(clip: Clip) -> None:
+    still = pose_clip(make_clip(straight([0.0] * 7)), camera_height_m=1.4)
+    assert (still.fallback_kind, still.scale.basis) == ("standing", "height")
+    black = pose_clip(replace(clip, frames=np.zeros_like(clip.frames)))
+    assert (black.fallback_kind, black.scale.basis) == ("blank", "usual height")
+    assert pose_clip(make_clip(straight([0.5]))).fallback_kind == "few"
+    assert pose_clip(make_clip(straight([]))).fallback_kind is not None

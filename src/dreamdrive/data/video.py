@@ -91,8 +91,8 @@ class Video:
             InputError: The file cannot be opened any more.
         """
         try:
-            with av.open(str(self.path)) as container:
-                stream = container.streams.video[0]
+            with _opened(self.path) as container:
+                stream = _pictures(container, self.path)
                 if stream.frames:
                     return stream.frames
                 duration, base = stream.duration, stream.time_base

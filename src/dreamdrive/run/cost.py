@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
+from dreamdrive.data.clip_reader import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import Source, open_source
@@ -110,8 +111,8 @@ def _of_recording(control: Control, selection: Selection) -> Planned | None:
     if claimed is None:
         return None
     wanted = range(claimed)[selection.start : selection.stop : selection.step]
-    if not wanted:
-        return None  # whoever reads the frames says what is wrong
+    if not 0 < len(wanted) <= MAX_FRAMES:
+        return None  # whoever reads the frames says what is wrong, or that the file claims too much
     size = choose_size(_first_size(source), control.size).target
     chosen = control.frames is not None
     rate_hz = control.fps or (source.rate_hz if isinstance(source, Video) else None)

@@ -75,12 +75,12 @@ def facts_of(
     """
     lead = clip.of_camera(int(clip.camera[0]))
     source, times_s = clip.source_index[lead], clip.times_s[lead]
-    kind = geometry.fallback_kind or "refused"
+    kind = geometry.fallback_kind or (None if geometry.fallback is None else "refused")
     return Facts(
         frames=len(lead),
         placed=len(lead) if geometry.placed is None else geometry.placed,
         interval_s=float(np.median(np.diff(times_s))) if len(lead) > 1 else 0.0,
-        fallback=None if geometry.fallback is None else kind,
+        fallback=kind,
         scenes=_scenes(source, [int(np.searchsorted(lead, cut)) for cut in clip.cuts]),
         step=int(np.median(np.diff(source))) if len(lead) > 1 else 1,
         psnr=_mean_psnr(held_out),

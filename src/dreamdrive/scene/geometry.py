@@ -101,7 +101,7 @@ class Geometry:
         detected: What was noticed about the clip, a sentence each.
         fallback: Why the fallback ran, in words, or None when the full reconstruction did.
         details: Figures for the report, as JSON values.
-        fallback_kind: The kind of that reason.
+        fallback_kind: Why depth is a guess; set without that reason where given poses stand still.
         placed: Frames whose cameras were found, rather than put between their neighbours; None for all.
     """
 

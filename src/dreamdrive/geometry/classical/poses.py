@@ -39,7 +39,7 @@ class Posed:
         detected: What was noticed, a sentence each.
         details: Figures, as JSON values.
         metres_per_unit: What makes metres of known depth; ``None`` where its unit stays unknown.
-        fallback_kind: The kind of that reason.
+        fallback_kind: Why depth is a guess, see ``Geometry``.
         placed: Frames that structure from motion placed; None for all.
     """
 
@@ -193,7 +193,8 @@ def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]
     if standing:
         notes = [*notes, "the camera stands still: depth cannot be seen from motion"]
     posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, details)
-    return replace(posed, standing=standing)
+    guessed = standing and clip.known.depth_m is None
+    return replace(posed, standing=standing, fallback_kind="standing" if guessed else None)
 
 
 def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:
