@@ -58,6 +58,7 @@ class _Hulls(msgspec.Struct):
     boxes: list[_Hull]
     world_from_map: _Pose
 
+
 MARK = "layout.json"
 """By this file a world folder is known."""
 
