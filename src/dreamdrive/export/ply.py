@@ -1,5 +1,6 @@
 """Gaussians as PLY, in the layout that 3DGS viewers read."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +8,12 @@ import torch
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file, new_folder
+from dreamdrive.scene.files import read_bytes
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 
 _COEFFICIENTS = (1, 4, 9, 16)
+_MOST_BYTES = 4_000_000_000
 
 
 def write_ply(gaussians: Gaussians, path: Path) -> None:
@@ -34,10 +37,7 @@ def read_ply(path: Path) -> Gaussians:
     Raises:
         InputError: The file is missing, damaged or holds no Gaussians.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    data = read_bytes(path, at_most=_MOST_BYTES)
     names, count, start = _header(path, data)
     size = 4 * len(names) * count
     if len(data) < start + size:
@@ -45,9 +45,9 @@ def read_ply(path: Path) -> Gaussians:
     table = np.frombuffer(data, dtype="<f4", count=len(names) * count, offset=start).reshape(
         count, len(names)
     )
-    rest = sorted((n for n in names if n.startswith("f_rest_")), key=lambda n: int(n.removeprefix("f_rest_")))
+    rest = [f"f_rest_{i}" for i in range(sum(name.startswith("f_rest_") for name in names))]
     coefficients = 1 + len(rest) // 3
-    if coefficients not in _COEFFICIENTS or len(rest) % 3:
+    if coefficients not in _COEFFICIENTS or len(rest) % 3 or not set(rest) <= set(names):
         raise InputError(f"{path} has {len(rest)} f_rest fields; expected 0, 9, 24 or 45")
 
     def take(*wanted: str) -> torch.Tensor:
@@ -122,7 +122,7 @@ def _header(path: Path, data: bytes) -> tuple[list[str], int, int]:
     is_plain = len(elements) == 1 and len(elements[0]) == 3 and elements[0][1] == "vertex"
     if (
         not is_plain
-        or not elements[0][2].isdigit()
+        or not re.fullmatch("[0-9]{1,12}", elements[0][2])
         or any(f[1:2] != ["float"] or len(f) != 3 for f in fields)
     ):
         raise InputError(f"{path}: expected one element vertex with float properties only")
