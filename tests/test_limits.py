@@ -85,8 +85,8 @@ def rig(path: Path) -> object:
         (
             rig,
             {"cameras": [{"frames": "a" * 300}]},
-            'PLACE/rig.json: camera 0 names no frames; expected {"cameras": [{"frames": folder, "intrinsics": '
-            'file, "car_from_camera": 4x4 in metres}, ...]}',
+            'PLACE/rig.json: camera 0 names no frames; expected {"cameras": [{"frames": folder, '
+            '"intrinsics": file, "car_from_camera": 4x4 in metres}, ...]}',
         ),
     ],
 )
