@@ -60,14 +60,19 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_features_and_paths_count_by_their_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not by their names: another file of the same name makes the prior run again."""
     requests: list[dict[str, dict[str, str]]] = []
-    monkeypatch.setattr(pipeline, "open_workspace", lambda out, request, **_: requests.append(request))
-    monkeypatch.setattr(pipeline, "read_outcome", lambda path, already_finished: already_finished)
+
+    def noted(out: Path, request: dict[str, dict[str, str]], **_: object) -> None:
+        requests.append(request)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "open_workspace", noted)
     files = {name: tmp_path / f"{name}.file" for name in ("features", "trajectory")}
     control = Control(tmp_path, frames="0:2", **files)
     for text in ("one", "other"):
         for path in files.values():
             path.write_text(text)
-        assert generate(control, tmp_path / "out")
+        with pytest.raises(KeyboardInterrupt):
+            generate(control, tmp_path / "out")
     first, second = (request["digests"] for request in requests)
     assert all(first[name] != second[name] for name in files)
     files["features"].unlink()

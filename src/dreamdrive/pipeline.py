@@ -213,7 +213,7 @@ def _make(
     if not stages.records["geometry"].cached:
         picture = inside(stages.folder, FIRST_PICTURE)
         write_png(picture, draw_geometry(clip, geometry))
-        say(f"A first picture: the path, distances and what moves, in {picture}")
+        say(f"A first picture is there, of the path, distances and what moves: {picture}")
     seeds = stages.run(
         "initialise",
         ("prior", "geometry"),

@@ -103,7 +103,7 @@ def _mean_psnr(scores: dict[int, Likeness]) -> float | None:
 
 def rough_because(facts: Facts) -> tuple[str, ...]:
     """Why the result is rough, and what helps, a sentence each; nothing where it is not."""
-    reasons = [_of_fallback(facts), _of_cuts(facts), _of_few(facts), _of_withheld(facts)]
+    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_withheld(facts)]
     return tuple(reason for reason in reasons if reason is not None)
 
 
