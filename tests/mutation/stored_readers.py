@@ -57,13 +57,7 @@ def _mend_scene(folder: Path) -> None:
 
 def _read_clip(folder: Path) -> None:
     codec.read_header(folder)
-    value = codec.read(folder)
-    assert isinstance(value, Clip)
-
-
-def _read_geometry(folder: Path) -> None:
-    value = codec.read(folder)
-    assert isinstance(value, Geometry)
+    codec.read(folder, Clip)
 
 
 def _ply(folder: Path) -> None:
@@ -113,7 +107,7 @@ STORED: tuple[Reader, ...] = (
     Reader(
         "result-geometry",
         lambda folder: codec.write(folder, true_geometry(_street()), {"stage": "geometry"}),
-        _read_geometry,
+        lambda folder: codec.read(folder, Geometry),
         _RESULT,
         _mend_result,
     ),
