@@ -1,6 +1,6 @@
 """Cuts in recordings: how many are found, at the right frame, and how often one is seen where none is.
 
-    python benchmarks/cuts.py [--worlds runs/cut_worlds] [--json FILE]
+    python benchmarks/cuts.py [--every N] [--worlds runs/cut_worlds] [--json FILE]
 
 The recordings are made from the drives and photos in ``DREAMDRIVE_DATA`` (default ``../shared/data``) and
 from drawn worlds, clean and as a video model might have drawn them. A cut counts as found if it is named at
@@ -12,9 +12,9 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 
 import cv2
@@ -61,16 +61,20 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--worlds", type=Path, default=ROOT / "runs" / "cut_worlds")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="take every Nth recording only")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     cv2.setNumThreads(1)
-    rows = measure(cases(args.worlds))
+    rows: dict[str, Row] = {}
+    for case in islice(cases(args.worlds), 0, None, args.every):
+        measure(case, rows)
+        report = {"every": args.every, "groups": summary(rows)}
+        write(args.json, json.dumps(report, indent=1) + "\n")
     for group, row in rows.items():
         print(
             f"{group:45s} recordings {row.recordings:4d}  cuts {row.cuts:4d}  found {row.found:4d}  "
             f"false {row.false_alarms:3d}  {1e3 * row.seconds / row.frames:5.1f} ms a frame"
         )
-    write(args.json, json.dumps({"groups": summary(rows)}, indent=1) + "\n")
     return 0
 
 
@@ -102,24 +106,20 @@ def drawn(folder: Path, options: list[str]) -> dict[str, np.ndarray]:
     return {f"seed {seed}": read(folder / str(seed)) for seed in SEEDS}
 
 
-def measure(cases: Iterable[Case]) -> dict[str, Row]:
-    """What is found in each group."""
-    rows: dict[str, Row] = {}
-    for case in cases:
-        if case.group not in rows:
-            print(case.group, file=sys.stderr, flush=True)
-        row = rows.setdefault(case.group, Row())
-        started = time.perf_counter()
-        named = {cut.first for cut in find_cuts(case.frames, np.ones(case.frames.shape[:3], dtype=bool)).cuts}
-        row.seconds += time.perf_counter() - started
-        row.recordings += 1
-        row.frames += len(case.frames)
-        row.cuts += len(case.cuts)
-        row.found += len(named & set(case.cuts))
-        row.false_alarms += len(named - set(case.cuts))
-        if named != set(case.cuts):
-            row.wrong.append(f"{case.name}: {sorted(named)} for {list(case.cuts)}")
-    return rows
+def measure(case: Case, rows: dict[str, Row]) -> None:
+    """Add what is found in a recording to its group."""
+    row = rows.setdefault(case.group, Row())
+    started = time.perf_counter()
+    found = find_cuts(case.frames, np.ones(case.frames.shape[:3], dtype=bool))
+    row.seconds += time.perf_counter() - started
+    named = {cut.first for cut in found.cuts}
+    row.recordings += 1
+    row.frames += len(case.frames)
+    row.cuts += len(case.cuts)
+    row.found += len(named & set(case.cuts))
+    row.false_alarms += len(named - set(case.cuts))
+    if named != set(case.cuts):
+        row.wrong.append(f"{case.name}: {sorted(named)} for {list(case.cuts)}")
 
 
 def summary(rows: dict[str, Row]) -> dict[str, dict[str, object]]:

@@ -5,7 +5,7 @@ import json
 import math
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import torch
@@ -54,6 +54,9 @@ JSON_NAME, _ARRAYS = "result.json", "result.safetensors"
 _NOUN, _ARRAY, _TENSOR, _TUPLE, _DICT, _ODD = "noun", "array", "tensor", "tuple", "dict", "number"
 
 
+T = TypeVar("T")
+
+
 class DamagedError(ValueError):
     """Stored files are missing, cut short or do not belong together."""
 
@@ -86,8 +89,12 @@ def read_header(folder: Path) -> dict[str, Any] | None:
     return cast("dict[str, Any]", header) if isinstance(header, dict) else None
 
 
-def read(folder: Path) -> object:
+def read(folder: Path, kind: type[T] = object) -> T:
     """What ``write`` stored; every noun of the types and shapes that it has.
+
+    Args:
+        folder: Where it lies.
+        kind: What it has to be.
 
     Raises:
         DamagedError: The files are missing, cut short or changed, do not belong together, or are too large
@@ -100,9 +107,12 @@ def read(folder: Path) -> object:
         blob = read_bytes(folder / _ARRAYS, at_most=2**40 if free is None else free // 2, follow=False)
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
-        return _decode(document["value"], load(blob))
+        value = _decode(document["value"], load(blob))
     except (InputError, ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
         raise DamagedError(f"{folder}: {error}") from error
+    if not isinstance(value, kind):
+        raise DamagedError(f"{folder} holds a {type(value).__name__}; expected a {kind.__name__}")
+    return value
 
 
 def _document(folder: Path) -> dict[str, Any]:

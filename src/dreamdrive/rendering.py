@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
-from dreamdrive.data.size import MIN_SIDE_PX
+from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import panels
 from dreamdrive.drives import RATES_HZ, Drive
@@ -29,8 +29,6 @@ Format = Literal["mp4", "png", "npz"]
 
 NOTE = "render.json"
 """What lies beside pictures and arrays: calibration, poses and times; a folder without it is not replaced."""
-MAX_SIDE_PX = 8192
-"""Longest side of a picture: that of the largest that H.264 knows (level 6.2, 8192x4320)."""
 PER_METRE = 256
 """What a depth of one metre is in a 16-bit PNG, as in KITTI: up to 256 m in steps of 4 mm."""
 _BYTES_PER_PX = 200
@@ -63,11 +61,9 @@ def check_size(look: Look) -> None:
     if look.size is None:
         return
     width, height = look.size
-    if min(look.size) < MIN_SIDE_PX or max(look.size) > MAX_SIDE_PX:
-        raise InputError(
-            f"--size {width}x{height}: expected sides of {MIN_SIDE_PX} to {MAX_SIDE_PX} pixels, the "
-            "largest that H.264 knows"
-        )
+    check_largest(look.size, f"--size {width}x{height}")
+    if min(look.size) < MIN_SIDE_PX:
+        raise InputError(f"--size {width}x{height}: expected sides of at least {MIN_SIDE_PX} pixels")
     if look.format == "mp4" and (width % 2 or height % 2):
         raise InputError(
             f"--size {width}x{height}: a video has even sides; choose "

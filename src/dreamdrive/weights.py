@@ -9,7 +9,6 @@ import warnings
 import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -206,7 +205,7 @@ def sha256(path: Path) -> str:
     """
     try:
         with open_file(path) as file:
-            return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
 

@@ -92,7 +92,7 @@ def test_what_is_no_scene_or_no_world_is_refused(place: Path, tmp_path: Path) ->
     with pytest.raises(InputError, match=r"is no world: layout\.json is missing"):
         decomposition(place / "out", tmp_path)
     (tmp_path / "broken.json").write_text("{")
-    with pytest.raises(InputError, match="is no JSON"):
+    with pytest.raises(InputError, match="is not JSON"):
         decomposition(place / "out", tmp_path / "broken.json")
 
 

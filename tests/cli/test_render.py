@@ -74,7 +74,8 @@ def test_results_in_the_folder_have_names_of_their_own(run: Run, out: Path) -> N
     [
         (
             ("--size", "99999x99999"),
-            "--size 99999x99999: expected sides of 16 to 8192 pixels, the largest that H.264 knows",
+            "--size 99999x99999: too large for H.264 video; expected 8192 pixels a side and 8.9 million in "
+            "all at most, such as 3840x2160",
         ),
         (("--size", "33x24"), "--size 33x24: a video has even sides; choose 32x24, or --format png"),
         (("--size", "9" * 5000 + "x2"), "expected WIDTHxHEIGHT in pixels, such as 480x270"),

@@ -1,5 +1,6 @@
 """What is no text: pictures, videos, arrays, weights."""
 
+import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -41,6 +42,17 @@ class _Small(nn.Module):
         self.bn = nn.BatchNorm1d(3)
 
 
+def _mend_png(name: str, folder: Path) -> None:
+    """Make the checksums of all parts right."""
+    data = bytearray((folder / name).read_bytes())
+    place = 8
+    while place + 12 <= len(data):
+        end = place + 8 + int.from_bytes(data[place : place + 4], "big")
+        data[end : end + 4] = zlib.crc32(data[place + 4 : end]).to_bytes(4, "big")
+        place = end + 4
+    (folder / name).write_bytes(data)
+
+
 def _picture(name: str, image: np.ndarray, *flags: int) -> Reader:
     def read(folder: Path) -> None:
         raw = read_image(folder / name)
@@ -49,7 +61,8 @@ def _picture(name: str, image: np.ndarray, *flags: int) -> Reader:
         assert raw.rgb.size <= 3 * MAX_PIXELS
         assert raw.opaque is None or raw.opaque.shape == raw.rgb.shape[:2]
 
-    return Reader(f"picture-{name}", lambda f: cv2.imwrite(str(f / name), image, flags), read)
+    mend = partial(_mend_png, name) if name.endswith(".png") else None
+    return Reader(f"picture-{name}", lambda f: cv2.imwrite(str(f / name), image, flags), read, mend=mend)
 
 
 def _folder(folder: Path) -> None:

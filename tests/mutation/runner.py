@@ -22,7 +22,9 @@ from tests.mutation.reader import Reader
 from tests.mutation.readers import READERS
 
 SECONDS, MEGABYTES = 5.0, 500.0
-"""Most that reading a spoilt sample may take."""
+"""Most computing and memory that reading a spoilt sample may take."""
+WAIT_S = 15.0
+"""Longest that it may take by the clock: the machine may have other work."""
 _ADDRESSES = 2_000_000_000
 """A last resort: bytes of addresses beyond what the process has, torch and all."""
 _LONGEST_MESSAGE = 1000
@@ -44,7 +46,7 @@ class Outcome:
     Attributes:
         case: Which.
         verdict: ``accepted``, ``refused`` or ``wrong``.
-        seconds: How long reading took.
+        seconds: How long the processor was at it.
         megabytes: By how much the memory in use grew at most.
         how: What was spoilt.
         said: The message, or what is wrong.
@@ -163,10 +165,10 @@ def _sample(reader: Reader, folder: Path) -> dict[str, bytes]:
 
 def _read(case: Case, reader: Reader, folder: Path, name: str, how: str, errors: int | None) -> Outcome:
     verdict, said = "accepted", ""
-    begin_mb, begin_s = _resting_mb(), time.perf_counter()
+    begin_mb, begin_s = _resting_mb(), time.process_time()
     if errors is not None:
-        faulthandler.dump_traceback_later(SECONDS, file=errors)
-        signal.setitimer(signal.ITIMER_REAL, SECONDS + 0.5)  # nothing handles it: the process ends
+        faulthandler.dump_traceback_later(WAIT_S, file=errors)
+        signal.setitimer(signal.ITIMER_REAL, WAIT_S + 0.5)  # nothing handles it: the process ends
     try:
         reader.read(folder)
     except reader.refusals as error:
@@ -180,7 +182,9 @@ def _read(case: Case, reader: Reader, folder: Path, name: str, how: str, errors:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         faulthandler.cancel_dump_traceback_later()
-    seconds, megabytes = time.perf_counter() - begin_s, max(_peak_mb() - begin_mb, 0.0)
+    seconds, megabytes = time.process_time() - begin_s, max(_peak_mb() - begin_mb, 0.0)
+    if seconds > SECONDS:
+        verdict, said = "wrong", f"{seconds:.1f} s of computing; then {verdict} {said[-1500:]}"
     if megabytes > MEGABYTES:
         verdict, said = "wrong", f"{megabytes:.0f} MB of memory; then {verdict} {said[-1500:]}"
     return Outcome(case, verdict, seconds, megabytes, how, said)

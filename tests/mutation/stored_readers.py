@@ -12,13 +12,14 @@ from dreamdrive import codec
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.data.world.files import read_world, write_world
 from dreamdrive.errors import InputError
+from dreamdrive.export.ply import read_ply, write_ply
 from dreamdrive.scene import folder as scene_folder
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
 from tests.mutation.reader import Reader
-from tests.scene.scenes import make_baseline, make_scene
+from tests.scene.scenes import gaussians, make_baseline, make_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 
@@ -56,13 +57,11 @@ def _mend_scene(folder: Path) -> None:
 
 def _read_clip(folder: Path) -> None:
     codec.read_header(folder)
-    value = codec.read(folder)
-    assert isinstance(value, Clip)
+    codec.read(folder, Clip)
 
 
-def _read_geometry(folder: Path) -> None:
-    value = codec.read(folder)
-    assert isinstance(value, Geometry)
+def _ply(folder: Path) -> None:
+    write_ply(gaussians(5, 0), folder / "a.ply")
 
 
 def _features(folder: Path) -> None:
@@ -108,7 +107,7 @@ STORED: tuple[Reader, ...] = (
     Reader(
         "result-geometry",
         lambda folder: codec.write(folder, true_geometry(_street()), {"stage": "geometry"}),
-        _read_geometry,
+        lambda folder: codec.read(folder, Geometry),
         _RESULT,
         _mend_result,
     ),
@@ -117,5 +116,6 @@ STORED: tuple[Reader, ...] = (
         lambda folder: write_world({"front": _street()}, folder / "world"),
         lambda folder: read_world(folder / "world"),
     ),
+    Reader("ply", _ply, lambda folder: read_ply(folder / "a.ply")),
     Reader("features", _features, _read_features),
 )

@@ -1,7 +1,7 @@
 """Finding what the geometry stage of ``generate`` left."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeVar
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from dreamdrive.evaluate.estimate import Estimate
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
+
+T = TypeVar("T")
 
 
 def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
@@ -26,13 +28,15 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
             together.
     """
     from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.scene.clip import Clip
+    from dreamdrive.scene.geometry import Geometry
 
     if out.name == "scene" and (out / "scene.json").is_file():
         out = out.parent
-    stages = out / "stages"
-    geometry = cast("Geometry | None", _stage(inside(out, "stages/geometry")))
-    if geometry is not None and not (out / "scene").is_dir() and (stages / "prior").is_dir():
-        clip = cast("Clip", _stage(inside(out, "stages/prior")))
+    geometry = _stage(inside(out, "stages/geometry"), Geometry)
+    clip = None if (out / "scene").is_dir() else _stage(inside(out, "stages/prior"), Clip)
+    if geometry is not None and clip is not None:
+        _check_agreement(out, clip, geometry)
         source = clip.provenance.get("input")
         lens = clip.provenance.get("lens") is not None
         name = None if source is None else Path(str(source)).resolve().name
@@ -72,13 +76,23 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
     return Estimate.of(geometry, scene.times_s, scene.held_out, index, source=source, undistorted=lens), ()
 
 
-def _stage(folder: Path) -> object:
+def _check_agreement(out: Path, clip: "Clip", geometry: "Geometry") -> None:
+    from dreamdrive.run.agreement import check_clip, check_geometry
+
+    try:
+        check_clip(clip)
+        check_geometry(clip, geometry)
+    except ValueError as error:
+        raise InputError(f"{out}: its stages do not belong together ({error}); run generate again") from error
+
+
+def _stage(folder: Path, kind: type[T]) -> T | None:
     """What a stage left; None where there is nothing."""
     from dreamdrive import codec
 
     if not (folder / codec.JSON_NAME).is_file():
         return None
     try:
-        return codec.read(folder)
+        return codec.read(folder, kind)
     except codec.DamagedError as error:
         raise InputError(f"{folder} is damaged ({error}); run generate again to compute it anew") from error

@@ -25,7 +25,7 @@ def read_layout(path: Path) -> Layout:
     try:
         layout = of_type(read_json(path), Layout, str(path))
     except InputError as error:
-        raise InputError(f"{error}; docs/layout.md says what a layout holds") from error
+        raise InputError(f"{error}; expected a layout as JSON, see docs/layout.md") from error
     for problem in problems(layout):
         raise InputError(f"{path}: {problem}")
     return layout

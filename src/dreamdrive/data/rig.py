@@ -17,6 +17,7 @@ from dreamdrive.scene.files import is_path
 from dreamdrive.scene.json_file import read_json
 
 RIG = "rig.json"
+MOST_CAMERAS = 32
 _EXPECTED = (
     'expected {"cameras": [{"frames": folder, "intrinsics": file, "car_from_camera": 4x4 in metres}, ...]}'
 )
@@ -52,6 +53,10 @@ def read_rig(path: Path) -> tuple[Mounted, ...]:
     listed = values.get("cameras")
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{path / RIG} lists no cameras; {_EXPECTED}")
+    if len(listed) > MOST_CAMERAS:
+        raise InputError(
+            f"{path / RIG} lists {len(listed)} cameras; expected at most {MOST_CAMERAS} on one car"
+        )
     return tuple(_mounted(path, index, entry) for index, entry in enumerate(listed))
 
 

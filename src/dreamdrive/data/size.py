@@ -131,6 +131,7 @@ def _default(source: tuple[int, int]) -> tuple[int, int]:
         raise InputError(
             f"the frames are {source[0]}x{source[1]} pixels, too flat for a width of {width}: give --size"
         )
+    check_largest((width, height), f"the frames are {source[0]}x{source[1]} pixels")
     return width, height
 
 

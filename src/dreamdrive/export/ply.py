@@ -13,7 +13,7 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 
 _COEFFICIENTS = (1, 4, 9, 16)
-_BYTES = 4_000_000_000
+_MOST_BYTES = 4_000_000_000
 """Largest PLY that is read: 17 million Gaussians of degree 3."""
 
 
@@ -38,7 +38,7 @@ def read_ply(path: Path) -> Gaussians:
     Raises:
         InputError: The file is missing, damaged or holds no Gaussians.
     """
-    data = read_bytes(path, at_most=_BYTES)
+    data = read_bytes(path, at_most=_MOST_BYTES)
     names, count, start = _header(path, data)
     size = 4 * len(names) * count
     if len(data) < start + size:
@@ -46,12 +46,9 @@ def read_ply(path: Path) -> Gaussians:
     table = np.frombuffer(data, dtype="<f4", count=len(names) * count, offset=start).reshape(
         count, len(names)
     )
-    rest = sorted(
-        (n for n in names if re.fullmatch(r"f_rest_[0-9]{1,4}", n)),
-        key=lambda n: int(n.removeprefix("f_rest_")),
-    )
+    rest = [f"f_rest_{i}" for i in range(sum(name.startswith("f_rest_") for name in names))]
     coefficients = 1 + len(rest) // 3
-    if coefficients not in _COEFFICIENTS or len(rest) % 3:
+    if coefficients not in _COEFFICIENTS or len(rest) % 3 or not set(rest) <= set(names):
         raise InputError(f"{path} has {len(rest)} f_rest fields; expected 0, 9, 24 or 45")
 
     def take(*wanted: str) -> torch.Tensor:
@@ -139,7 +136,7 @@ def _header(path: Path, data: bytes) -> tuple[list[str], int, int]:
     is_plain = len(elements) == 1 and len(elements[0]) == 3 and elements[0][1] == "vertex"
     if (
         not is_plain
-        or not re.fullmatch(r"[0-9]{1,12}", elements[0][2])
+        or not re.fullmatch("[0-9]{1,12}", elements[0][2])
         or any(f[1:2] != ["float"] or len(f) != 3 for f in fields)
     ):
         raise InputError(f"{path}: expected one element vertex with float properties only")

@@ -17,6 +17,7 @@ from torch import Tensor
 from dreamdrive.errors import InputError
 from dreamdrive.memory import free_bytes
 from dreamdrive.scene.atomic import new_folder
+from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.checked import build, check_finite
 from dreamdrive.scene.deformation import DeformationField
 from dreamdrive.scene.exposure import Exposure
@@ -25,7 +26,7 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.json_file import of_type, parse_json
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.stored_index import FARTHEST_M, MAX_PIXELS, About, StoredIndex, increasing
+from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
 from dreamdrive.scene.stored_motion import described, rebuilt
 
 FORMAT = "dreamdrive scene"

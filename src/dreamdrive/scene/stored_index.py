@@ -8,36 +8,30 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from dreamdrive.scene.actor import Actor
-from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.camera import FARTHEST_M, Camera
 
-MAX_SIDE_PX = 16384
-"""Largest width and height of a recorded view: 16K video."""
-FARTHEST_M = 1e7
-"""Farthest place in a scene along each axis: float32 still tells metres there."""
 MAX_PIXELS = 64_000_000
 """Most pixels of a view."""
 
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
-_Pixels = Annotated[float, Meta(ge=-1e6, le=1e6)]
-_Side = Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
 _Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-_Row = tuple[_Metres, _Metres, _Metres, _Metres]
+_Row = tuple[float, float, float, float]
 _Point = tuple[_Metres, _Metres, _Metres]
 
 
 class StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A view, as ``Camera``."""
 
-    fx_px: _Pixels
-    fy_px: _Pixels
-    cx_px: _Pixels
-    cy_px: _Pixels
-    width_px: _Side
-    height_px: _Side
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    width_px: int
+    height_px: int
     world_from_camera: tuple[_Row, _Row, _Row, _Row]
 
     def camera(self) -> Camera:
-        """The noun; ``ValueError`` where the pose is not rigid or a focal length not positive."""
+        """The noun; ``ValueError`` where its pose, size or focal length is none of a camera."""
         pose = np.array(self.world_from_camera, dtype=np.float64)
         return Camera(self.fx_px, self.fy_px, self.cx_px, self.cy_px, self.width_px, self.height_px, pose)
 

@@ -19,6 +19,7 @@ from dreamdrive.geometry.dust3r.network.config import (
     config_from_shapes,
 )
 from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
+from dreamdrive.scene.files import read_text
 from dreamdrive.weights import as_state, fill_network, read_state, read_torch
 
 EXPECTED = (
@@ -102,8 +103,5 @@ def _read_hub(path: Path) -> tuple[dict[str, Tensor], NetworkConfig]:
     for needed in (path, beside):
         if not needed.is_file():
             raise InputError(f"{needed} does not exist or is no file; expected {EXPECTED}")
-    try:
-        config = config_from_json(beside.read_text(encoding="utf-8"), str(beside))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{beside} is damaged ({error}); expected {EXPECTED}") from None
+    config = config_from_json(read_text(beside), str(beside))
     return read_state(path, EXPECTED), config

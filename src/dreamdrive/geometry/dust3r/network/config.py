@@ -148,6 +148,7 @@ def config_from_json(text: str, source: str) -> NetworkConfig:
         InputError: It is no JSON object, or states something that this network does not do.
     """
     try:
+        # The one JSON that states infinities; what it says of anything else is checked value by value.
         values = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{source} is not JSON ({error})") from None
