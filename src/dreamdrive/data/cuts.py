@@ -8,10 +8,13 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.data.likeness import Likeness
 
-SHARED, SHARED_MATCHES = 0.1, 10
-"""From here on two frames certainly show one place."""
-CLOSE, CLOSE_MATCHES = 0.15, 20
+SHARED, SHARED_MATCHES = 0.1, 8
+"""From here on two frames show one place, or may do."""
+CLOSE, CLOSE_MATCHES = 0.15, 15
 """How much neighbours of a cut must share: where they share little anyway, nothing follows from less."""
+RICH_MATCHES, RICH_SHARE, RICH_LIMIT = 30, 0.5, 0.25
+"""Neighbours with so many matches share more than two motorways do, whose road and sky flow alike: between
+these ``SHARED`` is this part of what they share, up to the limit."""
 LONGEST_FADE = 3
 """Mixed frames between two scenes."""
 MIXED = 0.25
@@ -106,14 +109,27 @@ class _Search:
     def _is_cut(self, start: int, end: int) -> bool:
         return (
             (end == start + 1 or self._mixed(start, end))
-            and self.looks.share(self.shown[start], self.shown[end]) < SHARED
+            and self.looks.share(self.shown[start], self.shown[end]) < self._least(start, end)
             and self._sides_agree(start, end)
             and not self._comes_back(start, end)
         )
 
-    def _shared(self, first: int, second: int) -> bool:
+    def _least(self, start: int, end: int) -> float:
+        """The share from which on frames around a cut show one place: more where neighbours share much."""
+        if self.looks.share(self.shown[start], self.shown[end]) >= RICH_LIMIT:
+            return SHARED
+        span, last = end - start, len(self.shown) - 1
+        sides = [(start - span, start)] if start >= span else []
+        sides += [(end, end + span)] if end + span <= last else []
+        pairs = [(self.shown[a], self.shown[b]) for a, b in sides]
+        if not pairs or min(self.looks.matches(*pair) for pair in pairs) < RICH_MATCHES:
+            return SHARED
+        shares = min(self.looks.share(*pair) for pair in pairs)
+        return float(np.clip(RICH_SHARE * shares, SHARED, RICH_LIMIT))
+
+    def _shared(self, first: int, second: int, least: float = SHARED) -> bool:
         a, b = self.shown[first], self.shown[second]
-        return self.looks.share(a, b) >= SHARED or self.looks.matches(a, b) >= SHARED_MATCHES
+        return self.looks.share(a, b) >= least or self.looks.matches(a, b) >= SHARED_MATCHES
 
     def _close(self, first: int, second: int) -> bool:
         a, b = self.shown[first], self.shown[second]
@@ -134,8 +150,9 @@ class _Search:
 
     def _comes_back(self, start: int, end: int) -> bool:
         """Whether the scene before is seen again after."""
+        least = self._least(start, end)
         return any(
-            self._shared(a, b)
+            self._shared(a, b, least)
             for a in range(max(0, start - _BEFORE + 1), start + 1)
             for b in range(end, min(len(self.shown), end + _AFTER))
         )
