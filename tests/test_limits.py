@@ -69,13 +69,13 @@ def rig(path: Path) -> object:
             read_layout,
             {"ego": {"track": TRACK}},
             "FILE: Expected `float` <= 100000.0 - at `$.ego.track[0].x_m`; "
-            "docs/layout.md says what a layout holds",
+            "expected a layout as JSON, see docs/layout.md",
         ),
         (
             read_layout,
             {"ego": {"track": [{**TRACK[0], "x_m": 0}] * 10_001}},
             "FILE: Expected `array` of length <= 10000 - at `$.ego.track`; "
-            "docs/layout.md says what a layout holds",
+            "expected a layout as JSON, see docs/layout.md",
         ),
         (
             rig,

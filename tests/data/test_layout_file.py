@@ -98,7 +98,7 @@ def test_the_wrong_field_is_named(
 def test_what_is_no_layout_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "street.json"
     path.write_text("{")
-    with pytest.raises(InputError, match=r"is not JSON: Input data was truncated; docs/layout\.md says"):
+    with pytest.raises(InputError, match=r"is not JSON: Input data was truncated; expected a layout as JSON"):
         read_layout(path)
     with pytest.raises(InputError, match="cannot be read: No such file"):
         read_layout(tmp_path / "none.json")
