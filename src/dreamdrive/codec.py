@@ -57,7 +57,7 @@ _NOUN, _ARRAY, _TENSOR, _TUPLE, _DICT, _ODD = "noun", "array", "tensor", "tuple"
 T = TypeVar("T")
 
 
-class DamagedError(ValueError):
+class DamagedError(InputError):
     """Stored files are missing, cut short or do not belong together."""
 
 
@@ -108,7 +108,7 @@ def read(folder: Path, kind: type[T] = object) -> T:
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
         value = _decode(document["value"], load(blob))
-    except (InputError, ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
         raise DamagedError(f"{folder}: {error}") from error
     if not isinstance(value, kind):
         raise DamagedError(f"{folder} holds a {type(value).__name__}; expected a {kind.__name__}")

@@ -233,8 +233,14 @@ def words_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
     return "\n".join(lines).encode("utf-8", "surrogateescape"), f"{kind} in line {row + 1}"
 
 
+_LONG_JSON = 2_000_000
+"""Bytes of JSON, grown by changes before, from which on Python's values of it would fill memory."""
+
+
 def json_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
-    """Change one value, key or list of a JSON text; text that is none has its bytes changed."""
+    """Change one value, key or list of a JSON text; text that is none, or long, has its bytes changed."""
+    if len(data) > _LONG_JSON:
+        return bytes_changed(data, rng)
     try:
         values = json.loads(data)
         changed, how = value_changed(values, rng)

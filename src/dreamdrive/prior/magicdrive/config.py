@@ -7,6 +7,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.boxes import CLASSES
 from dreamdrive.prior.magicdrive.cameras import NUSCENES, crop
 from dreamdrive.prior.magicdrive.raster import CHANNELS
+from dreamdrive.scene.checked import build
 
 EXPECTED = (
     "a folder with unet/ and controlnet/ of MagicDrive (of MagicDrive-t for --prior magicdrive-t) and "
@@ -122,17 +123,18 @@ def _settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
     _refuse_others("controlnet/config.json, cam_embedder_param", controlnet["cam_embedder_param"], _CAMERA)
     height, width = (int(side) for side in unet["img_size"])
     pooled, shape, widths = _map_encoder(controlnet)
-    return Settings(
-        size=(width, height),
-        map_shape=shape,
-        map_widths=widths,
-        map_pooled=pooled,
-        box_classes=boxes["n_classes"],
-        box_class_width=boxes["class_token_dim"],
-        box_widths=tuple(boxes["proj_dims"]),
-        views=_ring(unet["neighboring_view_pair"]),
-        temporal=_temporal(unet),
-    )
+    values = {
+        "size": (width, height),
+        "map_shape": shape,
+        "map_widths": widths,
+        "map_pooled": pooled,
+        "box_classes": boxes["n_classes"],
+        "box_class_width": boxes["class_token_dim"],
+        "box_widths": tuple(boxes["proj_dims"]),
+        "views": _ring(unet["neighboring_view_pair"]),
+        "temporal": _temporal(unet),
+    }
+    return build(Settings, values)
 
 
 def _map_encoder(
