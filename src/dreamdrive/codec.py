@@ -10,7 +10,6 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import torch
 from jaxtyping import Shaped
-from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from dreamdrive.decompose import Grouping
@@ -27,6 +26,7 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
 from dreamdrive.scene.json_file import parse_json
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.tensor_file import DAMAGE
 from dreamdrive.scene.trajectory import Trajectory
 
 NOUNS: dict[str, type] = {
@@ -108,7 +108,7 @@ def read(folder: Path, kind: type[T] = object) -> T:
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
         value = _decode(document["value"], load(blob))
-    except (ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
+    except DAMAGE as error:
         raise DamagedError(f"{folder}: {error}") from error
     if not isinstance(value, kind):
         raise DamagedError(f"{folder} holds a {type(value).__name__}; expected a {kind.__name__}")

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.files import open_file
-from dreamdrive.scene.tensor_file import HEADER_BYTES, briefly, header_problem
+from dreamdrive.scene.tensor_file import DAMAGE, HEADER_BYTES, briefly, header_problem
 from dreamdrive.scene.zip_file import directory_bytes
 
 Network = TypeVar("Network", bound=nn.Module)
@@ -116,7 +116,7 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
         if problem := header_problem(path):
             raise SafetensorError(problem)
         return load_file(path)
-    except (OSError, SafetensorError, ValueError, RuntimeError, KeyError) as error:
+    except DAMAGE as error:
         raise InputError(f"{path} is missing or damaged ({briefly(error)}); expected {expected}") from None
 
 

@@ -21,7 +21,7 @@ from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.json_file import parse_json
-from dreamdrive.scene.tensor_file import briefly, header_problem
+from dreamdrive.scene.tensor_file import DAMAGE, briefly, header_problem
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""
@@ -132,7 +132,7 @@ def read_features(path: Path) -> FeatureFile:
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except InputError:
         raise
-    except (OSError, SafetensorError, TypeError, ValueError, AttributeError, KeyError) as error:
+    except DAMAGE as error:
         raise InputError(f"{where} cannot be read ({briefly(error)}); expected {_EXPECTED}") from None
     if not arrays:
         raise InputError(f"{where} holds no array; expected {_EXPECTED}")

@@ -9,7 +9,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import safetensors
 import safetensors.torch
 import torch
 from torch import Tensor
@@ -28,6 +27,7 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
 from dreamdrive.scene.stored_motion import described, rebuilt
+from dreamdrive.scene.tensor_file import DAMAGE, briefly
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -181,8 +181,8 @@ def _read_part(path: Path, name: str, digest: str) -> dict[str, Tensor]:
         tensors = safetensors.torch.load(data)
         for key, tensor in tensors.items():
             check_finite(key, tensor)
-    except (safetensors.SafetensorError, ValueError, KeyError) as error:
-        raise InputError(f"{path / name} holds no tensors of a scene ({error})") from error
+    except DAMAGE as error:
+        raise InputError(f"{path / name} holds no tensors of a scene ({briefly(error)})") from error
     return tensors
 
 

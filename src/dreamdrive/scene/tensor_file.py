@@ -3,11 +3,24 @@
 import os
 from pathlib import Path
 
+from safetensors import SafetensorError
+
 from dreamdrive.errors import InputError
 from dreamdrive.scene.files import open_file
 
 HEADER_BYTES = 16_000_000
 """Most that the table of tensors in a file may hold; that of Vista takes half a megabyte."""
+DAMAGE = (
+    SafetensorError,
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    OverflowError,
+)
+"""What the library raises on files that are damaged, or state shapes that cannot be."""
 _LONGEST = 200
 
 

@@ -15,7 +15,7 @@ from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.scene.json_file import read_json
-from dreamdrive.scene.tensor_file import briefly, header_problem
+from dreamdrive.scene.tensor_file import DAMAGE, briefly, header_problem
 from dreamdrive.weights import check_sizes, in_words, misfits, some
 
 EXPECTED = (
@@ -142,7 +142,7 @@ def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
             raise SafetensorError(problem)
         file = safe_open(path, "pt")
         shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
+    except DAMAGE as error:
         raise InputError(
             f"{path} is no .safetensors or is cut short ({briefly(error)}); copy it again, expected "
             f"{EXPECTED}"
