@@ -10,7 +10,7 @@ from dreamdrive.data.likeness import Likeness
 
 SHARED, SHARED_MATCHES = 0.1, 8
 """From here on two frames show one place, or may do."""
-CLOSE, CLOSE_MATCHES = 0.15, 15
+CLOSE, CLOSE_MATCHES = 0.15, 20
 """How much neighbours of a cut must share: where they share little anyway, nothing follows from less."""
 RICH_MATCHES, RICH_SHARE, RICH_LIMIT = 30, 0.5, 0.25
 """Neighbours with so many matches share more than two motorways do, whose road and sky flow alike: between
