@@ -165,3 +165,9 @@ def test_facts_are_those_of_the_result() -> None:
         spread=0.2,
     )
     assert facts_of(clip, geometry, "draft", {}, {}).fallback is None
+
+
+def test_figures_that_look_alike_are_told_apart() -> None:
+    said = rough_because(replace(GOOD, psnr=31.98, blended_psnr=32.04))
+    assert "(31.98 against 32.04 dB)" in said[0]
+    assert "(31.9 against 32.0 dB)" in rough_because(replace(GOOD, psnr=31.9, blended_psnr=32.0))[0]

@@ -163,8 +163,14 @@ def _of_withheld(facts: Facts) -> str | None:
         return None
     return (
         "withheld frames are predicted worse than by blending the frames beside them "
-        f"({facts.psnr:.1f} against {facts.blended_psnr:.1f} dB): {_BETTER[facts.quality]}"
+        f"({_apart(facts.psnr, facts.blended_psnr)} dB): {_BETTER[facts.quality]}"
     )
+
+
+def _apart(first: float, second: float) -> str:
+    """Two figures, with as many digits as it takes to tell them apart, two at most."""
+    digits = 2 if f"{first:.1f}" == f"{second:.1f}" else 1
+    return f"{first:.{digits}f} against {second:.{digits}f}"
 
 
 def limits_of(facts: Facts) -> tuple[str, str]:
