@@ -15,7 +15,6 @@ from safetensors.numpy import load, save
 from dreamdrive.decompose import Grouping
 from dreamdrive.errors import InputError
 from dreamdrive.fit import StaticFit
-from dreamdrive.memory import free_bytes
 from dreamdrive.scene.atomic import new_file
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.checked import build, check_finite
@@ -26,7 +25,7 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
 from dreamdrive.scene.json_file import parse_json
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.tensor_file import DAMAGE
+from dreamdrive.scene.tensor_file import DAMAGE, read_own
 from dreamdrive.scene.trajectory import Trajectory
 
 NOUNS: dict[str, type] = {
@@ -102,9 +101,7 @@ def read(folder: Path, kind: type[T] = object) -> T:
     """
     try:
         document = _document(folder)
-        free = free_bytes()
-        # Twice: as the file's bytes and as arrays.
-        blob = read_bytes(folder / _ARRAYS, at_most=2**40 if free is None else free // 2, follow=False)
+        blob = read_own(folder / _ARRAYS)
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
         value = _decode(document["value"], load(blob))

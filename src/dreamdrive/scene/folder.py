@@ -14,7 +14,6 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.memory import free_bytes
 from dreamdrive.scene.atomic import new_folder
 from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.checked import build, check_finite
@@ -27,7 +26,7 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
 from dreamdrive.scene.stored_motion import described, rebuilt
-from dreamdrive.scene.tensor_file import DAMAGE, briefly
+from dreamdrive.scene.tensor_file import DAMAGE, briefly, read_own
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -166,11 +165,8 @@ def _read_index(path: Path) -> dict[str, Any]:
 
 
 def _read_part(path: Path, name: str, digest: str) -> dict[str, Tensor]:
-    free = free_bytes()
     try:
-        # Twice: as the file's bytes and as tensors.
-        limit = 2**40 if free is None else free // 2
-        data = read_bytes(inside(path, name), name, at_most=limit, follow=False)
+        data = read_own(inside(path, name), name)
     except InputError as error:
         raise InputError(f"{path} is incomplete: {error}") from error
     if hashlib.sha256(data).hexdigest() != digest:

@@ -6,7 +6,8 @@ from pathlib import Path
 from safetensors import SafetensorError
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import open_file
+from dreamdrive.memory import free_bytes
+from dreamdrive.scene.files import open_file, read_bytes
 
 HEADER_BYTES = 16_000_000
 """Most that the table of tensors in a file may hold; that of Vista takes half a megabyte."""
@@ -35,6 +36,16 @@ def header_problem(path: Path) -> str | None:
     if 2 <= header <= min(size - 8, HEADER_BYTES):
         return None
     return f"it states a header of {header} bytes and has {size}"
+
+
+def read_own(path: Path, where: str = "") -> bytes:
+    """A file of tensors that dreamdrive wrote, no link, if memory holds it twice: as bytes and as tensors.
+
+    Raises:
+        InputError: It is missing, not a regular file, or too large.
+    """
+    free = free_bytes()
+    return read_bytes(path, where, at_most=2**40 if free is None else free // 2, follow=False)
 
 
 def briefly(error: object) -> str:
