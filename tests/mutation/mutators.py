@@ -326,7 +326,8 @@ def zip_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
                     )
                     inner, how = change(inner, rng)
                 new.writestr(name, inner)
-    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, struct.error, zlib.error, EOFError):
+    except (zipfile.BadZipFile, ValueError, OSError, RuntimeError, struct.error, zlib.error, EOFError):
+        # An earlier change broke the archive, or marked a member as encrypted (a RuntimeError).
         return bytes_changed(data, rng)
     return made.getvalue(), f"member {spoilt}: {how}"
 
