@@ -15,13 +15,13 @@ from jaxtyping import Float
 from dreamdrive.evaluate.depth_errors import depth_errors, median_scale
 from dreamdrive.evaluate.geometry import BANDS_M, STANDING_M
 from dreamdrive.evaluate.paths import compare_paths
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, align
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.pairs import make_pairs
-from dreamdrive.geometry.dust3r.reference.adam import descend
-from dreamdrive.geometry.dust3r.reference.objective import Objective, raw_parameters
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.reference.adam import descend
+from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 RATE_HZ = 5.0

@@ -13,13 +13,13 @@ from _geometry_worlds import world_of
 
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.data.intrinsics import guess_camera
-from dreamdrive.data.world import Drive
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.geometry import evaluate_geometry
 from dreamdrive.evaluate.geometry_truth import GeometryTruth, of_drive, read_geometry_truth
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.backends.files import attach
 from dreamdrive.scene.clip import Clip
+from dreamdrive.world import Drive
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DREAMDRIVE_DATA", ROOT / "../shared/data")).resolve() / "clips"

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import torch
 from _machine import processor
 
-from dreamdrive.scene.atomic import new_file
-from dreamdrive.stages import digest
+from dreamdrive.files.atomic import new_file
+from dreamdrive.run.stages import digest
 
 Row = dict[str, Any]
 

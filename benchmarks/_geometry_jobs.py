@@ -15,7 +15,7 @@ from _geometry_cases import Measurement, Row, fields_of
 from _geometry_worlds import SEEDS
 from _simulated_pairs import Noise
 
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions
 
 HARD = Noise(mistaken=True)
 APART = Noise(mistaken=False, unseen=3)
@@ -23,7 +23,10 @@ COMMON = Noise(mistaken=False, common_focal=0.05, place=0.01)
 COMMON_BESIDE = ("bend a", "corner a")  # the authors' program keeps such a focal length: two worlds show it
 PATHS, LONG = ("bend a", "corner a"), 48  # worlds and frames of the choice of graph
 APART_GRAPHS = (GRAPH, "swin-5-noncyclic", "logwin-5-noncyclic")
-CITED = (GRAPH, "logwin-5-noncyclic")  # in dreamdrive.geometry.dust3r.pairs.video_graph, of the first path
+CITED = (
+    GRAPH,
+    "logwin-5-noncyclic",
+)  # in dreamdrive.geometry.backends.dust3r.pairs.video_graph, of the first path
 DRAWS = 3  # of the noise, of those
 SPEED_SIZES = ((96, 64), (128, 80), (192, 112), (512, 288))
 WHOLE_PX = 192 * 112  # sizes beyond: a few steps of Adam tell the seconds of all

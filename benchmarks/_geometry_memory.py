@@ -18,10 +18,10 @@ from _simulated_pairs import Truth, pair_maps, truth_of
 from jaxtyping import Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, align
-from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
+from dreamdrive.geometry.backends.dust3r.align.memory import predicted_bytes
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
 
 _COARSER = 4  # the drive is drawn so many times smaller: what alignment costs does not depend on detail
 

@@ -7,8 +7,8 @@ import shapely
 from jaxtyping import Float
 from msgspec.structs import replace
 
-from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.scene.layout import Ego, Layout, TrackPoint, track_function
+from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 
 # Of three seeds one street is straight, one bends and one crosses another.
 SEEDS = {

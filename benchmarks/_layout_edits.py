@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 import shapely
 
-from dreamdrive.data.world import Drive
 from dreamdrive.scene.layout import Area, Box, Layout, Line, TrackPoint, is_moving, track_function
+from dreamdrive.world import Drive
 
 VEHICLES = ("car", "van", "truck")
 WAYS = {"left": np.pi / 2, "right": -np.pi / 2, "ahead": 0.0, "back": np.pi}

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.data.world import Drive
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.world import Drive
 
 _FINEST_PX = 16.0  # noise is drawn on a grid on which its correlation length is at least so many pixels
 _FARTHEST, _NEAREST = 5.0, 0.3  # of the true distance: where a mover is mistaken to be

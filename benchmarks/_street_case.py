@@ -10,18 +10,18 @@ from typing import Literal
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.data.corruption import corrupt, parse_corruption
 from dreamdrive.data.intrinsics import guess_camera
 from dreamdrive.data.select import held_out_mask
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.fit import StaticFit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.options import Quality
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.run.stages import Stages, digest, stage_seed
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.stages import Stages, digest, stage_seed
+from dreamdrive.world import Drive, make_street
+from dreamdrive.world.corruption import corrupt, parse_corruption
 
 FRAMES, RATE_HZ, SIZE, HOLD_OUT = 24, 10.0, (320, 192), 8
 Poses = Literal["true", "estimated", "unknown_focal"]

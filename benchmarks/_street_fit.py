@@ -18,9 +18,9 @@ from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.decompose.group import Grouping
 from dreamdrive.fit import Parts, Representation, fit
 from dreamdrive.options import Quality
+from dreamdrive.run.stages import stage_seed
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
-from dreamdrive.stages import stage_seed
 
 PROBE_STEPS = 30
 Vote = Callable[[Start, torch.Tensor, Quality], Grouping]

@@ -26,7 +26,7 @@ from _street_views import views_digest
 from dreamdrive.evaluate.extractors import Toolbox
 from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES
-from dreamdrive.stages import digest
+from dreamdrive.run.stages import digest
 
 SEEDS = tuple(range(8))
 REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")

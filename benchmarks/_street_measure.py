@@ -14,12 +14,12 @@ from jaxtyping import Bool, UInt8
 from dreamdrive.evaluate.decomposition import evaluate_decomposition
 from dreamdrive.evaluate.extractors import Extractor, Toolbox
 from dreamdrive.evaluate.truth import Truth
-from dreamdrive.held_out import likeness
+from dreamdrive.run.held_out import likeness
+from dreamdrive.run.stages import digest
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity, fit_similarity
 from dreamdrive.splat.scene_view import render_scene
-from dreamdrive.stages import digest
 
 WINDOW, STRIDE = 16, 2
 

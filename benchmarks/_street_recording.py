@@ -13,13 +13,13 @@ from pandaset_truth import Movers, moving_masks
 
 from dreamdrive.evaluate.retrieval import retrieval
 from dreamdrive.fit import Representation
-from dreamdrive.held_out import score_scene
 from dreamdrive.options import Quality
 from dreamdrive.prior import choose_prior
+from dreamdrive.run.held_out import score_scene
+from dreamdrive.run.stages import digest
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat.scene_view import render_scene
-from dreamdrive.stages import digest
 
 CLIP, CAMERA = "pandaset_002", "front_camera"
 SIZE, FRAMES, RATE_HZ, CAMERA_HEIGHT_M = (320, 180), "20:68:2", 10.0, 2.2

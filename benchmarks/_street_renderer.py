@@ -5,7 +5,7 @@ from typing import Any
 
 from _street_case import FRAMES, RATE_HZ, SIZE
 
-from dreamdrive.data.world import StreetOptions, World, draw_street, drive
+from dreamdrive.world import StreetOptions, World, draw_street, drive
 
 ASKED = {"antialiased": 10.0, "one_ray": 20.0}
 """Frames a second that were asked for, at 320x192 on two cores."""

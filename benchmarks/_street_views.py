@@ -7,10 +7,10 @@ import numpy as np
 from _street_case import NOVEL, VIEWS, world_digest, world_of
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.data.world import Drive, WorldBox
-from dreamdrive.scene.atomic import new_file
+from dreamdrive.files.atomic import new_file
+from dreamdrive.run.stages import digest
 from dreamdrive.scene.camera import Camera
-from dreamdrive.stages import digest
+from dreamdrive.world import Drive, WorldBox
 
 NEAR_M = 0.5
 """Frames whose camera is nearer to a box, or inside it, do not count: 64 degrees show 0.6 m of what is half a

@@ -32,9 +32,9 @@ from _street_views import views_digest
 from _workers import work_off
 
 from dreamdrive.options import Quality
+from dreamdrive.run.stages import digest
 from dreamdrive.scene.features import OF_GEOMETRY
 from dreamdrive.splat import native_info
-from dreamdrive.stages import digest
 
 SEEDS = (0, 1, 2, 3)
 FIGURES = {

@@ -29,7 +29,6 @@ from _street_measure import to_scene
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.evaluate.actor_places import gaussians_of, offset_m
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.pipeline import generate
@@ -43,6 +42,7 @@ from dreamdrive.scene.similarity import Similarity, fit_similarity
 from dreamdrive.splat import one_torch_thread
 from dreamdrive.splat import render as splat
 from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 
 ROOT = Path(__file__).resolve().parents[1]
 FPS = 10.0

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from dreamdrive.data import write_trajectory
-from dreamdrive.drives import check_numbers, distance_m, drives_of, share_seen
+from dreamdrive.drive.drives import check_numbers, distance_m, drives_of, share_seen
 from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dreamdrive.held_out import BASELINES, interpolate_flow, likeness, score_baselines
+from dreamdrive.run.held_out import BASELINES, interpolate_flow, likeness, score_baselines
 from tests.rigs import rig_clip
 from tests.streets import small_street, street_clip, true_geometry
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from dreamdrive.data import Lens
 from dreamdrive.data.distortion import Distortion
-from dreamdrive.pictures import _surround, as_recorded, frame_rate, lens_of, smooth, up_of, write_held_out
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show.videos import _surround, as_recorded, frame_rate, lens_of, smooth, up_of, write_held_out
 from tests.scene.scenes import make_scene
 
 

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import Control, InputError, Outcome, codec, generate, load_scene, options, pipeline
+from dreamdrive import Control, InputError, Outcome, generate, load_scene, options, pipeline
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, StaticFit
 from dreamdrive.geometry import reconstruct
+from dreamdrive.run import codec
 from dreamdrive.run.lock import only_run
+from dreamdrive.run.stages import STAGES
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.stages import STAGES
 
 TINY = Control(frames="0:6", size=(64, 40), hold_out=4, seed=1)
 

@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import rendering
 from dreamdrive.data import read_trajectory
 from dreamdrive.data.intrinsics import read_intrinsics
-from dreamdrive.drive import panels
-from dreamdrive.drives import Drive
+from dreamdrive.drive.drives import Drive
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files.depth import read_depth
-from dreamdrive.rendering import Look, check_size, depth_png, video_rate, view_camera, write_drive
+from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show import panels, rendering
+from dreamdrive.show.rendering import Look, check_size, depth_png, video_rate, view_camera, write_drive
 from dreamdrive.splat.scene_view import SceneView, render_scene
 from tests.scene.scenes import make_scene
 

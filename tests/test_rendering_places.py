@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dreamdrive.drives import Drive
+from dreamdrive.drive.drives import Drive
 from dreamdrive.errors import InputError
-from dreamdrive.rendering import Look
-from dreamdrive.rendering_places import places
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show.places import places
+from dreamdrive.show.rendering import Look
 
 PATH = Trajectory(np.eye(4)[None], np.zeros(1))
 ONE, TWO = [Drive("stop", PATH)], [Drive("stop", PATH), Drive("mine", PATH)]

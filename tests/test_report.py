@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dreamdrive.report import against_request
+from dreamdrive.run.report import against_request
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Scale

@@ -6,9 +6,9 @@ from pathlib import Path
 import cv2
 import pytest
 
-from dreamdrive import sampling
 from dreamdrive.errors import InputError
 from dreamdrive.prior.replay import REPLAY
+from dreamdrive.run import sampling
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from tests.data.pictures import texture

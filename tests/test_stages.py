@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import codec
 from dreamdrive.errors import InputError
+from dreamdrive.run import codec
+from dreamdrive.run.stages import STAGES, Stages, Storage, digest, file_digest, stage_seed
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.stages import STAGES, Stages, Storage, digest, file_digest, stage_seed
 from tests.streets import small_street, street_clip, true_geometry
 
 

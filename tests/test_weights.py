@@ -9,9 +9,9 @@ import pytest
 import torch
 from torch import nn
 
-from dreamdrive import weights
 from dreamdrive.errors import InputError
-from dreamdrive.weights import check_sizes, fill, fill_network, load_network, read_torch
+from dreamdrive.models import weights
+from dreamdrive.models.weights import check_sizes, fill, fill_network, load_network, read_torch
 
 
 class Small(nn.Module):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dreamdrive.errors import InputError
-from dreamdrive.workspace import Workspace, open_workspace
+from dreamdrive.run.workspace import Workspace, open_workspace
 
 OPTIONS = {"quality": "draft", "size": (64, 40)}
 REQUEST = {"digests": {"input": "abc"}, "options": OPTIONS, "seed": 0}

@@ -14,17 +14,14 @@ from dreamdrive.data import read_clip
 from dreamdrive.data.rig import is_rig
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
+from dreamdrive.files.paths import inside
 from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import backend_of, reconstruct
-from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
-from dreamdrive.geometry.picture import draw_geometry
-from dreamdrive.held_out import score_baselines, score_scene
-from dreamdrive.hub import find_weights
-from dreamdrive.memory import available_cores, free_bytes
+from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
+from dreamdrive.machine import available_cores, free_bytes
+from dreamdrive.models.hub import find_weights
 from dreamdrive.options import QUALITIES, Quality, QualityName
-from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
-from dreamdrive.report import describe
 from dreamdrive.run.agreement import (
     check_clip,
     check_geometry,
@@ -35,16 +32,11 @@ from dreamdrive.run.agreement import (
     check_static,
 )
 from dreamdrive.run.cost import announcement, check_memory, plan
+from dreamdrive.run.held_out import score_baselines, score_scene
 from dreamdrive.run.lock import only_run
 from dreamdrive.run.outcome import Outcome, outcome_of, read_outcome
-from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
-from dreamdrive.scene.files import inside
-from dreamdrive.scene.folder import load_scene, save_scene
-from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.scene import Scene
-from dreamdrive.stages import (
+from dreamdrive.run.report import describe
+from dreamdrive.run.stages import (
     STAGES,
     Progress,
     StageProgress,
@@ -54,7 +46,15 @@ from dreamdrive.stages import (
     file_digest,
     stage_seed,
 )
-from dreamdrive.workspace import REPORT, Workspace, check_writable, open_workspace
+from dreamdrive.run.workspace import REPORT, Workspace, check_writable, open_workspace
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+from dreamdrive.show.geometry import draw_geometry
+from dreamdrive.show.videos import Scored, lens_of, write_held_out, write_png, write_videos
 
 Say = Callable[[str], None]
 """Called with a sentence for somebody who waits."""

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 
-from dreamdrive.geometry.dust3r.align.alignment import align
-from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
-from dreamdrive.geometry.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.align.alignment import align
+from dreamdrive.geometry.backends.dust3r.align.memory import predicted_bytes
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 

@@ -5,8 +5,8 @@ import pytest
 from benchmarks._layout_edits import move_box, widen_road
 
 from dreamdrive.data.layout_file import problems
-from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.scene.layout import is_moving
+from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 
 
 @pytest.fixture(scope="module")

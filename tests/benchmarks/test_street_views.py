@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive.data.world import WorldBox
 from dreamdrive.scene.camera import Camera
+from dreamdrive.world import WorldBox
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 FRAMES = 24

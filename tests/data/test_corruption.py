@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from dreamdrive.data.corruption import Corruption, corrupt, parse_corruption
-from dreamdrive.data.corruption.noise import Noise
-from dreamdrive.data.corruption.settings import STRENGTHS
-from dreamdrive.data.corruption.shapes import slide, wobble
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
+from dreamdrive.world import Drive, make_street
+from dreamdrive.world.corruption import Corruption, corrupt, parse_corruption
+from dreamdrive.world.corruption.noise import Noise
+from dreamdrive.world.corruption.settings import STRENGTHS
+from dreamdrive.world.corruption.shapes import slide, wobble
 
 
 @pytest.fixture(scope="module")

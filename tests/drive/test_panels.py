@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dreamdrive.drive import panels
+from dreamdrive.show import panels
 
 
 def image(value: int) -> np.ndarray:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from dreamdrive.evaluate.estimate import Estimate
-from dreamdrive.evaluate.geometry_picture import draw_geometry_errors, error_colours
 from dreamdrive.evaluate.geometry_truth import GeometryTruth
 from dreamdrive.scene.camera import Camera
+from dreamdrive.show.geometry_truth import draw_geometry_errors, error_colours
 
 
 def test_right_is_white_too_far_red_too_near_blue_unknown_dark() -> None:

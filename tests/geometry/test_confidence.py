@@ -3,7 +3,7 @@
 import numpy as np
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.confidence import (
+from dreamdrive.geometry.depth.confidence import (
     GROUND_PRIOR_CONFIDENCE,
     agreement,
     combine,

@@ -5,8 +5,8 @@ import pytest
 from tests.geometry.toy_drive import make_clip, straight, turning
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical.contradiction import check, explain
-from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.cameras.contradiction import check, explain
+from dreamdrive.geometry.evidence.look import look
 from dreamdrive.scene.clip import Clip, Known
 
 PATH = turning(8, 0.4, 2.0)

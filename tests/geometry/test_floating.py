@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.dense import densify
-from dreamdrive.geometry.classical.floating import floating
-from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
-from dreamdrive.geometry.classical.moving import FLAGGED
-from dreamdrive.geometry.classical.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.dense import densify
+from dreamdrive.geometry.depth.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.moving.evidence import FLAGGED
+from dreamdrive.geometry.moving.floating import floating
+from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
 
 FRAME = 3
 STEP_M = 0.8

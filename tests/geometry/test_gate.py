@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dreamdrive.geometry.classical.gate import MAX_REPROJECTION_PX, WOBBLING_PX, judge
-from dreamdrive.geometry.classical.sfm import Model
+from dreamdrive.geometry.cameras.gate import MAX_REPROJECTION_PX, WOBBLING_PX, judge
+from dreamdrive.geometry.cameras.sfm import Model
 
 FRAMES = 12
 MOVING = np.ones(FRAMES - 1, bool)

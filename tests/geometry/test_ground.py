@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, straight, turning
 
-from dreamdrive.geometry.classical import evidence
-from dreamdrive.geometry.classical.ground_points import fit_points
-from dreamdrive.geometry.classical.ground_sweep import Road, sweep
-from dreamdrive.geometry.classical.poses import pose_clip
-from dreamdrive.geometry.classical.scale import Street, asked_m_s, from_ground, from_road_points
+from dreamdrive.geometry.cameras.posing import pose_clip
+from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.road.ground_points import fit_points
+from dreamdrive.geometry.road.ground_sweep import Road, sweep
+from dreamdrive.geometry.road.scale import Street, asked_m_s, from_ground, from_road_points
 from dreamdrive.scene.trajectory import Trajectory
 
 

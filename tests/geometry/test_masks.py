@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT, HOOD_ROWS, WIDTH, make_clip, straight
 
-from dreamdrive.geometry.classical import evidence, masks
+from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.evidence import masks
 
 STEPS = [0.5] * 9
 

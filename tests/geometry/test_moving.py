@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis.extra.numpy import arrays
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.dense import densify
-from dreamdrive.geometry.classical.moving import FLAGGED, decide, fill
-from dreamdrive.geometry.classical.upright import upright_depth
+from dreamdrive.geometry.dense import densify
+from dreamdrive.geometry.moving.evidence import FLAGGED, decide, fill
+from dreamdrive.geometry.road.upright import upright_depth
 
 
 def flagged_shares(street: toy.Toy) -> tuple[float, float, float]:

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
-from dreamdrive.geometry.classical import evidence
-from dreamdrive.geometry.classical.odometry import DEFAULT_SPEED_M_S, Odometry, drive
+from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive
+from dreamdrive.geometry.evidence import look as evidence
 
 
 def run(path: np.ndarray, blank_road: bool = False) -> Odometry:

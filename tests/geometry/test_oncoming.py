@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.oncoming import oncoming
-from dreamdrive.geometry.classical.view import View, make_view
+from dreamdrive.geometry.depth.view import View, make_view
+from dreamdrive.geometry.moving.oncoming import oncoming
 
 STEP_M = 0.8
 MIDDLE = slice(2, 5)

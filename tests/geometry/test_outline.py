@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.flow import PairFlow, neighbour_flows
-from dreamdrive.geometry.classical.outline import outline
-from dreamdrive.geometry.classical.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.depth.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.moving.outline import outline
 
 FRAME = 3
 HORIZON = toy.HEIGHT // 2

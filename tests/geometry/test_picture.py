@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.dense import densify
-from dreamdrive.geometry.picture import draw_geometry
+from dreamdrive.geometry.dense import densify
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.show.geometry import draw_geometry
 
 
 @pytest.fixture(scope="module")

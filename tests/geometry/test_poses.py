@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from tests.geometry.toy_drive import HEIGHT, HEIGHT_M, WIDTH, make_clip, straight, turning
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical.known import in_metres
-from dreamdrive.geometry.classical.paths import fill, rebase
-from dreamdrive.geometry.classical.poses import Posed, pose_clip
+from dreamdrive.geometry.cameras.paths import fill, rebase
+from dreamdrive.geometry.cameras.posing import Posed, pose_clip
+from dreamdrive.geometry.road.known_depth import in_metres
 from dreamdrive.scene.clip import Clip, Known
 
 

@@ -5,7 +5,7 @@ import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, turning
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.refine import refined
+from dreamdrive.geometry.cameras.refine import refined
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
 

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import make_clip, path_error, straight
 
-from dreamdrive.geometry.classical import evidence, sfm
-from dreamdrive.geometry.classical.reconstruct import Outcome, reconstruct
-from dreamdrive.geometry.classical.sfm import Model
+from dreamdrive.geometry.cameras import sfm
+from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
+from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.evidence import look as evidence
 from dreamdrive.scene.clip import Clip
 
 

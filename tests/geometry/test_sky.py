@@ -3,7 +3,7 @@
 import numpy as np
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical.sky import above_horizon, sky_mask
+from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 

@@ -3,8 +3,8 @@
 from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.classical.dense import PASSES
-from dreamdrive.geometry.classical.reconstruct import STEPS
+from dreamdrive.geometry.cameras.mapping import STEPS
+from dreamdrive.geometry.dense import PASSES
 
 
 def test_a_drive_takes_all_steps_and_one_that_stands_jumps() -> None:

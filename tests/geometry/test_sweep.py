@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical import smoothing, sweep
-from dreamdrive.geometry.classical.depth import sweep_frames
-from dreamdrive.geometry.classical.view import make_view, single_threaded_opencv
+from dreamdrive.geometry.depth import smoothing, sweep
+from dreamdrive.geometry.depth.one_frame import sweep_frames
+from dreamdrive.geometry.depth.view import make_view, single_threaded_opencv
 from dreamdrive.scene.camera import Camera
 
 

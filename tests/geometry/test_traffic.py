@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dreamdrive.geometry.classical.traffic import MIN_SEEN, USUAL_HEIGHT_M, compared_with_traffic
+from dreamdrive.geometry.moving.traffic import MIN_SEEN, USUAL_HEIGHT_M, compared_with_traffic
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dreamdrive.geometry.classical.depth import Swept
-from dreamdrive.geometry.classical.flanks import fill_flanks
+from dreamdrive.geometry.depth.flanks import fill_flanks
+from dreamdrive.geometry.depth.one_frame import Swept
 
 SHAPE = (60, 80)
 PLANE = (np.maximum(np.arange(60) - 20, 0)[:, None] * np.full((1, 80), 0.005)).astype(np.float32)

@@ -15,7 +15,7 @@ _NEEDED_MB = 3000
 def doctor() -> None:
     """Show versions, instruction set, threads and memory, and say what is missing and how to get it."""
     from dreamdrive import __version__
-    from dreamdrive.report import PACKAGES, package_versions
+    from dreamdrive.run.report import PACKAGES, package_versions
 
     table = Table(show_header=False, box=None)
     table.add_row("dreamdrive", __version__)

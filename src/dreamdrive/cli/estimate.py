@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import inside
+from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate.estimate import Estimate
@@ -88,7 +88,7 @@ def _check_agreement(out: Path, clip: "Clip", geometry: "Geometry") -> None:
 
 def _stage(folder: Path, kind: type[T]) -> T | None:
     """What a stage left; None where there is nothing."""
-    from dreamdrive import codec
+    from dreamdrive.run import codec
 
     if not (folder / codec.JSON_NAME).is_file():
         return None

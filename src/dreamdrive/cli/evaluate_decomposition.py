@@ -47,9 +47,9 @@ def decomposition(
 def _truth(scene: "Scene", world: Path) -> "Truth":
     """The truth of the scene's frames."""
     from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.data.world import drive
-    from dreamdrive.data.world.files import read_world
     from dreamdrive.evaluate.truth import Truth
+    from dreamdrive.world import drive
+    from dreamdrive.world.files import read_world
 
     if not world.exists():
         raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")

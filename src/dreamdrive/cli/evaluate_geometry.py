@@ -30,9 +30,9 @@ def geometry(
         picture: Draw errors of depth and both paths into this PNG.
     """
     from dreamdrive.evaluate.geometry import evaluate_geometry
-    from dreamdrive.evaluate.geometry_picture import draw_geometry_errors
     from dreamdrive.evaluate.geometry_truth import read_geometry_truth
-    from dreamdrive.pictures import write_png
+    from dreamdrive.show.geometry_truth import draw_geometry_errors
+    from dreamdrive.show.videos import write_png
 
     console = Console()
     with console.status("reading the truth and comparing"):

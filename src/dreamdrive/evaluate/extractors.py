@@ -15,7 +15,7 @@ from dreamdrive.evaluate.networks import efficientnet_lite, i3d, inception, lpip
 from dreamdrive.evaluate.networks.packaged import MissingWeightsError
 from dreamdrive.evaluate.networks.resize import Resize
 from dreamdrive.evaluate.pixels import psnr, ssim
-from dreamdrive.weights import sha256
+from dreamdrive.models.weights import sha256
 
 Stlpips = Literal["alex", "vgg", "both"]
 """Trunk of the shift-tolerant LPIPS; that of VGG takes four times as long."""

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical import CLASSICAL
-from dreamdrive.geometry.dust3r import DUST3R
-from dreamdrive.geometry.feedforward import FEED_FORWARD
+from dreamdrive.geometry.backends.classical import CLASSICAL
+from dreamdrive.geometry.backends.dust3r import DUST3R
+from dreamdrive.geometry.backends.feedforward import FEED_FORWARD
+from dreamdrive.geometry.cameras.refine import refined
 from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
-from dreamdrive.geometry.refine import refined
 from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.classical import assemble
-from dreamdrive.geometry.classical import scale as scales
-from dreamdrive.geometry.classical.dense import StaticDepth, densify
-from dreamdrive.geometry.classical.evidence import Evidence
-from dreamdrive.geometry.classical.known import MIN_RATIOS, depth_points, in_metres
-from dreamdrive.geometry.classical.paths import rebase
-from dreamdrive.geometry.classical.poses import as_posed
-from dreamdrive.geometry.classical.scale import Metric, Street
+from dreamdrive.geometry.backends.classical import assemble
+from dreamdrive.geometry.cameras.paths import rebase
+from dreamdrive.geometry.cameras.posing import as_posed
+from dreamdrive.geometry.cameras.standing import stands
+from dreamdrive.geometry.dense import StaticDepth, densify
+from dreamdrive.geometry.evidence.look import Evidence
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.standing import stands
+from dreamdrive.geometry.road import scale as scales
+from dreamdrive.geometry.road.known_depth import MIN_RATIOS, depth_points, in_metres
+from dreamdrive.geometry.road.scale import Metric, Street
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 

@@ -11,13 +11,13 @@ from jaxtyping import Float, Int
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
-from dreamdrive.memory import best_device
+from dreamdrive.files.json_file import read_json
+from dreamdrive.machine import best_device
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.json_file import read_json
 from dreamdrive.scene.trajectory import Trajectory
 
 PROMPT = "The view ahead from a car that drives along a street."

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
 
-from dreamdrive.backend import Backend
 from dreamdrive.errors import InputError
+from dreamdrive.models.backend import Backend
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control

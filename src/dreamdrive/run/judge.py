@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dreamdrive.held_out import Likeness
 from dreamdrive.options import QualityName
+from dreamdrive.run.held_out import Likeness
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Basis, Fallback, Geometry
 

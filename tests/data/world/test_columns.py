@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dreamdrive.data.world.columns import by_columns, dot, outer, picked, turned
+from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.sampled_from([(3,), (2, 4)]))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dreamdrive.data.world import Drive, Semantic, StreetOptions, WorldBox, draw_street, drive, make_street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import is_moving
+from dreamdrive.world import Drive, Semantic, StreetOptions, WorldBox, draw_street, drive, make_street
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dreamdrive.data import read_clip
-from dreamdrive.data.world import Drive, make_street
-from dreamdrive.data.world.files import read_world, write_world
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.backends.files import attach
+from dreamdrive.world import Drive, make_street
+from dreamdrive.world.files import read_world, write_world
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from embreex.rtcore import EmbreeDevice
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dreamdrive.data.world.mesh import Mesh, ball, box, cylinder, frustum, place
-from dreamdrive.data.world.solid import Solid
+from dreamdrive.world.mesh import Mesh, ball, box, cylinder, frustum, place
+from dreamdrive.world.solid import Solid
 
 DEVICE = EmbreeDevice()
 DEVICE_CODE = """
@@ -29,7 +29,7 @@ void* rtcNewDevice(const char* config) {
 """
 CODE = """
 import sys, numpy as np
-from dreamdrive.data.world import make_street
+from dreamdrive.world import make_street
 street = make_street(2, 1, size=(320, 192))
 np.savez(sys.argv[1], frame=street.frames[0], depth=street.depth_m[0], instance=street.instance[0])
 """

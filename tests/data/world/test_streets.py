@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import shapely
 
-from dreamdrive.data.world import StreetOptions, draw_street, drive
-from dreamdrive.data.world.road import travelled_m
 from dreamdrive.errors import InputError
 from dreamdrive.scene.layout import Layout, is_moving, track_function
+from dreamdrive.world import StreetOptions, draw_street, drive
+from dreamdrive.world.road import travelled_m
 
 SEEDS = range(8)
 

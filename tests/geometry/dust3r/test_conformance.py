@@ -12,18 +12,18 @@ from tests.geometry.dust3r.network.golden import tiny
 from tests.geometry.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.dust3r.network.images import fitting
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.backends.dust3r.network.images import fitting
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.fitting import Fitting
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.clip import Known as KnownOfClip
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.world import Drive, make_street
 
-MODULE = import_module("dreamdrive.geometry.dust3r.reconstruct")
+MODULE = import_module("dreamdrive.geometry.backends.dust3r.reconstruct")
 FRAMES, SIZE, LONG_SIDE = 5, (160, 120), 128
 CUT = 10  # rows cut off below, so that the principal point is not in the middle
 HOW = fitting(160, 110, LONG_SIDE)  # 128x88, of which 128x80 are left

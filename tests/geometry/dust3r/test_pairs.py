@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
 
 
 def test_golden_pairs(golden_dir: Path) -> None:

@@ -9,22 +9,22 @@ from tests.geometry.dust3r.network.golden import tiny
 from tests.geometry.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
-from dreamdrive.data.world import make_street
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.classical.evidence import look
-from dreamdrive.geometry.dust3r.align.aligned import Aligned
-from dreamdrive.geometry.dust3r.network.config import NetworkConfig
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
-from dreamdrive.geometry.dust3r.network.images import fitting
-from dreamdrive.geometry.dust3r.pairs import make_pairs, video_graph
-from dreamdrive.geometry.dust3r.reconstruct import measured, planned_pairs
+from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
+from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
+from dreamdrive.geometry.backends.dust3r.network.images import fitting
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
+from dreamdrive.geometry.backends.dust3r.reconstruct import measured, planned_pairs
+from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import make_street
 
 FRAMES, SIZE = 6, (160, 96)
-MODULE = import_module("dreamdrive.geometry.dust3r.reconstruct")
+MODULE = import_module("dreamdrive.geometry.backends.dust3r.reconstruct")
 
 
 @pytest.fixture(scope="module")

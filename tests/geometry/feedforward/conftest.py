@@ -9,9 +9,9 @@ from tests.geometry.feedforward.fakes import KINDS, Truth, install, save_weights
 from tests.streets import street_clip
 from torch import Tensor
 
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.geometry.fitting import Fitting
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import Drive, make_street
 
 FRAMES, SIZE = 8, (160, 96)
 

@@ -18,9 +18,9 @@ from safetensors.torch import save_file
 from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 
-from dreamdrive.data.world import Drive
-from dreamdrive.geometry.feedforward.pictures import fit_patches, show, standardise
+from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show, standardise
 from dreamdrive.geometry.fitting import Fitting
+from dreamdrive.world import Drive
 
 SKY_M = 400.0
 

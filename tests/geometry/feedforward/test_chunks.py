@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.feedforward.chunks import chunks, join
-from dreamdrive.geometry.feedforward.network import Seen
+from dreamdrive.geometry.backends.feedforward.chunks import chunks, join
+from dreamdrive.geometry.backends.feedforward.network import Seen
 from dreamdrive.scene.camera import Camera
 
 CAMERA = Camera(30.0, 30.0, 16.0, 12.0, 32, 24)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from tests.geometry.feedforward.fakes import BACKEND, METRIC, Truth
 
-from dreamdrive.data.world import Drive
 from dreamdrive.geometry import BACKENDS
-from dreamdrive.geometry.feedforward.reconstruct import FeedForward
+from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import Drive
 
 
 def way_of(kind: str, **changes: int) -> FeedForward:

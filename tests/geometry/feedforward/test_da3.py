@@ -8,9 +8,9 @@ import torch
 from safetensors.torch import save_model
 from torch import nn
 
-from dreamdrive.geometry.feedforward.da3 import INSTALL, load_da3
-from dreamdrive.geometry.feedforward.load import upstream
-from dreamdrive.geometry.feedforward.network import Views
+from dreamdrive.geometry.backends.feedforward.da3 import INSTALL, load_da3
+from dreamdrive.geometry.backends.feedforward.load import upstream
+from dreamdrive.geometry.backends.feedforward.network import Views
 
 
 @pytest.mark.filterwarnings("ignore")

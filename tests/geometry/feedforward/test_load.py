@@ -29,7 +29,7 @@ def test_without_its_package_a_backend_says_what_to_install(
     package = BACKENDS[name].package
     assert package is not None
     monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.setattr("dreamdrive.backend.find_spec", dict[str, None]().get)
+    monkeypatch.setattr("dreamdrive.models.backend.find_spec", dict[str, None]().get)
     with pytest.raises(InputError, match=rf"{package} is missing: (pip install --no-deps|git clone)"):
         reconstruct(clip, method=name, weights=save_weights(tmp_path, name))
 

@@ -8,10 +8,10 @@ import pytest
 import torch
 from tests.geometry.feedforward.fakes import Truth
 
-from dreamdrive.data.world import Drive
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import BACKENDS, reconstruct
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import Drive
 
 
 @pytest.mark.parametrize("kind", ["mapanything"])

@@ -10,7 +10,7 @@ from tests.geometry.files import drives
 
 from dreamdrive.data.lens import Lens
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files import attach, bent_model
+from dreamdrive.geometry.backends.files import attach, bent_model
 from dreamdrive.scene.camera import Camera
 
 NAMES = [f"{i:04d}.jpg" for i in range(6)]

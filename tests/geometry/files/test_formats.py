@@ -5,12 +5,12 @@ import pytest
 from tests.geometry.files import drives
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files.colmap import read_colmap_model
-from dreamdrive.geometry.files.formats import companions, recognise
-from dreamdrive.geometry.files.nerfstudio import read_transforms
-from dreamdrive.geometry.files.pandaset import read_pandaset
-from dreamdrive.geometry.files.plain import read_plain
-from dreamdrive.geometry.files.pose_lists import read_pose_list
+from dreamdrive.geometry.backends.files.colmap import read_colmap_model
+from dreamdrive.geometry.backends.files.formats import companions, recognise
+from dreamdrive.geometry.backends.files.nerfstudio import read_transforms
+from dreamdrive.geometry.backends.files.pandaset import read_pandaset
+from dreamdrive.geometry.backends.files.plain import read_plain
+from dreamdrive.geometry.backends.files.pose_lists import read_pose_list
 
 POSE = np.eye(4).tolist()
 

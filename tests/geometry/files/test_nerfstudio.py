@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.geometry.files import drives
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files import attach, bent_model, companions
+from dreamdrive.geometry.backends.files import attach, bent_model, companions
 
 NAMES = [f"images/{i:04d}.png" for i in range(6)]  # other endings than the clip's
 TRUTH = np.array([drives.pose((0, 0.02 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])

@@ -8,7 +8,7 @@ from tests.geometry.files import drives
 
 from dreamdrive.data import read_clip
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.backends.files import attach
 
 TRUTH = np.array([drives.pose((0.3, 0.05 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 ENTRY = {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.files import attach
+from dreamdrive.geometry.backends.files import attach
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from tests.geometry.files import drives
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.files import attach, companions
+from dreamdrive.geometry.backends.files import attach, companions
 
 TRUTH = np.array([drives.pose((0, 0.05 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 CALIBRATION = (

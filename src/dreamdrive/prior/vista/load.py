@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dreamdrive.memory import best_device, free_bytes
+from dreamdrive.machine import best_device, free_bytes
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.memory import Free, Job, check_memory
 from dreamdrive.prior.vista.networks import Networks

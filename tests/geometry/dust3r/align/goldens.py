@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from safetensors.numpy import load_file
 
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.reference.objective import Raw
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference.objective import Raw
 
 
 def scene(golden_dir: Path, name: str) -> tuple[PairMaps, dict[str, np.ndarray], dict[str, np.ndarray]]:

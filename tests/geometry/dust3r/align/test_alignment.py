@@ -10,14 +10,14 @@ from tests.geometry.dust3r.align.goldens import config, scene
 from tests.geometry.dust3r.align.pairs import path_error, pinholes, street, window
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.align.aligned import Aligned
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.align.memory import predicted_bytes
-from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.reference.adam import descend
-from dreamdrive.geometry.dust3r.reference.objective import Objective, raw_parameters
+from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.align.memory import predicted_bytes
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference.adam import descend
+from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)

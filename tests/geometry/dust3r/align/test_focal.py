@@ -9,7 +9,7 @@ from benchmarks._simulated_pairs import Noise, pair_maps
 from safetensors.numpy import load_file
 from tests.geometry.dust3r.align.pairs import street, window
 
-from dreamdrive.geometry.dust3r.align.focal import (
+from dreamdrive.geometry.backends.dust3r.align.focal import (
     FocalRule,
     focal_px,
     focal_votes,

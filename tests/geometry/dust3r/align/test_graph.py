@@ -8,8 +8,8 @@ from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.pairs import street, window
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 
 
 @pytest.fixture(scope="module")

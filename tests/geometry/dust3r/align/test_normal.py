@@ -9,14 +9,14 @@ import torch
 from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.pairs import street, window
 
-from dreamdrive.geometry.dust3r.align.freedom import Freedom
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.align.normal import ImageSamples, normal_equations
-from dreamdrive.geometry.dust3r.align.penalty import Cauchy, Distance, Penalty
-from dreamdrive.geometry.dust3r.align.rays import RayMisses
-from dreamdrive.geometry.dust3r.align.samples import draw_samples
-from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.dust3r.align.state import State
+from dreamdrive.geometry.backends.dust3r.align.freedom import Freedom
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples, normal_equations
+from dreamdrive.geometry.backends.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.backends.dust3r.align.rays import RayMisses
+from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 _STEPS = 60

@@ -9,8 +9,8 @@ from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.goldens import scene
 from tests.geometry.dust3r.align.pairs import path_error, street, window
 
-from dreamdrive.geometry.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 
 EXACT = Noise(0, 1 / 8, 0, 0, 0)
 

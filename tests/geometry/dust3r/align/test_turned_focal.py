@@ -8,11 +8,11 @@ import pytest
 from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.dust3r.align.pairs import path_error, pinholes, street, window
 
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.dust3r.align.focal import FocalVotes, focal_votes
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.align.turned_focal import TurnedFocal, turned_focal
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 
 FRAMES = 8
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)

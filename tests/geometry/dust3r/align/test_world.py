@@ -7,8 +7,8 @@ import pytest
 from benchmarks._simulated_pairs import Noise, pair_maps, truth_of
 from tests.geometry.dust3r.align.pairs import path_error, window
 
-from dreamdrive.data.world import make_street
-from dreamdrive.geometry.dust3r.align.alignment import AlignOptions, align
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
+from dreamdrive.world import make_street
 
 
 @pytest.mark.slow

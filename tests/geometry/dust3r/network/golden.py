@@ -12,10 +12,10 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor
 
-from dreamdrive.geometry.dust3r.network.checkpoint import normalise
-from dreamdrive.geometry.dust3r.network.config import DptSizes, NetworkConfig, config_from_keywords
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
-from dreamdrive.weights import fill_network
+from dreamdrive.geometry.backends.dust3r.network.checkpoint import normalise
+from dreamdrive.geometry.backends.dust3r.network.config import DptSizes, NetworkConfig, config_from_keywords
+from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
+from dreamdrive.models.weights import fill_network
 
 TINY = NetworkConfig(
     enc_dim=32,

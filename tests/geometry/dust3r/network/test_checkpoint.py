@@ -15,8 +15,8 @@ from tests.geometry.dust3r.network.golden import TINY, tiny
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
+from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
+from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 
 ALIAS = ".scratch.layer_rn."
 

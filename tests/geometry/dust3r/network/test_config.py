@@ -9,7 +9,7 @@ import pytest
 from tests.geometry.dust3r.network.golden import Golden, tiny
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.network.config import (
+from dreamdrive.geometry.backends.dust3r.network.config import (
     NetworkConfig,
     check_agreement,
     config_from_call,

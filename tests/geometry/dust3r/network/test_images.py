@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.geometry.dust3r.network.golden import Golden
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.network.images import as_input, fitting
+from dreamdrive.geometry.backends.dust3r.network.images import as_input, fitting
 from dreamdrive.geometry.fitting import Fitting, prepare
 from dreamdrive.scene.camera import Camera
 

@@ -9,13 +9,13 @@ import torch
 from tests.geometry.dust3r.network.golden import tiny
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.network.config import NetworkConfig
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r, Tokens
-from dreamdrive.geometry.dust3r.network.images import as_input
-from dreamdrive.geometry.dust3r.network.inference import infer
-from dreamdrive.geometry.dust3r.network.memory import plan_memory
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r, Tokens
+from dreamdrive.geometry.backends.dust3r.network.images import as_input
+from dreamdrive.geometry.backends.dust3r.network.inference import infer
+from dreamdrive.geometry.backends.dust3r.network.memory import plan_memory
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
 
 SHAPES = ((32, 48), (32, 48), (48, 32), (32, 48), (48, 32))
 

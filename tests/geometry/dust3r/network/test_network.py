@@ -9,10 +9,10 @@ import torch
 from tests.geometry.dust3r.network.golden import Golden, relative, tiny
 from torch import Tensor, nn
 
-from dreamdrive.geometry.dust3r.network.config import NetworkConfig
-from dreamdrive.geometry.dust3r.network.dust3r import Dust3r
-from dreamdrive.geometry.dust3r.network.heads import Pointmap, pointmap
-from dreamdrive.geometry.dust3r.network.rope import Rotation, grid_positions, rotate, rotation
+from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
+from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap, pointmap
+from dreamdrive.geometry.backends.dust3r.network.rope import Rotation, grid_positions, rotate, rotation
 
 LIMIT = 3e-5
 # The head of 39 million weights takes seconds to seed.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from tests.geometry.dust3r.align.goldens import scene
 
-from dreamdrive.geometry.dust3r.reference.clean import clean, world_points
+from dreamdrive.geometry.backends.dust3r.reference.clean import clean, world_points
 
 
 def test_it_is_golden(golden_dir: Path) -> None:

@@ -9,12 +9,12 @@ from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.dust3r.align.goldens import config, raw, scene
 from tests.geometry.dust3r.align.pairs import path_error, street
 
-from dreamdrive.geometry.dust3r.align.areas import half_areas
-from dreamdrive.geometry.dust3r.align.graph import graph_of
-from dreamdrive.geometry.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.reference.adam import descend
-from dreamdrive.geometry.dust3r.reference.objective import Objective, raw_parameters
+from dreamdrive.geometry.backends.dust3r.align.areas import half_areas
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference.adam import descend
+from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 
 

@@ -9,9 +9,9 @@ from tests.geometry.dust3r.align.goldens import scene
 from tests.geometry.dust3r.align.pairs import path_error, street
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.dust3r.reference.clean import world_points
-from dreamdrive.geometry.dust3r.reference.pair_viewer import view_pair
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference.clean import world_points
+from dreamdrive.geometry.backends.dust3r.reference.pair_viewer import view_pair
 
 
 def test_it_is_golden(golden_dir: Path) -> None:

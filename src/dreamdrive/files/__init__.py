@@ -1,0 +1,1 @@
+"""Reading and writing that damaged or hostile files cannot mislead."""

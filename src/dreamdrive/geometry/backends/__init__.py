@@ -1,0 +1,1 @@
+"""Ways of getting geometry, one each; only the table in ``geometry`` imports them."""

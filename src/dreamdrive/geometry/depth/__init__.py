@@ -1,0 +1,1 @@
+"""Plane sweep, its smoothing and its confidence."""

@@ -1,0 +1,1 @@
+"""Evidence of motion in posed frames, outlines of moving things, oncoming traffic."""

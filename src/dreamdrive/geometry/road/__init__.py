@@ -1,0 +1,1 @@
+"""The road plane, the metric scale, and what stands on the road."""

@@ -1,0 +1,1 @@
+"""What every method with a network needs: its table entry, weights from files and from the hub."""

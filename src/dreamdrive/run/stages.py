@@ -1,0 +1,237 @@
+"""Stages whose results are kept: the same input and options are never computed twice."""
+
+import hashlib
+import json
+import logging
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field, is_dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
+
+from dreamdrive import __version__
+from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import of_type
+from dreamdrive.files.paths import inside, open_file
+from dreamdrive.run import codec
+
+STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
+"""All stages in their order; each result depends on some of those before it."""
+
+FORMAT = 3
+"""Version of what is stored; a change makes all older results unknown."""
+
+Progress = Callable[[int, int], None]
+"""Called with steps done and steps in all."""
+
+StageProgress = Callable[[str, int, int], None]
+"""Called with a stage's name, steps done and steps in all; 0 in all where a stage cannot count its steps."""
+
+T = TypeVar("T")
+_log = logging.getLogger("dreamdrive")
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """What a stage cost when it was computed.
+
+    Attributes:
+        seconds: Wall time.
+        peak_rss_mb: Largest memory of the process up to the end of the stage.
+        cached: Whether the result was read rather than computed this time.
+    """
+
+    seconds: float
+    peak_rss_mb: float
+    cached: bool
+
+
+@dataclass(frozen=True)
+class Storage(Generic[T]):
+    """How results of one kind lie in a folder.
+
+    Attributes:
+        write: Stores a value in a folder, or replaces the one there; whole or not at all.
+        read: Reads it back, or raises ``InputError``.
+    """
+
+    write: Callable[[Path, T], None]
+    read: Callable[[Path], T]
+
+
+@dataclass
+class Stages:
+    """Runs stages, or reads what an earlier run of the same stages left.
+
+    Attributes:
+        folder: One folder a stage is kept in here.
+        recompute_from: Results of this stage and all later ones are not read.
+        progress: Told of every step.
+        claim: Called before something is written.
+        keys: Key of each stage that ran.
+        records: Cost of each stage that ran.
+    """
+
+    folder: Path
+    recompute_from: str | None
+    progress: StageProgress
+    claim: Callable[[], None]
+    keys: dict[str, str] = field(default_factory=dict)
+    records: dict[str, StageRecord] = field(default_factory=dict)
+
+    def run(
+        self,
+        name: str,
+        after: tuple[str, ...],
+        options: object,
+        compute: Callable[[Progress], T],
+        storage: Storage[T] | None = None,
+        check: Callable[[T], None] = lambda _: None,
+    ) -> T:
+        """The result of a stage.
+
+        A computed result is stored and read back, so that what later stages see never depends on whether it
+        was just computed.
+
+        Args:
+            name: One of ``STAGES``.
+            after: The stages whose results it uses.
+            options: Everything else the result depends on, as a dataclass or JSON values.
+            compute: Makes the result.
+            storage: For results that ``codec`` does not know.
+            check: Raises ``ValueError`` where a stored result does not belong to those it was made from.
+        """
+        key = digest([name, FORMAT, __version__, options, [self.keys[other] for other in after]])
+        self.keys[name] = key
+        folder = inside(self.folder, name)
+        fresh = self.recompute_from is not None and STAGES.index(name) >= STAGES.index(self.recompute_from)
+        found = None if fresh else _header(folder)
+        if found is not None and found.key == key:
+            try:
+                value = _load(folder, storage)
+                check(value)
+            except ValueError as error:
+                _log.warning("%s is computed again: %s", name, error)
+            else:
+                self.records[name] = StageRecord(found.seconds, found.peak_rss_mb, cached=True)
+                self.progress(name, 1, 1)
+                return value
+        return self._compute(name, key, compute, storage)
+
+    def measure(self, name: str, compute: Callable[[Progress], T]) -> T:
+        """Run something that is not kept, and record what it cost."""
+        at, whole = 0, 1
+
+        def tell(done: int, total: int) -> None:
+            nonlocal at, whole
+            at, whole = done, total or 1
+            self.progress(name, done, total)
+
+        tell(0, 0)
+        start = time.perf_counter()
+        value = compute(tell)
+        self.records[name] = StageRecord(round(time.perf_counter() - start, 2), peak_rss_mb(), cached=False)
+        if at < whole:
+            tell(whole, whole)
+        return value
+
+    def _compute(
+        self, name: str, key: str, compute: Callable[[Progress], T], storage: Storage[T] | None
+    ) -> T:
+        value = self.measure(name, compute)
+        record = self.records[name]
+        self.claim()
+        folder = inside(self.folder, name)
+        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)), storage)
+        return _load(folder, storage)
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What is noted beside a stage's result."""
+
+    key: str
+    seconds: float
+    peak_rss_mb: float
+
+
+def _header(folder: Path) -> _Header | None:
+    """What is noted beside the result in a folder; None where there is none, or no such note."""
+    found = codec.read_header(folder)
+    try:
+        return None if found is None else of_type(found, _Header, str(folder))
+    except InputError:
+        return None
+
+
+def _store(folder: Path, value: T, header: dict[str, Any], storage: Storage[T] | None) -> None:
+    if storage is None:
+        codec.write(folder, value, header)
+        return
+    # A folder without a header holds nothing, so that a kill on the way leaves no mixture behind.
+    (folder / codec.JSON_NAME).unlink(missing_ok=True)
+    storage.write(folder / "value", value)
+    codec.write(folder, None, header)
+
+
+def _load(folder: Path, storage: Storage[T] | None) -> T:
+    return cast(T, codec.read(folder)) if storage is None else storage.read(inside(folder, "value"))
+
+
+def digest(value: object) -> str:
+    """SHA-256 of JSON values and dataclasses of them."""
+    text = json.dumps(value, sort_keys=True, default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: object) -> object:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"a stage's options hold a {type(value).__name__}")
+
+
+def file_digest(path: Path, *, deep: bool = False) -> str:
+    """SHA-256 of a file's content, or of names and contents of the files in a folder.
+
+    Args:
+        path: A file or a folder; hidden files in it do not count. Links are followed.
+        deep: Whether the folders in a folder count.
+
+    Raises:
+        InputError: It is neither a regular file nor a folder, or may not be read.
+    """
+    if not path.is_dir():
+        with open_file(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    files = sorted(file for file in _files(path, deep) if not file.name.startswith("."))
+    return digest([[f.relative_to(path).as_posix(), file_digest(f)] for f in files])
+
+
+def _files(folder: Path, deep: bool, within: frozenset[Path] = frozenset()) -> Iterator[Path]:
+    """Files of a folder, those behind links too; ``within`` are the folders that lead there.
+
+    ``Path.rglob`` does not enter folders that are links, which is how weights of several places are joined.
+    """
+    real = folder.resolve()
+    if real in within:
+        return
+    for entry in folder.iterdir():
+        if entry.is_file():
+            yield entry
+        elif deep and entry.is_dir():
+            yield from _files(entry, deep, within | {real})
+
+
+def stage_seed(seed: int, name: str) -> int:
+    """A stage's own seed: results do not depend on which other stages ran before it."""
+    return int(digest([seed, name])[:8], 16) % 2**31
+
+
+def peak_rss_mb() -> float:
+    """Largest memory this process has held so far, in megabytes."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6, 1)

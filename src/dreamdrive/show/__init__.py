@@ -1,0 +1,1 @@
+"""All drawing: videos, panels, pictures of the geometry, renderings of drives."""

@@ -1,0 +1,6 @@
+"""Frames as a video model would have drawn them: what is wrong with generated video, put on a true clip."""
+
+from dreamdrive.world.corruption.apply import corrupt
+from dreamdrive.world.corruption.settings import PRESETS, Corruption, parse_corruption
+
+__all__ = ["PRESETS", "Corruption", "corrupt", "parse_corruption"]
