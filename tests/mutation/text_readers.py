@@ -24,8 +24,8 @@ from dreamdrive.prior.magicdrive.config import read_settings
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.camera import FARTHEST_M
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
-from tests.geometry.dust3r.network.test_config import CALL, HUB
-from tests.geometry.files import drives
+from tests.geometry.backends.dust3r.network.test_config import CALL, HUB
+from tests.geometry.backends.files import drives
 from tests.mutation.reader import Reader
 from tests.prior.magicdrive.tiny import official_configs
 from tests.streets import small_street
