@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from dreamdrive.decompose import GroupOptions, ScoreOptions
-from dreamdrive.decompose.actors import ActorOptions
+from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
 from dreamdrive.scene.deformation import DeformationConfig
 from dreamdrive.scene.hexplane import HexPlaneConfig

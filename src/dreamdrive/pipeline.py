@@ -19,42 +19,46 @@ from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, in
 from dreamdrive.geometry import backend_of, reconstruct
 from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.machine import available_cores, free_bytes
-from dreamdrive.models.hub import find_weights
+from dreamdrive.models import find_weights
 from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.prior import choose_prior, prior_of
-from dreamdrive.run.agreement import (
+from dreamdrive.progress import Progress, StageProgress
+from dreamdrive.run import (
+    REPORT,
+    STAGES,
+    Outcome,
+    Stages,
+    Storage,
+    Workspace,
+    announcement,
     check_clip,
     check_geometry,
     check_grouping,
+    check_memory,
     check_scene,
     check_scores,
     check_seeds,
     check_static,
-)
-from dreamdrive.run.cost import announcement, check_memory, plan
-from dreamdrive.run.held_out import score_baselines, score_scene
-from dreamdrive.run.lock import only_run
-from dreamdrive.run.outcome import Outcome, outcome_of, read_outcome
-from dreamdrive.run.report import describe
-from dreamdrive.run.stages import (
-    STAGES,
-    Progress,
-    StageProgress,
-    Stages,
-    Storage,
+    check_writable,
+    describe,
     digest,
     file_digest,
+    only_run,
+    open_workspace,
+    outcome_of,
+    plan,
+    read_outcome,
+    score_baselines,
+    score_scene,
     stage_seed,
 )
-from dreamdrive.run.workspace import REPORT, Workspace, check_writable, open_workspace
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.show.geometry import draw_geometry
-from dreamdrive.show.videos import Scored, lens_of, write_held_out, write_png, write_videos
+from dreamdrive.show import Scored, draw_geometry, lens_of, write_held_out, write_png, write_videos
 
 Say = Callable[[str], None]
 """Called with a sentence for somebody who waits."""

@@ -9,9 +9,10 @@ from tests.scene.scenes import make_scene
 
 from dreamdrive.data import Lens
 from dreamdrive.data.distortion import Distortion
+from dreamdrive.drive.manoeuvres import frame_rate, smooth, up_of
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.show.videos import _surround, as_recorded, frame_rate, lens_of, smooth, up_of, write_held_out
+from dreamdrive.show.videos import _surround, as_recorded, lens_of, write_held_out
 
 
 def distorted(scene: Scene) -> Scene:

@@ -8,7 +8,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
 
@@ -27,7 +27,7 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
         InputError: There is neither a scene nor the stages of one, or they are damaged or do not belong
             together.
     """
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
 
@@ -51,7 +51,7 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
     """A finished scene, with the geometry it was made from where that was kept."""
     import numpy as np
 
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
 
     scene = open_scene(out)
     about = scene.provenance
@@ -77,7 +77,7 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
 
 
 def _check_agreement(out: Path, clip: "Clip", geometry: "Geometry") -> None:
-    from dreamdrive.run.agreement import check_clip, check_geometry
+    from dreamdrive.run import check_clip, check_geometry
 
     try:
         check_clip(clip)

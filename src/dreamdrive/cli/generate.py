@@ -107,7 +107,7 @@ def generate(
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.pipeline import generate as run
-    from dreamdrive.run.outcome import lines_of
+    from dreamdrive.run import lines_of
     from dreamdrive.scene.control import Control
 
     stop_like_an_interruption()

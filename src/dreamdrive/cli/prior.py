@@ -85,7 +85,7 @@ def sample(
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.data.recording import rate_hz
-    from dreamdrive.run.sampling import sample as run
+    from dreamdrive.run import sample as run
     from dreamdrive.scene.control import Control
 
     control = Control(
@@ -161,7 +161,7 @@ def features(
     use_all_cores()
     _check_packages()
     from dreamdrive.cli.actions import parse_action
-    from dreamdrive.run.sampling import clip_features
+    from dreamdrive.run import clip_features
 
     options = {"block": block, "sigma": sigma, "channels": channels}
     console = Console(highlight=False)

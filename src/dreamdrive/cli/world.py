@@ -49,8 +49,18 @@ def make(
     from dreamdrive.data.layout_file import read_layout
     from dreamdrive.files.atomic import check_free
     from dreamdrive.machine import free_bytes
-    from dreamdrive.world import MOUNTS, Drive, Mount, StreetOptions, World, corruption, draw_street, drive
-    from dreamdrive.world.files import MARK, write_world
+    from dreamdrive.world import (
+        MARK,
+        MOUNTS,
+        Drive,
+        Mount,
+        StreetOptions,
+        World,
+        corruption,
+        draw_street,
+        drive,
+        write_world,
+    )
 
     wanted = parse_size(size)
     if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(wanted) < 16:

@@ -11,13 +11,11 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data import read_trajectory
-from dreamdrive.drive import MANOEUVRES, manoeuvre, resampled
-from dreamdrive.drive.manoeuvres import LANE_M
+from dreamdrive.drive.manoeuvres import LANE_M, MANOEUVRES, manoeuvre, resampled, smooth, up_of
 from dreamdrive.errors import InputError
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.show.videos import smooth, up_of
-from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.splat import render_scene
 
 RATES_HZ = (0.1, 240.0)
 """Rates that ``--fps`` takes: from a picture every ten seconds to the fastest that players show."""

@@ -9,12 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.cameras import odometry, sfm
-from dreamdrive.geometry.cameras.focal import settle
-from dreamdrive.geometry.cameras.paths import fill
-from dreamdrive.geometry.cameras.posing import MIN_TRACKS
-from dreamdrive.geometry.evidence.features import Features
-from dreamdrive.geometry.evidence.look import Evidence
+from dreamdrive.geometry.cameras import MIN_TRACKS, fill, odometry, settle, sfm
+from dreamdrive.geometry.evidence import Evidence, Features
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 

@@ -6,23 +6,4 @@ from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
 from dreamdrive.fit.motion import MotionConfig
 from dreamdrive.fit.static import StaticFit, fit_static
-from dreamdrive.fit.trainer import FitOptions, Progress
-
-__all__ = [
-    "Densifier",
-    "DensifySettings",
-    "FitOptions",
-    "GradientDensifier",
-    "LossName",
-    "MotionConfig",
-    "NoDensifier",
-    "Parts",
-    "Progress",
-    "Representation",
-    "SeedOptions",
-    "StaticFit",
-    "fit",
-    "fit_static",
-    "initialise",
-    "render_loss",
-]
+from dreamdrive.fit.trainer import FitOptions

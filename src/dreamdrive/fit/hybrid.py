@@ -9,8 +9,9 @@ from dreamdrive.fit.densify import DensifySettings, GradientDensifier
 from dreamdrive.fit.motion import MotionConfig, start_motion
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
-from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
+from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
+from dreamdrive.progress import Progress
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.deformation import Tracks

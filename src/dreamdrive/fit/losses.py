@@ -9,7 +9,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
-from dreamdrive.splat.arguments import check_dtype
+from dreamdrive.splat import check_dtype
 
 LossName = Literal["field", "paper"]
 # Weights of L1 and of 1 - SSIM. "paper" is eq. 14 as printed, unweighted; "field" is what 3DGS and its

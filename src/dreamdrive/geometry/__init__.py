@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.classical import CLASSICAL
+from dreamdrive.geometry.backends import CLASSICAL
 from dreamdrive.geometry.backends.dust3r import DUST3R
 from dreamdrive.geometry.backends.feedforward import FEED_FORWARD
-from dreamdrive.geometry.cameras.refine import refined
-from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
+from dreamdrive.geometry.cameras import refined
+from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.surround import reconstruct_cameras
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 

@@ -5,14 +5,23 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.cameras.posing import Posed
-from dreamdrive.geometry.depth.confidence import agreement, combine, temporal_neighbours
-from dreamdrive.geometry.depth.flanks import fill_flanks
-from dreamdrive.geometry.depth.one_frame import sweep_frames
-from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
-from dreamdrive.geometry.depth.view import Tell, View, make_view, single_threaded_opencv, unheard
-from dreamdrive.geometry.moving.evidence import FLAGGED, moving_evidence, standing_evidence
-from dreamdrive.geometry.road.upright import upright_depth
+from dreamdrive.geometry.cameras import Posed
+from dreamdrive.geometry.depth import (
+    Tell,
+    View,
+    above_horizon,
+    agreement,
+    combine,
+    fill_flanks,
+    make_view,
+    single_threaded_opencv,
+    sky_mask,
+    sweep_frames,
+    temporal_neighbours,
+    unheard,
+)
+from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.road import upright_depth
 from dreamdrive.scene.clip import Clip
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives

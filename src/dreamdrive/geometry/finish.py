@@ -5,16 +5,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.backends.classical import assemble
-from dreamdrive.geometry.cameras.paths import rebase
-from dreamdrive.geometry.cameras.posing import as_posed
-from dreamdrive.geometry.cameras.standing import stands
-from dreamdrive.geometry.dense import StaticDepth, densify
-from dreamdrive.geometry.evidence.look import Evidence
+from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
+from dreamdrive.geometry.dense import Dense, StaticDepth, densify
+from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.moving import compared_with_traffic
+from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
 from dreamdrive.geometry.road import scale as scales
-from dreamdrive.geometry.road.known_depth import MIN_RATIOS, depth_points, in_metres
-from dreamdrive.geometry.road.scale import Metric, Street
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 
@@ -62,6 +59,35 @@ def finish(
     known = in_metres(clip, _of_known(clip, metres, still))
     dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
     return assemble(clip, posed, dense)
+
+
+def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
+    """What both halves found, as the next stages take it."""
+    used = ~clip.held_out
+    shares = {
+        "depth_share": float((dense.depth_m[used] > 0).mean()),
+        "confident_share": float((dense.confidence[used] > 0.25).mean()),
+        "sky_share": float(dense.sky[used].mean()),
+        "moving_share": float((dense.moving[used] >= 0.5).mean()),
+    }
+    geometry = Geometry(
+        cameras=posed.cameras,
+        depth_m=dense.depth_m,
+        confidence=dense.confidence,
+        sky=dense.sky,
+        moving=dense.moving,
+        fixed_regions=posed.fixed_regions[None],
+        region_names=posed.region_names,
+        ground=posed.ground,
+        scale=posed.scale,
+        focal=posed.focal,
+        detected=posed.detected,
+        fallback=posed.fallback,
+        details={**posed.details, **shares},
+        fallback_kind=posed.fallback_kind,
+        placed=posed.placed,
+    )
+    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 def _rough_factor(measured: Measured) -> float:

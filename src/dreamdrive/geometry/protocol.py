@@ -1,20 +1,13 @@
 """What every way of getting geometry has in common."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from dreamdrive.models.backend import Backend
+from dreamdrive.models import Backend
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-
-Progress = Callable[[int, int], None]
-"""Called with steps done and steps in all."""
-
-
-def silent(done: int, total: int) -> None:
-    """Progress that nobody watches."""
 
 
 @runtime_checkable

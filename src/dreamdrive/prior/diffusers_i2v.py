@@ -18,8 +18,9 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 

@@ -14,8 +14,8 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.machine import best_device
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
+from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory

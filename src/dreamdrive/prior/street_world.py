@@ -10,7 +10,8 @@ from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import check_largest
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.world import Drive, StreetOptions, draw_street, drive

@@ -11,7 +11,7 @@ from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES, QualityName
-from dreamdrive.prior.street_world import FRAMES, SIZE
+from dreamdrive.prior import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
 from dreamdrive.run.outcome import duration
 from dreamdrive.scene.control import Control

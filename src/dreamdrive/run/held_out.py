@@ -11,8 +11,7 @@ from jaxtyping import Bool, Float, UInt8
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat import ssim_map
-from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.splat import render_scene, ssim_map
 
 
 @dataclass(frozen=True)

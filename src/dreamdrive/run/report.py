@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from dreamdrive import __version__
-from dreamdrive.evaluate.paths import compare_paths
+from dreamdrive.evaluate import compare_paths
 from dreamdrive.run.held_out import Likeness
 from dreamdrive.run.judge import facts_of, limits_of, rough_because
 from dreamdrive.run.stages import StageRecord

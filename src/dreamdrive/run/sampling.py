@@ -11,9 +11,9 @@ from dreamdrive.data.recording import ABOUT, write_recording
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import check_free
-from dreamdrive.models.hub import find_weights
+from dreamdrive.models import find_weights
 from dreamdrive.prior import choose_prior, prior_of
-from dreamdrive.prior.protocol import Progress, silent
+from dreamdrive.progress import Progress, silent
 from dreamdrive.run.stages import file_digest
 from dreamdrive.scene.action import Action
 from dreamdrive.scene.clip import Clip
@@ -114,7 +114,7 @@ def clip_features(
     Raises:
         InputError: The clip, the weights or an option cannot be used, or the file cannot be written.
     """
-    from dreamdrive.prior.vista.features import FeatureOptions, video_features
+    from dreamdrive.prior.vista import FeatureOptions, video_features
 
     if out.suffix != ".safetensors":
         raise InputError(f"-o {out}: expected a name that ends in .safetensors")

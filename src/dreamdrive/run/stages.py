@@ -15,6 +15,7 @@ from dreamdrive import __version__
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import of_type
 from dreamdrive.files.paths import inside, open_file
+from dreamdrive.progress import Progress, StageProgress
 from dreamdrive.run import codec
 
 STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
@@ -22,12 +23,6 @@ STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
 
 FORMAT = 3
 """Version of what is stored; a change makes all older results unknown."""
-
-Progress = Callable[[int, int], None]
-"""Called with steps done and steps in all."""
-
-StageProgress = Callable[[str, int, int], None]
-"""Called with a stage's name, steps done and steps in all; 0 in all where a stage cannot count its steps."""
 
 T = TypeVar("T")
 _log = logging.getLogger("dreamdrive")

@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.evaluate.estimate import Estimate
-from dreamdrive.evaluate.geometry_truth import GeometryTruth
+from dreamdrive.evaluate import Estimate, GeometryTruth
 from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.show.panels import Image, depth_colours, labelled
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from dreamdrive.drive.drives import Drive
+from dreamdrive.drive import Drive
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import inside
 from dreamdrive.show.rendering import Look

@@ -13,7 +13,7 @@ from jaxtyping import UInt8, UInt16
 
 from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
-from dreamdrive.drive.drives import RATES_HZ, Drive
+from dreamdrive.drive import RATES_HZ, Drive, frame_rate
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
 from dreamdrive.machine import free_bytes
@@ -21,8 +21,8 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
-from dreamdrive.show.videos import frame_rate, write_png
-from dreamdrive.splat.scene_view import SceneView, render_scene
+from dreamdrive.show.videos import write_png
+from dreamdrive.splat import SceneView, render_scene
 
 Show = Literal["colour", "depth", "dynamic", "static"]
 Format = Literal["mp4", "png", "npz"]

@@ -13,20 +13,17 @@ from torch import Tensor
 
 from dreamdrive.data import Lens
 from dreamdrive.data.video_writer import write_video
-from dreamdrive.drive import manoeuvre, resampled
+from dreamdrive.drive import frame_rate, manoeuvre, smooth, up_of
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
-from dreamdrive.run.stages import Progress
+from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
-from dreamdrive.splat import render
-from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.splat import render, render_scene
 
-SMOOTH_HZ = 20.0
-"""Videos of drives have at least this rate: a scene has a view at any time, not only at recorded ones."""
 SHIFT_M = 2.0
 """How far to the right the shifted drive goes."""
 
@@ -135,23 +132,6 @@ def as_recorded(
         return panels.to_bytes(render_scene(scene, camera, t_s, of_rig=of_rig).colour.numpy())
     wide = lens.covering().at(camera.world_from_camera)
     return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s, of_rig=of_rig).colour.numpy(), wide))
-
-
-def frame_rate(path: Trajectory) -> float:
-    """Frames a second of a drive: one over the median step; 10 for a single pose."""
-    return float(1 / np.median(np.diff(path.times_s))) if len(path) > 1 else 10.0
-
-
-def smooth(path: Trajectory) -> Trajectory:
-    """A drive with as many poses between the recorded ones as ``SMOOTH_HZ`` takes."""
-    rate = frame_rate(path)
-    return resampled(path, rate * float(np.ceil(SMOOTH_HZ / rate)))
-
-
-def up_of(scene: Scene) -> Float[np.ndarray, "3"]:
-    """Unit vector away from the road; that of a level camera where no road was found."""
-    up: Any = scene.provenance.get("up")
-    return np.array([0.0, -1.0, 0.0] if up is None else up, dtype=np.float64)
 
 
 def lens_of(scene: Scene) -> Lens | None:

@@ -1,15 +1,14 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-from dreamdrive.geometry.cameras.mapping import STEPS
-from dreamdrive.geometry.cameras.posing import Posed, pose_clip
-from dreamdrive.geometry.dense import PASSES, Dense, densify
-from dreamdrive.geometry.moving.traffic import compared_with_traffic
-from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
-from dreamdrive.geometry.road.known_depth import in_metres
+from dreamdrive.geometry.cameras import STEPS, pose_clip
+from dreamdrive.geometry.dense import PASSES, densify
+from dreamdrive.geometry.finish import assemble
+from dreamdrive.geometry.protocol import GeometryBackend
+from dreamdrive.geometry.road import in_metres
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -48,35 +47,6 @@ def _counted(progress: Progress, start: int, each: int, total: int) -> Callable[
 
     progress(start, total)
     return tell
-
-
-def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
-    """What both halves found, as the next stages take it."""
-    used = ~clip.held_out
-    shares = {
-        "depth_share": float((dense.depth_m[used] > 0).mean()),
-        "confident_share": float((dense.confidence[used] > 0.25).mean()),
-        "sky_share": float(dense.sky[used].mean()),
-        "moving_share": float((dense.moving[used] >= 0.5).mean()),
-    }
-    geometry = Geometry(
-        cameras=posed.cameras,
-        depth_m=dense.depth_m,
-        confidence=dense.confidence,
-        sky=dense.sky,
-        moving=dense.moving,
-        fixed_regions=posed.fixed_regions[None],
-        region_names=posed.region_names,
-        ground=posed.ground,
-        scale=posed.scale,
-        focal=posed.focal,
-        detected=posed.detected,
-        fallback=posed.fallback,
-        details={**posed.details, **shares},
-        fallback_kind=posed.fallback_kind,
-        placed=posed.placed,
-    )
-    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 CLASSICAL = GeometryBackend(

@@ -9,8 +9,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.paths import path_length
-from dreamdrive.geometry.evidence.look import Evidence
-from dreamdrive.geometry.evidence.motion import track
+from dreamdrive.geometry.evidence import Evidence, track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 

@@ -11,9 +11,8 @@ from jaxtyping import Bool, UInt8
 from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
-from dreamdrive.geometry.depth.view import Tell, unheard
-from dreamdrive.geometry.evidence import features
-from dreamdrive.geometry.evidence.features import Features
+from dreamdrive.geometry.depth import Tell, unheard
+from dreamdrive.geometry.evidence import Features, features
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Fallback
 

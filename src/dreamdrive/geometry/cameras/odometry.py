@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.geometry.evidence.motion import track
-from dreamdrive.geometry.road.ground_sweep import Pair, Road
+from dreamdrive.geometry.evidence import track
+from dreamdrive.geometry.road import Pair, Road
 from dreamdrive.scene.camera import Camera
 
 STILL_PX, MOVING_PX = 0.35, 1.0

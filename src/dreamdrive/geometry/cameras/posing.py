@@ -10,12 +10,10 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras import contradiction, odometry
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
-from dreamdrive.geometry.depth.view import Tell, unheard
+from dreamdrive.geometry.depth import Tell, unheard
+from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.evidence import look as looking
-from dreamdrive.geometry.evidence.look import Evidence
-from dreamdrive.geometry.road import scale
-from dreamdrive.geometry.road.known_depth import depth_points, depth_ratios
-from dreamdrive.geometry.road.scale import Metric, Street
+from dreamdrive.geometry.road import Metric, Street, depth_points, depth_ratios, scale
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Fallback, Focal, Ground, Scale

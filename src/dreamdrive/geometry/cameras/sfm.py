@@ -10,7 +10,7 @@ import numpy as np
 import pycolmap
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.evidence.features import Features
+from dreamdrive.geometry.evidence import Features
 from dreamdrive.scene.camera import Camera
 
 OVERLAP = 5

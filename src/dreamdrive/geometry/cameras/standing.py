@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.evidence.look import Evidence
+from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.scene.clip import Clip
 
 STANDING_M = 0.5

@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth.sweep import Correlation, Warp, sample
-from dreamdrive.geometry.depth.view import View
+from dreamdrive.geometry.depth import Correlation, View, Warp, sample
 from dreamdrive.geometry.moving.flow import PairFlow
 
 _PLANE_SHARE = 0.85  # static things are no farther than this share of the plane's inverse depth

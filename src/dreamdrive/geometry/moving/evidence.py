@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth.sweep import sample
-from dreamdrive.geometry.depth.view import View, by_frame
+from dreamdrive.geometry.depth import View, by_frame, sample
 from dreamdrive.geometry.moving import contest
 from dreamdrive.geometry.moving.floating import Floating, floating
 from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows

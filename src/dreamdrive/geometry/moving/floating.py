@@ -12,8 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.geometry.depth.sweep import Warp
-from dreamdrive.geometry.depth.view import View
+from dreamdrive.geometry.depth import View, Warp
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.moving.misfit import misfit
 from dreamdrive.scene.linked_pixels import linked_pixels

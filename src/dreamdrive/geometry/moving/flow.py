@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth.sweep import Correlation, Warp, inside, sample
-from dreamdrive.geometry.depth.view import View, parallel
+from dreamdrive.geometry.depth import Correlation, View, Warp, inside, parallel, sample
 
 OFFSETS = (-4, -2, -1, 1, 2, 4)  # neighbours in the order of the used frames
 _WINDOW_PX = 9

@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.depth.sweep import inside, sample
-from dreamdrive.geometry.depth.view import View
+from dreamdrive.geometry.depth import View, inside, sample
 
 _CAP = 25.0  # grey levels
 _WINDOW_PX = 3

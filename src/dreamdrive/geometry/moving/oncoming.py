@@ -14,8 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.geometry.depth.sweep import Warp, inside, on_plane, sample
-from dreamdrive.geometry.depth.view import View, by_frame
+from dreamdrive.geometry.depth import View, Warp, by_frame, inside, on_plane, sample
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
 _BACKGROUND = (0.0, 0.012, 0.024)  # 1/m; what is behind it, beside the road

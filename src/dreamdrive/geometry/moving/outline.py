@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.geometry.depth.sweep import Warp
-from dreamdrive.geometry.depth.view import View
+from dreamdrive.geometry.depth import View, Warp
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
 from dreamdrive.geometry.moving.graph_cut import minimum_cut
 from dreamdrive.geometry.moving.misfit import misfit

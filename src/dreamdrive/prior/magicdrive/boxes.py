@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.scene.layout import BoxKind, Layout, track_function
-from dreamdrive.world.world import upright
+from dreamdrive.world import upright
 
 CLASSES = (
     "car",

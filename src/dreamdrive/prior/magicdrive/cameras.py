@@ -12,7 +12,7 @@ from jaxtyping import Float
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Ego, track_function
-from dreamdrive.world.world import upright
+from dreamdrive.world import upright
 
 FULL_SIZE = (1600, 900)
 """Width and height of the pictures that the intrinsics belong to."""

@@ -15,7 +15,7 @@ from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.machine import best_device
-from dreamdrive.models.weights import check_sizes, fill, read_state, sha256
+from dreamdrive.models import check_sizes, fill, read_state, sha256
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings

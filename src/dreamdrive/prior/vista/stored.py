@@ -12,7 +12,7 @@ from torch import Tensor
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
-from dreamdrive.models.weights import check_sizes, in_words, misfits, some
+from dreamdrive.models import check_sizes, in_words, misfits, some
 from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind

@@ -2,5 +2,3 @@
 
 from dreamdrive.world.corruption.apply import corrupt
 from dreamdrive.world.corruption.settings import PRESETS, Corruption, parse_corruption
-
-__all__ = ["PRESETS", "Corruption", "corrupt", "parse_corruption"]

@@ -7,27 +7,35 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.backends.dust3r.align.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
-from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
-from dreamdrive.geometry.backends.dust3r.network.images import fitting
-from dreamdrive.geometry.backends.dust3r.network.inference import BUDGET_BYTES, infer
-from dreamdrive.geometry.backends.dust3r.network.memory import plan_memory
+from dreamdrive.geometry.backends.dust3r.align import (
+    Aligned,
+    AlignOptions,
+    Known,
+    align,
+    check_budget,
+    predicted_bytes,
+)
+from dreamdrive.geometry.backends.dust3r.network import (
+    BUDGET_BYTES,
+    Dust3r,
+    fitting,
+    infer,
+    load_dust3r,
+    plan_memory,
+)
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
-from dreamdrive.geometry.cameras import contradiction
-from dreamdrive.geometry.cameras.standing import stands, without_poses
-from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
-from dreamdrive.geometry.evidence.look import Evidence, free_pixels, look
+from dreamdrive.geometry.cameras import contradiction, stands, without_poses
+from dreamdrive.geometry.depth import above_horizon, sky_mask
+from dreamdrive.geometry.evidence import Evidence, free_pixels
+from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
-from dreamdrive.geometry.moving.evidence import FLAGGED
-from dreamdrive.geometry.protocol import Progress, silent
+from dreamdrive.geometry.moving import FLAGGED
 from dreamdrive.machine import best_device
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.machine import best_device
-from dreamdrive.models.weights import as_state, check_sizes, fill, read_state, read_torch
+from dreamdrive.models import as_state, check_sizes, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)
 _NAMES = ("model.safetensors", "model.pt", "model.pth")

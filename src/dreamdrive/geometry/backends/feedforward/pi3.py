@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from dreamdrive.geometry.backends.dust3r.align.focal import robust_px
+from dreamdrive.geometry.backends.dust3r.align import robust_px
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.poses import nearest_rigid

@@ -13,14 +13,14 @@ from dreamdrive.geometry.backends.feedforward.camera import SharedCamera, seen_t
 from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
 from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show
-from dreamdrive.geometry.cameras import contradiction
-from dreamdrive.geometry.cameras.standing import stands, unit_in, without_poses
-from dreamdrive.geometry.evidence.look import free_pixels, look
+from dreamdrive.geometry.cameras import contradiction, stands, unit_in, without_poses
+from dreamdrive.geometry.evidence import free_pixels
+from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
-from dreamdrive.geometry.protocol import Progress, silent
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry

@@ -6,5 +6,3 @@ reader in a module of its own, which states its conventions and returns the same
 
 from dreamdrive.geometry.backends.files.attach import attach
 from dreamdrive.geometry.backends.files.formats import EXPECTED, bent_model, companions
-
-__all__ = ["EXPECTED", "attach", "bent_model", "companions"]

@@ -15,7 +15,7 @@ from dreamdrive.geometry.backends.files.formats import recognise
 from dreamdrive.geometry.backends.files.given import DepthFiles, Given
 from dreamdrive.geometry.backends.files.onto_clip import OntoClip
 from dreamdrive.geometry.backends.files.wanted import Wanted
-from dreamdrive.geometry.road.known_depth import depth_ratios, factor_of
+from dreamdrive.geometry.road import depth_ratios, factor_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 

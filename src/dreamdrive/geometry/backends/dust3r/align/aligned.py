@@ -13,7 +13,7 @@ from dreamdrive.geometry.backends.dust3r.align.samples import Dense
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.cameras.standing import unit_in
+from dreamdrive.geometry.cameras import unit_in
 from dreamdrive.scene.similarity import Similarity
 
 _NETWORK_FOCAL = 0.05  # relative; how far all pairs may be off together, however well they agree

@@ -23,7 +23,7 @@ from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.camera import check_rigid
-from dreamdrive.splat.torch_threads import one_torch_thread
+from dreamdrive.splat import one_torch_thread
 
 _FLOOR = 1e-4  # of the median depth: distances below it weigh no more
 _COARSE = 1e-3  # gain of a step at which the paper's loss is left for the robust one

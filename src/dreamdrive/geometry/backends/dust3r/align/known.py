@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import BASE_SCALE, Start
-from dreamdrive.geometry.cameras.registration import register
+from dreamdrive.geometry.cameras import register
 from dreamdrive.scene.similarity import Similarity
 
 _STANDING = 1e-9

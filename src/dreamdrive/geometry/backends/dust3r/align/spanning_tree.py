@@ -11,7 +11,7 @@ from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_px
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.cameras.registration import register
+from dreamdrive.geometry.cameras import register
 from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs

@@ -20,7 +20,7 @@ from dreamdrive.geometry.backends.dust3r.network.config import (
     config_from_shapes,
 )
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
-from dreamdrive.models.weights import as_state, fill_network, read_state, read_torch
+from dreamdrive.models import as_state, fill_network, read_state, read_torch
 
 EXPECTED = (
     "a DUSt3R model: DUSt3R_ViTLarge_BaseDecoder_512_dpt.pth or the like, or the folder of its hub form "

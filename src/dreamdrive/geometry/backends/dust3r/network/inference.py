@@ -13,7 +13,7 @@ from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap
 from dreamdrive.geometry.backends.dust3r.network.images import as_input
 from dreamdrive.geometry.backends.dust3r.network.memory import Size, plan_memory
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.protocol import Progress, silent
+from dreamdrive.progress import Progress, silent
 
 BUDGET_BYTES = 8 * 10**9
 """Memory allowed by default. Not what the machine has free: the size of a batch shows in the last digits."""

@@ -13,9 +13,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align.areas import Normalisation, half_areas
-from dreamdrive.geometry.backends.dust3r.align.graph import Graph
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import BASE_SCALE, Start
+from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Normalisation, Start, half_areas
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.similarity import Similarity
 

@@ -3,10 +3,14 @@
 import numpy as np
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.align.focal import FocalRule, focal_px
-from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
-from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import PNP_CONFIDENCE, Start
+from dreamdrive.geometry.backends.dust3r.align import (
+    PNP_CONFIDENCE,
+    FocalRule,
+    Start,
+    focal_px,
+    graph_of,
+    pose_by_pnp,
+)
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 
 _PNP_STEPS = 100
