@@ -9,8 +9,9 @@ import pytest
 import torch
 from tests.streets import small_street, street_clip, true_geometry
 
+from dreamdrive import progress
 from dreamdrive.errors import InputError
-from dreamdrive.run import codec
+from dreamdrive.run import codec, stages
 from dreamdrive.run.stages import STAGES, Stages, Storage, digest, file_digest, stage_seed
 from dreamdrive.scene.geometry import Geometry
 
@@ -23,18 +24,18 @@ class Work:
         self.seen: list[tuple[str, int, int]] = []
         self.stages = Stages(folder, recompute_from, lambda *step: self.seen.append(step), lambda: None)
 
-    def run(self, name: str, after: tuple[str, ...] = (), options: object = None) -> torch.Tensor:
+    def run(self, name: str, options: object = None) -> torch.Tensor:
         def compute(progress: object) -> torch.Tensor:
             self.calls.append(name)
             progress(1, 1)  # type: ignore[operator]
             return torch.arange(5.0)
 
-        return self.stages.run(name, after, options, compute)
+        return self.stages(name, options, compute)
 
     def chain(self) -> None:
         self.run("prior")
-        self.run("geometry", ("prior",))
-        self.run("initialise", ("prior", "geometry"))
+        self.run("geometry")
+        self.run("initialise")
 
 
 def test_a_result_is_computed_once(tmp_path: Path) -> None:
@@ -51,8 +52,8 @@ def test_a_changed_option_recomputes_the_stage_and_what_follows(tmp_path: Path) 
     Work(tmp_path).chain()
     work = Work(tmp_path)
     work.run("prior")
-    work.run("geometry", ("prior",), {"height_m": 2.2})
-    work.run("initialise", ("prior", "geometry"))
+    work.run("geometry", {"height_m": 2.2})
+    work.run("initialise")
     assert work.calls == ["geometry", "initialise"]
 
 
@@ -104,7 +105,7 @@ def test_an_interrupted_stage_leaves_the_earlier_ones(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        work.stages.run("geometry", ("prior",), None, killed)
+        work.stages("geometry", None, killed)
     again = Work(tmp_path)
     again.chain()
     assert again.calls == ["geometry", "initialise"]
@@ -155,22 +156,65 @@ def test_only_known_nouns_are_stored_or_read(tmp_path: Path) -> None:
         codec.read(tmp_path)
 
 
-def test_other_storage_is_used_for_values_of_its_kind(tmp_path: Path) -> None:
+def test_a_stage_of_other_storage_is_kept_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def read(path: Path) -> str:
         if not path.exists():
             raise InputError("gone")
         return path.read_text()
 
     storage = Storage(write=lambda path, value: _write_text(path, value), read=read)
+    monkeypatch.setitem(stages._STORAGE, "fit", storage)  # type: ignore[arg-type]
     for expected in (["made"], []):
         calls: list[str] = []
-        work = Work(tmp_path)
-        value = work.stages.run(
-            "fit", (), None, lambda _, calls=calls: calls.append("made") or "text", storage
-        )
+        value = Work(tmp_path).stages("fit", None, lambda _, calls=calls: calls.append("made") or "text")
         assert (value, calls) == ("text", expected)
     (tmp_path / "fit" / "value").unlink()
-    assert Work(tmp_path).stages.run("fit", (), None, lambda _: "again", storage) == "again"
+    assert Work(tmp_path).stages("fit", None, lambda _: "again") == "again"
+
+
+def test_another_program_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Work(tmp_path).chain()
+    monkeypatch.setattr(stages, "program_digest", lambda: "of another version")
+    work = Work(tmp_path)
+    work.chain()
+    assert work.calls == ["prior", "geometry", "initialise"]
+
+
+def test_what_is_given_is_not_computed_and_counts_by_its_content(tmp_path: Path) -> None:
+    for given, expected in (
+        (torch.zeros(3), ["initialise"]),
+        (torch.zeros(3), []),
+        (torch.ones(3), ["initialise"]),
+    ):
+        work = Work(tmp_path)
+        assert work.stages("geometry", None, lambda _: torch.ones(9), given=given) is given
+        work.run("initialise")
+        assert work.calls == expected
+
+
+def test_a_kill_inside_a_stage_leaves_its_finished_parts(tmp_path: Path) -> None:
+    made: list[str] = []
+
+    def part(name: str) -> torch.Tensor:
+        made.append(name)
+        return torch.arange(3.0)
+
+    def stage(work: progress.Work, killed: bool) -> torch.Tensor:
+        first = work.keep("first", lambda: part("first"))
+        if killed:
+            raise KeyboardInterrupt
+        return first + work.part(1, 2).keep("first", lambda: part("second"))
+
+    with pytest.raises(KeyboardInterrupt):
+        Work(tmp_path).stages("geometry", "slow", lambda work: stage(work, killed=True))
+    work = Work(tmp_path)
+    assert work.stages("geometry", "slow", lambda work: stage(work, killed=False)).tolist() == [0, 2, 4]
+    assert made == ["first", "second"]
+    assert not (tmp_path / "geometry.parts").exists()
+    work = Work(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        work.stages("geometry", "other", lambda work: stage(work, killed=True))
+    assert made == ["first", "second", "first"]
 
 
 def test_a_full_disk_is_one_clear_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,11 +77,11 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
 
 
 def _check_agreement(out: Path, clip: "Clip", geometry: "Geometry") -> None:
-    from dreamdrive.run import check_clip, check_geometry
+    from dreamdrive.run import check
 
     try:
-        check_clip(clip)
-        check_geometry(clip, geometry)
+        check.clip(clip)
+        check.geometry(clip, geometry)
     except ValueError as error:
         raise InputError(f"{out}: its stages do not belong together ({error}); run generate again") from error
 

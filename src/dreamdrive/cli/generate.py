@@ -1,6 +1,7 @@
 """``dreamdrive generate``: from a recording to a scene and its videos."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -106,6 +107,8 @@ def generate(
     """
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
+    from dreamdrive.geometry import GeometryOptions
+    from dreamdrive.options import QUALITIES
     from dreamdrive.pipeline import generate as run
     from dreamdrive.run import lines_of
     from dreamdrive.scene.control import Control
@@ -127,20 +130,18 @@ def generate(
         hold_out=hold_out,
         seed=seed,
     )
+    how = GeometryOptions(geometry, None, camera_height, refine_poses)
+    chosen = replace(QUALITIES[quality], geometry=how, representation=representation)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(
             control,
             out,
             prior=prior,
-            geometry_method=geometry,
             geometry_files=geometry_files,
-            refine_poses=refine_poses,
             weights=weights,
             geometry_weights=geometry_weights,
-            quality=quality,
-            representation=representation,
-            camera_height_m=camera_height,
+            options=chosen,
             recompute_from=recompute_from,
             force=force,
             progress=bars,

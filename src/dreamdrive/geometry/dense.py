@@ -22,6 +22,7 @@ from dreamdrive.geometry.depth import (
 )
 from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
 from dreamdrive.geometry.road import upright_depth
+from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
@@ -56,7 +57,13 @@ class StaticDepth:
     confidence: Float[np.ndarray, "f h w"]
 
 
-def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell: Tell = unheard) -> Dense:
+def densify(
+    clip: Clip,
+    posed: Posed,
+    measured: StaticDepth | None = None,
+    tell: Tell = unheard,
+    keep: Keep = at_once,
+) -> Dense:
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
@@ -70,6 +77,7 @@ def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell:
         posed: Their cameras.
         measured: Depth to take in place of the plane sweep's, such as a network's.
         tell: Called for each frame of each pass, of which there are ``PASSES`` at most.
+        keep: Keeps the depth that was swept.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
     given = clip.known.depth_m is not None
@@ -85,7 +93,7 @@ def densify(clip: Clip, posed: Posed, measured: StaticDepth | None = None, tell:
         elif rough:
             inverse, confidence = _plane_and_backdrop(view)
         else:
-            inverse, confidence = _swept(view, sky)
+            inverse, confidence = keep("swept", lambda: _swept(view, sky))
         moving = _moving(view, inverse, confidence, sky, given, posed) * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)

@@ -54,7 +54,7 @@ def finish(
     # Of a standing clip it is not that of the poses, as which others read it.
     details = measured.details if still else {**measured.details, "metres_per_unit": metres}
     posed = as_posed(clip, evidence, poses, measured.camera, metric, measured.focal_observed, notes, details)
-    posed = replace(posed, standing=still)
+    posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
     dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
@@ -86,6 +86,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         details={**posed.details, **shares},
         fallback_kind=posed.fallback_kind,
         placed=posed.placed,
+        metres_per_unit=posed.metres_per_unit,
     )
     return replace(geometry, scale=compared_with_traffic(geometry))
 

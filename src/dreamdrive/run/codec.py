@@ -20,6 +20,8 @@ from dreamdrive.files.json_file import parse_json
 from dreamdrive.files.paths import TEXT_BYTES, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, read_own
 from dreamdrive.fit import StaticFit
+from dreamdrive.geometry.cameras import Posed
+from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.exposure import Exposure
@@ -40,6 +42,8 @@ NOUNS: dict[str, type] = {
         Ground,
         Grouping,
         Known,
+        Measured,
+        Posed,
         Scale,
         Sky,
         StaticFit,

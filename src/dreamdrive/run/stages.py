@@ -7,24 +7,30 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field, is_dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast, runtime_checkable
 
-from dreamdrive import __version__
+import numpy as np
+import torch
+
+from dreamdrive import _native
 from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import remove
 from dreamdrive.files.json_file import of_type
 from dreamdrive.files.paths import inside, open_file
-from dreamdrive.progress import Progress, StageProgress
+from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run import codec
+from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.scene.scene import Scene
 
 STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
 """All stages in their order; each result depends on some of those before it."""
 
-FORMAT = 3
-"""Version of what is stored; a change makes all older results unknown."""
-
 T = TypeVar("T")
+U = TypeVar("U")
 _log = logging.getLogger("dreamdrive")
 
 
@@ -56,56 +62,97 @@ class Storage(Generic[T]):
     read: Callable[[Path], T]
 
 
+_STORAGE = {"fit": Storage[Scene](lambda path, scene: save_scene(scene, path, replace=True), load_scene)}
+"""Results that ``codec`` does not know."""
+
+
+def trusted(value: object) -> None:
+    """No check."""
+
+
+@runtime_checkable
+class Run(Protocol):
+    """What gives the result of a stage: ``call`` computes it, ``Stages`` keeps it on disk."""
+
+    def __call__(
+        self,
+        name: str,
+        options: object,
+        compute: Callable[[Work], T],
+        *,
+        check: Callable[[T], None] = trusted,
+        given: T | None = None,
+    ) -> T:
+        """The result.
+
+        Args:
+            name: One of ``STAGES``.
+            options: All that the result depends on beside the results before it.
+            compute: Makes the result.
+            check: Raises ``ValueError`` where a stored result does not belong to those before it.
+            given: The result, where it is known already.
+        """
+        ...
+
+
+def call(
+    name: str,
+    options: object,
+    compute: Callable[[Work], T],
+    *,
+    check: Callable[[T], None] = trusted,
+    given: T | None = None,
+) -> T:
+    """A ``Run`` that keeps nothing."""
+    return compute(Work()) if given is None else given
+
+
 @dataclass
 class Stages:
-    """Runs stages, or reads what an earlier run of the same stages left.
+    """A ``Run`` that reads what an earlier run of the same stages left, and leaves what it computes.
+
+    The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
+    result is found again only by the program that made it.
 
     Attributes:
         folder: One folder a stage is kept in here.
         recompute_from: Results of this stage and all later ones are not read.
         progress: Told of every step.
         claim: Called before something is written.
-        keys: Key of each stage that ran.
         records: Cost of each stage that ran.
+        results: Result of each stage that ran, or was given.
     """
 
     folder: Path
     recompute_from: str | None
     progress: StageProgress
     claim: Callable[[], None]
-    keys: dict[str, str] = field(default_factory=dict)
     records: dict[str, StageRecord] = field(default_factory=dict)
+    results: dict[str, Any] = field(default_factory=dict)
+    _last: str = field(default="", init=False)
 
-    def run(
+    def __call__(
         self,
         name: str,
-        after: tuple[str, ...],
         options: object,
-        compute: Callable[[Progress], T],
-        storage: Storage[T] | None = None,
-        check: Callable[[T], None] = lambda _: None,
+        compute: Callable[[Work], T],
+        *,
+        check: Callable[[T], None] = trusted,
+        given: T | None = None,
     ) -> T:
-        """The result of a stage.
+        """See ``Run``; a computed result is stored and read back, so that what follows sees no difference."""
+        self._last = digest([name, program_digest(), options if given is None else given, self._last])
+        value = self._kept(name, compute, check) if given is None else given
+        self.results[name] = value
+        return value
 
-        A computed result is stored and read back, so that what later stages see never depends on whether it
-        was just computed.
-
-        Args:
-            name: One of ``STAGES``.
-            after: The stages whose results it uses.
-            options: Everything else the result depends on, as a dataclass or JSON values.
-            compute: Makes the result.
-            storage: For results that ``codec`` does not know.
-            check: Raises ``ValueError`` where a stored result does not belong to those it was made from.
-        """
-        key = digest([name, FORMAT, __version__, options, [self.keys[other] for other in after]])
-        self.keys[name] = key
+    def _kept(self, name: str, compute: Callable[[Work], T], check: Callable[[T], None]) -> T:
         folder = inside(self.folder, name)
         fresh = self.recompute_from is not None and STAGES.index(name) >= STAGES.index(self.recompute_from)
         found = None if fresh else _header(folder)
-        if found is not None and found.key == key:
+        if found is not None and found.key == self._last:
             try:
-                value = _load(folder, storage)
+                value = cast(T, _load(folder, _STORAGE.get(name)))
                 check(value)
             except ValueError as error:
                 _log.warning("%s is computed again: %s", name, error)
@@ -113,7 +160,7 @@ class Stages:
                 self.records[name] = StageRecord(found.seconds, found.peak_rss_mb, cached=True)
                 self.progress(name, 1, 1)
                 return value
-        return self._compute(name, key, compute, storage)
+        return self._compute(name, self._last, compute)
 
     def measure(self, name: str, compute: Callable[[Progress], T]) -> T:
         """Run something that is not kept, and record what it cost."""
@@ -132,15 +179,27 @@ class Stages:
             tell(whole, whole)
         return value
 
-    def _compute(
-        self, name: str, key: str, compute: Callable[[Progress], T], storage: Storage[T] | None
-    ) -> T:
-        value = self.measure(name, compute)
+    def _compute(self, name: str, key: str, compute: Callable[[Work], T]) -> T:
+        parts = inside(self.folder, f"{name}.parts")
+
+        def keep(part: str, make: Callable[[], U]) -> U:
+            place = parts / part
+            found = _header(place)
+            if found is not None and found.key == key:
+                with suppress(InputError):
+                    return cast(U, codec.read(place))
+            value = make()
+            self.claim()
+            codec.write(place, value, asdict(_Header(key, 0, 0)))
+            return cast(U, codec.read(place))
+
+        value = self.measure(name, lambda tell: compute(Work(tell, keep)))
         record = self.records[name]
         self.claim()
-        folder = inside(self.folder, name)
+        folder, storage = inside(self.folder, name), _STORAGE.get(name)
         _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)), storage)
-        return _load(folder, storage)
+        remove(parts)
+        return cast(T, _load(folder, storage))
 
 
 @dataclass(frozen=True)
@@ -161,7 +220,7 @@ def _header(folder: Path) -> _Header | None:
         return None
 
 
-def _store(folder: Path, value: T, header: dict[str, Any], storage: Storage[T] | None) -> None:
+def _store(folder: Path, value: object, header: dict[str, Any], storage: Storage[Any] | None) -> None:
     if storage is None:
         codec.write(folder, value, header)
         return
@@ -171,22 +230,37 @@ def _store(folder: Path, value: T, header: dict[str, Any], storage: Storage[T] |
     codec.write(folder, None, header)
 
 
-def _load(folder: Path, storage: Storage[T] | None) -> T:
-    return cast(T, codec.read(folder)) if storage is None else storage.read(inside(folder, "value"))
+def _load(folder: Path, storage: Storage[Any] | None) -> object:
+    return codec.read(folder) if storage is None else storage.read(inside(folder, "value"))
 
 
 def digest(value: object) -> str:
-    """SHA-256 of JSON values and dataclasses of them."""
+    """SHA-256 of JSON values, arrays, paths, which count by their content, and dataclasses of them."""
     text = json.dumps(value, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _plain(value: object) -> object:
     if is_dataclass(value) and not isinstance(value, type):
-        return asdict(value)
+        return {field.name: getattr(value, field.name) for field in fields(value)}
     if isinstance(value, Path):
-        return str(value)
+        return file_digest(value, deep=True)
+    if isinstance(value, torch.Tensor):
+        value = value.detach().cpu().numpy()
+    if isinstance(value, np.ndarray):
+        whole = np.ascontiguousarray(value)
+        return [str(whole.dtype), list(whole.shape), hashlib.sha256(whole.data).hexdigest()]
+    if isinstance(value, torch.nn.Module):
+        return dict(value.state_dict())
     raise TypeError(f"a stage's options hold a {type(value).__name__}")
+
+
+@cache
+def program_digest() -> str:
+    """SHA-256 of the package's sources and of its compiled core: another program keeps other results."""
+    package = Path(__file__).resolve().parents[1]
+    files = [*package.rglob("*.py"), Path(_native.__file__)]
+    return digest([[file.name, hashlib.sha256(file.read_bytes()).hexdigest()] for file in sorted(files)])
 
 
 def file_digest(path: Path, *, deep: bool = False) -> str:

@@ -140,6 +140,17 @@ def open_workspace(
     return Workspace(out, request)
 
 
+def check_place(out: Path, source: Path | None) -> None:
+    """Fail before the work where the output folder is the input, or cannot be written.
+
+    Raises:
+        InputError: It is or cannot.
+    """
+    if source is not None and out.resolve() == source.resolve():
+        raise InputError(f"{out} is the input itself; choose another output folder")
+    check_writable(out)
+
+
 def check_writable(out: Path) -> None:
     """Fail before the work rather than after it.
 

@@ -8,7 +8,7 @@ from dreamdrive.geometry.dense import PASSES, densify
 from dreamdrive.geometry.finish import assemble
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.road import in_metres
-from dreamdrive.progress import Progress, silent
+from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -19,7 +19,7 @@ def reconstruct(
     camera_height_m: float | None = None,
     seed: int = 0,
     weights: Path | None = None,
-    progress: Progress = silent,
+    work: Work = Work(),
 ) -> Geometry:
     """Pose a clip and find its depth, see ``geometry.protocol``; no network.
 
@@ -28,24 +28,24 @@ def reconstruct(
     """
     passes, used = len(clip), int((~clip.held_out).sum())
     posing, total = (1 + STEPS) * passes, (1 + STEPS) * passes + PASSES * used
-    posed = pose_clip(
-        clip, camera_height_m=camera_height_m, seed=seed, tell=_counted(progress, 0, passes, total)
-    )
-    dense = densify(in_metres(clip, posed.metres_per_unit), posed, tell=_counted(progress, posing, 1, total))
-    progress(total, total)
+    tell = _counted(work, 0, passes, total)
+    posed = work.keep("posed", lambda: pose_clip(clip, camera_height_m=camera_height_m, seed=seed, tell=tell))
+    known = in_metres(clip, posed.metres_per_unit)
+    dense = densify(known, posed, tell=_counted(work, posing, 1, total), keep=work.keep)
+    work(total, total)
     return assemble(clip, posed, dense)
 
 
-def _counted(progress: Progress, start: int, each: int, total: int) -> Callable[[], None]:
+def _counted(work: Work, start: int, each: int, total: int) -> Callable[[], None]:
     """What tells of steps of one size, from a start on; the last one is told of by who knows that it was."""
     done = start
 
     def tell() -> None:
         nonlocal done
         done = min(done + each, total - 1)
-        progress(done, total)
+        work(done, total)
 
-    progress(start, total)
+    work(start, total)
     return tell
 
 

@@ -12,7 +12,7 @@ from tests.geometry.backends.dust3r.network.golden import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
 from dreamdrive.geometry.backends.dust3r.network.images import fitting
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
@@ -91,7 +91,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, clip: Clip, weights: Path) -> Meas
     with monkeypatch.context() as patch:
         patch.setattr(MODULE, "finish", caught)
         with pytest.raises(HandedError) as handed:
-            reconstruct(clip, method="dust3r", weights=weights)
+            reconstruct(clip, GeometryOptions(method="dust3r", weights=weights))
     return handed.value.args[0]
 
 
@@ -206,7 +206,7 @@ def test_a_standing_camera_needs_no_unit_of_its_poses(
     truth = pictured(street, clip, HOW)
     knowing(monkeypatch, replace(truth, depth=truth.depth[still], world_from_camera=poses))
     height_m = float(street.ground.height_m(np.zeros(3)))
-    found = reconstruct(standing, method="dust3r", weights=weights, camera_height_m=height_m)
+    found = reconstruct(standing, GeometryOptions(method="dust3r", weights=weights, camera_height_m=height_m))
     assert any("stands still" in note for note in found.detected)
     np.testing.assert_array_equal(np.stack([each.world_from_camera for each in found.cameras]), poses)
     both = (found.depth_m > 0) & (street.depth_m[still, :-CUT] > 0)

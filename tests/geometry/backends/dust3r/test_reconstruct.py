@@ -10,7 +10,7 @@ from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
@@ -20,6 +20,7 @@ from dreamdrive.geometry.backends.dust3r.reconstruct import measured, planned_pa
 from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
+from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.world import make_street
 
@@ -74,10 +75,8 @@ def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip
     told: list[tuple[int, int]] = []
     found = reconstruct(
         clip,
-        method="dust3r",
-        weights=weights,
-        camera_height_m=1.5,
-        progress=lambda done, total: told.append((done, total)),
+        GeometryOptions("dust3r", weights, camera_height_m=1.5),
+        work=Work(lambda done, total: told.append((done, total))),
     )
     assert {total for _, total in told} == {FRAMES + len(make_pairs(FRAMES)) + 1}
     assert [done for done, _ in told] == sorted(done for done, _ in told)
@@ -92,11 +91,11 @@ def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip
 
 def test_weights_and_method_have_to_fit(clip: Clip, weights: Path, tmp_path: Path):
     with pytest.raises(InputError, match="--weights PATH"):
-        reconstruct(clip, method="dust3r")
+        reconstruct(clip, GeometryOptions(method="dust3r"))
     with pytest.raises(InputError, match="takes no weights"):
-        reconstruct(clip, weights=weights)
+        reconstruct(clip, GeometryOptions(weights=weights))
     with pytest.raises(InputError, match="does not exist"):
-        reconstruct(clip, method="dust3r", weights=tmp_path / "none.pth")
+        reconstruct(clip, GeometryOptions(method="dust3r", weights=tmp_path / "none.pth"))
 
 
 def aligned(**changes: object) -> Aligned:
@@ -150,7 +149,7 @@ def test_one_frame_is_too_few(clip: Clip, weights: Path):
         },
     )
     with pytest.raises(InputError, match="two frames or more"):
-        reconstruct(alone, method="dust3r", weights=weights)
+        reconstruct(alone, GeometryOptions(method="dust3r", weights=weights))
 
 
 def test_pairs_get_fewer_before_a_clip_is_refused():

@@ -10,7 +10,7 @@ from safetensors.torch import load_file
 from tests.geometry.backends.feedforward.fakes import BACKEND, CONFIGS, FAKES, Truth, install, save_weights
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry import BACKENDS, reconstruct
+from dreamdrive.geometry import BACKENDS, GeometryOptions, reconstruct
 from dreamdrive.scene.clip import Clip
 
 
@@ -31,7 +31,7 @@ def test_without_its_package_a_backend_says_what_to_install(
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.setattr("dreamdrive.models.backend.find_spec", dict[str, None]().get)
     with pytest.raises(InputError, match=rf"{package} is missing: (pip install --no-deps|git clone)"):
-        reconstruct(clip, method=name, weights=save_weights(tmp_path, name))
+        reconstruct(clip, GeometryOptions(method=name, weights=save_weights(tmp_path, name)))
 
 
 @pytest.mark.parametrize("name", FAKES)
@@ -134,4 +134,4 @@ def test_one_frame_is_refused(kind: str, clip: Clip, weights: Path) -> None:
     fields = ("frames", "times_s", "camera", "valid", "held_out", "source_index")
     alone = replace(clip, **{name: getattr(clip, name)[:1] for name in fields})
     with pytest.raises(InputError, match="takes two frames or more; got 1"):
-        reconstruct(alone, method=method(kind), weights=weights)
+        reconstruct(alone, GeometryOptions(method=method(kind), weights=weights))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.files import attach
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -176,4 +176,4 @@ def test_bad_depth_is_refused(tmp_path, kind):
 
 def test_an_unknown_method_is_named_with_the_known_ones():
     with pytest.raises(InputError, match="classical"):
-        reconstruct(make_clip(), method="magic")
+        reconstruct(make_clip(), GeometryOptions(method="magic"))

@@ -35,7 +35,7 @@ from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.moving import FLAGGED
 from dreamdrive.machine import best_device
-from dreamdrive.progress import Progress, silent
+from dreamdrive.progress import Progress, Work
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -52,7 +52,7 @@ def reconstruct(
     camera_height_m: float | None = None,
     seed: int = 0,
     weights: Path | None = None,
-    progress: Progress = silent,
+    work: Work = Work(),
 ) -> Geometry:
     """Pointmaps of pairs of frames, aligned, brought to metres; see ``geometry.protocol``.
 
@@ -63,7 +63,7 @@ def reconstruct(
         camera_height_m: Height of the camera above the road; None assumes 1.5 m.
         seed: Seed of everything random.
         weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
-        progress: Told of frames and pairs that the network has seen, then of the alignment.
+        work: Told of frames and pairs that the network has seen, then of the alignment.
 
     Raises:
         InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that contradict
@@ -74,7 +74,7 @@ def reconstruct(
     check_frames(clip, "dust3r")
     evidence = look(clip)
     contradiction.check(clip, evidence)
-    maps, how = _seen(clip, weights, lambda done, total: progress(done, total + 1))
+    maps, how = _seen(clip, weights, lambda done, total: work(done, total + 1))
     # Of a standing camera the path is noise, in which no unit can be read.
     standing = stands(clip, evidence)
     shown = without_poses(clip) if standing else clip

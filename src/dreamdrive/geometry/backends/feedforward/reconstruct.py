@@ -20,7 +20,7 @@ from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
-from dreamdrive.progress import Progress, silent
+from dreamdrive.progress import Progress, Work, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -55,7 +55,7 @@ class FeedForward:
         camera_height_m: float | None = None,
         seed: int = 0,
         weights: Path | None = None,
-        progress: Progress = silent,
+        work: Work = Work(),
     ) -> Geometry:
         """Cameras and depth of the network, brought to metres.
 
@@ -66,7 +66,7 @@ class FeedForward:
             camera_height_m: Height of the camera above the road; None assumes 1.5 m.
             seed: Seed of everything random.
             weights: The network's file or folder.
-            progress: Told after each chunk of frames, and at the end.
+            work: Told after each chunk of frames; keeps what the network measured.
 
         Raises:
             InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
@@ -79,7 +79,8 @@ class FeedForward:
         contradiction.check(clip, evidence)
         # Of a standing camera the path is noise, in which no unit can be read.
         shown = without_poses(clip) if stands(clip, evidence) else clip
-        found = self.measure(shown, free_pixels(clip, evidence), weights, seed, progress)
+        free = free_pixels(clip, evidence)
+        found = work.keep("measured", lambda: self.measure(shown, free, weights, seed, work))
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
 
     def measure(

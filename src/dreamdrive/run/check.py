@@ -14,7 +14,7 @@ from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 
 
-def check_clip(clip: object) -> None:
+def clip(clip: object) -> None:
     """Frames of the cameras' size, in the order of time."""
     if not isinstance(clip, Clip) or not len(clip):
         raise ValueError("it holds no clip")
@@ -25,7 +25,7 @@ def check_clip(clip: object) -> None:
             raise ValueError("the times run back")
 
 
-def check_geometry(clip: Clip, geometry: object) -> None:
+def geometry(clip: Clip, geometry: object) -> None:
     """A camera and a depth for each frame."""
     if not isinstance(geometry, Geometry) or len(geometry.cameras) != len(clip):
         raise ValueError(f"it holds no geometry of {len(clip)} frames")
@@ -42,7 +42,7 @@ def check_geometry(clip: Clip, geometry: object) -> None:
         raise ValueError("it knows regions without a name")
 
 
-def check_seeds(clip: Clip, seeds: object) -> None:
+def seeds(clip: Clip, seeds: object) -> None:
     """Gaussians of frames that there are."""
     if not isinstance(seeds, Gaussians) or not len(seeds):
         raise ValueError("it holds no Gaussians")
@@ -50,13 +50,13 @@ def check_seeds(clip: Clip, seeds: object) -> None:
         raise ValueError(f"its Gaussians come from frames beyond the {len(clip)} of the clip")
 
 
-def check_static(seeds: Gaussians, static: object) -> None:
+def static(seeds: Gaussians, static: object) -> None:
     """A fitted Gaussian for each seed."""
     if not isinstance(static, StaticFit) or len(static.gaussians) != len(seeds):
         raise ValueError(f"it holds no fit of {len(seeds)} Gaussians")
 
 
-def check_scores(seeds: Gaussians, scores: object) -> None:
+def scores(seeds: Gaussians, scores: object) -> None:
     """A score in [0, 1] for each seed."""
     if not isinstance(scores, Tensor) or tuple(scores.shape) != (len(seeds),):
         raise ValueError(f"it holds no scores of {len(seeds)} Gaussians")
@@ -64,7 +64,7 @@ def check_scores(seeds: Gaussians, scores: object) -> None:
         raise ValueError("its scores are not between 0 and 1")
 
 
-def check_grouping(seeds: Gaussians, grouping: object) -> None:
+def grouping(seeds: Gaussians, grouping: object) -> None:
     """A label for each seed."""
     if not isinstance(grouping, Grouping) or len(grouping.dynamic) != len(seeds):
         raise ValueError(f"it holds no labels of {len(seeds)} Gaussians")
@@ -72,7 +72,7 @@ def check_grouping(seeds: Gaussians, grouping: object) -> None:
         raise ValueError("its clusters have impossible numbers")
 
 
-def check_scene(clip: Clip, scene: Scene) -> None:
+def scene(clip: Clip, scene: Scene) -> None:
     """A view for each frame."""
     if len(scene.cameras) != len(clip) or scene.times_s.tolist() != clip.times_s.tolist():
         raise ValueError(f"it holds no scene of the {len(clip)} frames")
