@@ -2,6 +2,7 @@
 
 from dreamdrive.run import check
 from dreamdrive.run.lock import only_run
+from dreamdrive.run.options_file import read_options
 from dreamdrive.run.outcome import Outcome, lines_of, outcome_of, read_outcome
 from dreamdrive.run.production import Production, start
 from dreamdrive.run.report import PACKAGES, package_versions
