@@ -1,1 +1,0 @@
-"""Ways of getting geometry, one each; only the table in ``geometry`` imports them."""

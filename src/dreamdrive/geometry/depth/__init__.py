@@ -1,1 +1,0 @@
-"""Plane sweep, its smoothing and its confidence."""

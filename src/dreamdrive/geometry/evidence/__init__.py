@@ -1,1 +1,0 @@
-"""What can be seen in the frames alone: features, motion, regions fixed to the camera."""

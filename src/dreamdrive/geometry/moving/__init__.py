@@ -1,1 +1,0 @@
-"""Evidence of motion in posed frames, outlines of moving things, oncoming traffic."""

@@ -1,1 +1,0 @@
-"""The road plane, the metric scale, and what stands on the road."""

@@ -1,1 +1,0 @@
-"""All drawing: videos, panels, pictures of the geometry, renderings of drives."""
