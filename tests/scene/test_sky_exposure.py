@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from benchmarks import _plain_step as plain
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure, ExposureNetwork, recorded_picture, transform_colour
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import set_threads, threads
+from splat import plain_step as plain
 
 
 def camera(yaw_deg: float = 0.0, pitch_deg: float = 0.0, position: tuple[float, ...] = (0, 0, 0)) -> Camera:

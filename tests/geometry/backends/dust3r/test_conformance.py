@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes
 from tests.geometry.backends.dust3r.network.golden import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
@@ -22,6 +21,7 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.clip import Known as KnownOfClip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.world import Drive, make_street
+from geometry.simulated_pairs import Noise, Truth, pair_maps
 
 MODULE = import_module("dreamdrive.geometry.backends.dust3r.reconstruct")
 FRAMES, SIZE, LONG_SIDE = 5, (160, 120), 128

@@ -2,7 +2,8 @@
 
 import cv2
 import numpy as np
-from benchmarks._simulated_pairs import Truth
+
+from geometry.simulated_pairs import Truth
 
 
 def window(count: int, reach: int = 3) -> np.ndarray:

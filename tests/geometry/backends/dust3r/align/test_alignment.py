@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.backends.dust3r.align.goldens import config, scene
 from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
@@ -19,6 +18,7 @@ from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference.adam import descend
 from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
+from geometry.simulated_pairs import Noise, Truth, pair_maps
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)
 ROBUST = AlignOptions(samples_per_image=300)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, pair_maps
 from safetensors.numpy import load_file
 from tests.geometry.backends.dust3r.align.pairs import street, window
 
@@ -18,6 +17,7 @@ from dreamdrive.geometry.backends.dust3r.align.focal import (
     weiszfeld_px,
 )
 from dreamdrive.geometry.weighted import weighted_median
+from geometry.simulated_pairs import Noise, pair_maps
 
 CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "pp", "wide", "tele"]
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.backends.dust3r.align.pairs import street, window
 
 from dreamdrive.geometry.backends.dust3r.align.freedom import Freedom
@@ -18,6 +17,7 @@ from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.splat.torch_threads import one_torch_thread
+from geometry.simulated_pairs import Noise, pair_maps
 
 _STEPS = 60
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.backends.dust3r.align.goldens import scene
 from tests.geometry.backends.dust3r.align.pairs import path_error, street, window
 
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from geometry.simulated_pairs import Noise, pair_maps
 
 EXACT = Noise(0, 1 / 8, 0, 0, 0)
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
@@ -13,6 +12,7 @@ from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_vo
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from geometry.simulated_pairs import Noise, Truth, pair_maps
 
 FRAMES = 8
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.backends.dust3r.align.goldens import config, raw, scene
 from tests.geometry.backends.dust3r.align.pairs import path_error, street
 
@@ -16,6 +15,7 @@ from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference.adam import descend
 from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
+from geometry.simulated_pairs import Noise, pair_maps
 
 
 @pytest.mark.parametrize("name", ["A", "B"])

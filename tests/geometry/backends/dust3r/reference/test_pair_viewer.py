@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks._simulated_pairs import Noise, pair_maps
 from tests.geometry.backends.dust3r.align.goldens import scene
 from tests.geometry.backends.dust3r.align.pairs import path_error, street
 
@@ -12,6 +11,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference.clean import world_points
 from dreamdrive.geometry.backends.dust3r.reference.pair_viewer import view_pair
+from geometry.simulated_pairs import Noise, pair_maps
 
 
 def test_it_is_golden(golden_dir: Path) -> None:

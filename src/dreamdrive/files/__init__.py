@@ -1,1 +1,0 @@
-"""Reading and writing that damaged or hostile files cannot mislead."""
