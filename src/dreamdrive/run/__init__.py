@@ -9,4 +9,4 @@ from dreamdrive.run.report import PACKAGES, package_versions
 from dreamdrive.run.request import Request, request_of
 from dreamdrive.run.sampling import clip_features, sample
 from dreamdrive.run.stages import STAGES, Run, Stages, call, digest, file_digest, program_digest, stage_seed
-from dreamdrive.run.workspace import REPORT, check_place, open_workspace
+from dreamdrive.run.workspace import REPORT, check_ours, check_place, open_workspace

@@ -76,7 +76,5 @@ def _unknown(name: str, is_table: bool, known: list[str]) -> str:
     return (
         f"there is no option {name}; did you mean {', '.join(near[:3])}?"
         if near
-        else (
-            f"there is no option {name}; expected one of {', '.join(known[:3])}, ... (docs/options.md lists all)"
-        )
+        else (f"there is no option {name}; expected one of {', '.join(known[:3])}, ... (see docs/options.md)")
     )

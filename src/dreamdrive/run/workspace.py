@@ -140,6 +140,16 @@ def open_workspace(
     return Workspace(out, request)
 
 
+def check_ours(out: Path) -> None:
+    """Fail where a folder is not one that ``generate`` wrote.
+
+    Raises:
+        InputError: It is not.
+    """
+    if _identity(out / REPORT) is None and _identity(out / "stages" / "request.json") is None:
+        raise InputError(f"{out} is no folder that dreamdrive generate wrote; nothing was removed")
+
+
 def check_place(out: Path, source: Path | None) -> None:
     """Fail before the work where the output folder is the input, or cannot be written.
 
