@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks._simulated_pairs import Noise, Truth, pair_maps
 from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
