@@ -27,7 +27,7 @@ from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.stored import open_weights
 from tests.data.pictures import texture
 from tests.export.test_ply import gaussians
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
 from tests.mutation.reader import Reader
 from tests.prior.vista.tiny import save_official
