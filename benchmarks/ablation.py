@@ -109,7 +109,7 @@ def make(cut: Cut) -> None:
     steps = quality.static.steps
     cases = cut.runs / ("cases" if steps == QUALITY.static.steps else f"cases-{steps}")
     begin = begun(start(case, quality, cases), variant, quality)
-    fitted = fit_case(begin, variant.representation, quality, variant.vote, variant.scale)
+    fitted = fit_case(begin, variant.representation, quality, variant.vote, variant.errors)
     scene = fitted.scene
     views, _, _ = measure(scene, case, [], cut.runs / "truth")
     novel = [views[view]["psnr"] for view in NOVEL if views[view]["psnr"] is not None]

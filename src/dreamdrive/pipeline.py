@@ -305,7 +305,7 @@ def _decompose(
             clip,
             geometry,
             seeds,
-            error_maps(clip, geometry, static.gaussians, static.sky, static.exposure, settings.score.error),
+            error_maps(clip, geometry, static.gaussians, static.sky, static.exposure),
             settings.score,
             seed,
             tell,

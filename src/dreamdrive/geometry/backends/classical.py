@@ -1,13 +1,11 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from dreamdrive.geometry.cameras.mapping import STEPS
 from dreamdrive.geometry.cameras.posing import Posed, pose_clip
 from dreamdrive.geometry.dense import PASSES, Dense, densify
-from dreamdrive.geometry.moving.traffic import compared_with_traffic
 from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
 from dreamdrive.geometry.road.known_depth import in_metres
 from dreamdrive.scene.clip import Clip
@@ -59,7 +57,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         "sky_share": float(dense.sky[used].mean()),
         "moving_share": float((dense.moving[used] >= 0.5).mean()),
     }
-    geometry = Geometry(
+    return Geometry(
         cameras=posed.cameras,
         depth_m=dense.depth_m,
         confidence=dense.confidence,
@@ -76,7 +74,6 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         fallback_kind=posed.fallback_kind,
         placed=posed.placed,
     )
-    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 CLASSICAL = GeometryBackend(
