@@ -91,7 +91,7 @@ class BackendRun(Measurement):
         return {"clip": self.clip, "way": self.way, "settings": made}
 
     def measure(self, runs: Path) -> Row:
-        """The figures of docs/geometry_evaluation.md, and seconds of the processor, of all threads."""
+        """The figures of docs/reference/evaluate_geometry.md, and processor seconds of all threads."""
         given = self._recorded() if self.clip in RECORDINGS else self._drawn(runs)
         clip = given.clip
         began = time.process_time()

@@ -41,7 +41,7 @@ def make(
         size: Size of the frames.
         cameras: front is one camera; surround six, each in a folder of its own.
         corrupt: Draw the frames as a video model might have, such as generated or warp=0.5,flicker=1, see
-            docs/consistency.md; the truth stays that of the clean street.
+            docs/reference/corruptions.md; the truth stays that of the clean street.
         one_ray: One ray a pixel, twice as fast, with rough edges.
         force: Replace a world that is there already.
     """
