@@ -1,6 +1,5 @@
 """F_group: spatio-temporal clusters vote on what is dynamic (eq. 10)."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from dreamdrive.decompose.covered import covered
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.on_road import on_road
 from dreamdrive.scene.clip import Clip
@@ -71,17 +69,15 @@ class Grouping:
     Attributes:
         dynamic: The final label (N,).
         cluster: Index of each Gaussian's space-time cluster (N,), -1 outside all dynamic clusters.
-        covered: Static ones that no frame has seen, see ``covered`` (N,).
     """
 
     dynamic: Bool[Tensor, " n"]
     cluster: Int[Tensor, " n"]
-    covered: Bool[Tensor, " n"]
 
     @property
     def static(self) -> Bool[Tensor, " n"]:
         """What the scene's static part is made of (N,)."""
-        return ~self.dynamic & ~self.covered
+        return ~self.dynamic
 
 
 def group(
@@ -101,8 +97,7 @@ def group(
     """
     value = scores.detach().numpy()
     if not options.clustering:
-        cluster = np.where(value > options.threshold, 0, -1)
-        return _grouping(clip, geometry, gaussians, cluster, options)
+        return _grouping(np.where(value > options.threshold, 0, -1))
     index = np.flatnonzero(value > options.candidate)
     points = source_pixels(geometry, gaussians, index)
     frames = gaussians.source_frame.numpy()[index]
@@ -112,7 +107,7 @@ def group(
     members = upright & np.isin(labels, wins)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     cluster[index[members]] = np.searchsorted(wins, labels[members])
-    return _grouping(clip, geometry, gaussians, cluster, options)
+    return _grouping(cluster)
 
 
 def _low(
@@ -137,17 +132,8 @@ def elected(
     return np.flatnonzero(wins)
 
 
-def _grouping(
-    clip: Clip,
-    geometry: Geometry,
-    gaussians: Gaussians,
-    cluster: Int[np.ndarray, " n"],
-    options: GroupOptions,
-) -> Grouping:
-    dynamic = torch.from_numpy(cluster >= 0)
-    pixels = source_pixels(geometry, gaussians, np.arange(len(gaussians)))
-    hidden = covered(clip, geometry, gaussians, dynamic, pixels, math.ceil(options.reach_px / 1.5))
-    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
+def _grouping(cluster: Int[np.ndarray, " n"]) -> Grouping:
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))
 
 
 def source_pixels(
