@@ -9,7 +9,6 @@ from _ablation_groups import by_density, by_density_and_features, by_voxels, sca
 from _street_fit import Scale, Vote, own_scale, own_vote, with_steps
 from _street_jobs import QUALITY
 
-from dreamdrive.fit import Representation
 from dreamdrive.options import Quality
 
 
@@ -30,7 +29,7 @@ class Variant:
     about: str
     change: Callable[[Quality], Quality] = lambda quality: quality
     features: Literal["all", "evidence", "appearance", "none", "efficientnet"] = "all"
-    representation: Representation = "hybrid"
+    representation: str = "hybrid"
     vote: Vote = own_vote
     scale: Scale = own_scale
 

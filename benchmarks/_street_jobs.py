@@ -24,12 +24,11 @@ from _street_recording import Recorded, recording
 from _street_views import views_digest
 
 from dreamdrive.evaluate.extractors import Toolbox
-from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES
 from dreamdrive.stages import digest
 
 SEEDS = tuple(range(8))
-REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
+REPRESENTATIONS: tuple[str, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
 BUDGETS = ("equal_steps", "equal_time", "five_times")
 QUALITY = QUALITIES["draft"]
 TIMES = 5
@@ -52,7 +51,7 @@ class Job:
     """One fit, and the folder of all of them."""
 
     case: Case
-    representation: Representation
+    representation: str
     budget: str
     runs: Path
 

@@ -12,7 +12,6 @@ from clips import DATA
 from pandaset_truth import Movers, moving_masks
 
 from dreamdrive.evaluate.retrieval import retrieval
-from dreamdrive.fit import Representation
 from dreamdrive.held_out import score_scene
 from dreamdrive.options import Quality
 from dreamdrive.prior import choose_prior
@@ -30,7 +29,7 @@ ABOUT: list[object] = [CLIP, CAMERA, FRAMES, RATE_HZ, SIZE, HOLD_OUT]
 class Recorded:
     """One fit of the recording, and the folder of all fits."""
 
-    representation: Representation
+    representation: str
     runs: Path
 
     @property

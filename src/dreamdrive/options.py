@@ -5,10 +5,8 @@ from typing import Literal
 
 from dreamdrive.decompose import GroupOptions, ScoreOptions
 from dreamdrive.decompose.actors import ActorOptions
-from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
-from dreamdrive.scene.deformation import DeformationConfig
-from dreamdrive.scene.hexplane import HexPlaneConfig
-from dreamdrive.scene.vibration import VibrationConfig
+from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
+from dreamdrive.motion import MotionConfig, choose_representation
 
 QualityName = Literal["draft", "standard", "high"]
 
@@ -25,7 +23,7 @@ class Quality:
         group: The vote.
         cast: The actors' tracks.
         densify: Growing and pruning in the joint fit.
-        network: Size of the deformation field; its width is that of every representation.
+        width: Units of the layers of every motion's network (the paper's baseline: 256; 64 suits two cores).
     """
 
     static: FitOptions
@@ -35,23 +33,21 @@ class Quality:
     group: GroupOptions = field(default_factory=GroupOptions)
     cast: ActorOptions = field(default_factory=ActorOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
-    network: DeformationConfig = field(default_factory=DeformationConfig)
+    width: int = 64
 
-    def motion(self, representation: Representation) -> MotionConfig:
+    def motion(self, representation: str) -> MotionConfig | None:
         """What the joint fit learns motion by; all networks have the same width."""
-        if representation == "hexplane":
-            return HexPlaneConfig(width=self.network.width)
-        if representation == "vibration":
-            return VibrationConfig()
-        return self.network
+        motion = choose_representation(representation).motion
+        return None if motion is None else motion.config_type.sized(self.width)
 
-    def steps(self, representation: Representation) -> dict[str, int]:
+    def steps(self, representation: str) -> dict[str, int]:
         """Optimisation steps of each stage: those on Gaussians are the same for all representations.
 
-        ``score`` trains the classifier of the decomposition, which hybrid alone has, and changes no Gaussian.
+        ``score`` trains the classifier of the decomposition and changes no Gaussian.
         """
         fits = {"static": self.static.steps, "fit": self.fit.steps}
-        return {**fits, "score": self.score.steps} if representation == "hybrid" else fits
+        scored = choose_representation(representation).moves == "scored"
+        return {**fits, "score": self.score.steps} if scored else fits
 
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.

@@ -14,13 +14,14 @@ from dreamdrive.data import read_clip
 from dreamdrive.data.rig import is_rig
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.errors import InputError
-from dreamdrive.fit import Parts, Representation, StaticFit, fit, fit_static, initialise
+from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import backend_of, reconstruct
 from dreamdrive.geometry.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.picture import draw_geometry
 from dreamdrive.held_out import score_baselines, score_scene
 from dreamdrive.hub import find_weights
 from dreamdrive.memory import available_cores, free_bytes
+from dreamdrive.motion import choose_representation
 from dreamdrive.options import QUALITIES, Quality, QualityName
 from dreamdrive.pictures import Scored, lens_of, write_held_out, write_png, write_videos
 from dreamdrive.prior import choose_prior, prior_of
@@ -76,7 +77,7 @@ def generate(
     geometry_weights: str | Path | None = None,
     refine_poses: bool = False,
     quality: QualityName = "standard",
-    representation: Representation = "hybrid",
+    representation: str = "hybrid",
     camera_height_m: float | None = None,
     recompute_from: str | None = None,
     force: bool = False,
@@ -99,7 +100,7 @@ def generate(
         geometry_weights: The network of the geometry method, where the prior has one too.
         refine_poses: Whether given poses tell only how long the path is, see ``geometry.refine``.
         quality: Name in ``options.QUALITIES``.
-        representation: ``"hybrid"``, or one of its baselines.
+        representation: Name in ``motion.REPRESENTATIONS``.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
             better does; None assumes 1.5 m.
         recompute_from: Compute this stage and all later ones again.
@@ -118,6 +119,7 @@ def generate(
     control, network = _with_networks(control, prior, weights, geometry_weights)
     choose_prior(prior).check(control)
     backend_of(geometry_method, network)
+    choose_representation(representation)
     if camera_height_m is not None and not 0 < camera_height_m < float("inf"):
         raise InputError(f"--camera-height {camera_height_m:g}: expected metres above the road, such as 1.5")
     if control.path is not None and out.resolve() == control.path.resolve():
@@ -149,9 +151,7 @@ def generate(
         return outcome_of(_publish(workspace, stages, control, made), REPORT, already_finished=False)
 
 
-def _announce(
-    control: Control, prior: str, quality: QualityName, representation: Representation, say: Say
-) -> None:
+def _announce(control: Control, prior: str, quality: QualityName, representation: str, say: Say) -> None:
     """Say what the run will cost, where that is known before the frames are read.
 
     Raises:
@@ -288,14 +288,15 @@ def _decompose(
     seeds: Gaussians,
     static: StaticFit,
     settings: Quality,
-    representation: Representation,
+    representation: str,
     seed: int,
 ) -> tuple[Scored | None, Parts]:
     """Tell static from moving (eq. 5-10); the baselines take everything as one or the other."""
     nothing = torch.zeros(0, dtype=torch.int64)
-    if representation == "static":
+    moves = choose_representation(representation).moves
+    if moves == "none":
         return None, Parts(static.gaussians, static.gaussians.select(nothing), None, ())
-    if representation != "hybrid":
+    if moves == "all":
         return None, Parts(seeds.select(nothing), static.gaussians, None, ())
     scores = stages.run(
         "score",
@@ -331,7 +332,7 @@ def _fitted(
     parts: Parts,
     start: StaticFit,
     quality: Quality,
-    representation: Representation,
+    representation: str,
     seed: int,
     progress: Progress,
 ) -> Scene:

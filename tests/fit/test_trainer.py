@@ -9,14 +9,14 @@ from benchmarks._plain_step import PlainTrainer
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.static import footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Trainer, optimise
 from dreamdrive.fit.views import View, training_views
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
-from dreamdrive.scene.exposure import ExposureNetwork
+from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.splat import one_torch_thread, set_threads, threads
 
 OPTIONS = FitOptions(steps=20, sh_after=0.0, warm_up=0.0)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from benchmarks import _plain_step as plain
+from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.exposure import Exposure, ExposureNetwork, recorded_picture, transform_colour
+from dreamdrive.scene.exposure import Exposure, transform_colour
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import set_threads, threads
 

@@ -1,26 +1,21 @@
 """The joint fit of static and dynamic Gaussians (eq. 11-14), and its baselines."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import torch
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
-from dreamdrive.fit.motion import MotionConfig, start_motion
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
 from dreamdrive.fit.views import training_views
+from dreamdrive.motion import MotionConfig, Start, Tracks, start_motion
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import Tracks
-from dreamdrive.scene.exposure import ExposureNetwork
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.scene.vibration import Vibration
-
-Representation = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,7 @@ def fit(
     parts: Parts,
     start: StaticFit,
     options: FitOptions,
-    motion: MotionConfig,
+    motion: MotionConfig | None,
     densify: DensifySettings,
     seed: int,
     progress: Progress,
@@ -61,18 +56,16 @@ def fit(
         parts: Static and dynamic Gaussians; with no dynamic ones the result is a static scene.
         start: The static fit, whose sky is kept.
         options: Length, rates and weights.
-        motion: Which representation of motion, and its size; the paper's is F_deform.
+        motion: Which representation of motion, and its size; the paper's is F_deform; None for none.
         densify: When and what to grow and prune.
         seed: Order of the frames, weights, places of split Gaussians.
         progress: Called with steps done and steps in all.
     """
     views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
     moving, dynamic = None, parts.dynamic
-    if len(dynamic):
-        moving, dynamic = start_motion(clip, geometry, dynamic, parts.tracks, motion, seed)
-    rates = LearningRates()
-    if isinstance(moving, Vibration):
-        rates = replace(rates, interval_s=moving.config.interval_s)
+    if len(dynamic) and motion is not None:
+        moving, dynamic = start_motion(motion, Start(clip, geometry, dynamic, parts.tracks, seed))
+    rates = LearningRates(interval_s=clip.interval_s)
     model = Model(
         static=_parameters(parts.static, rates),
         dynamic=_parameters(dynamic, rates),

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import torch
 
 from dreamdrive.fit.densify import NoDensifier
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
 from dreamdrive.fit.views import training_views
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.exposure import Exposure, ExposureNetwork
+from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky

@@ -10,14 +10,13 @@ from torch import Tensor
 from dreamdrive import _native
 from dreamdrive.fit.activation import Activated, activate
 from dreamdrive.fit.densify import Densifier
+from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.fit.losses import LossName, geometry_loss, render_loss, shape_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
+from dreamdrive.motion import Motion
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import alive_at
-from dreamdrive.scene.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import one_torch_thread, rasterize
@@ -108,7 +107,7 @@ class Model:
         if self.dynamic is None or self.deformation is None:
             return None
         whole = self.dynamic.gaussians().without_features()
-        rows = alive_at(whole, t_s)
+        rows = whole.alive_at(t_s)
         # A copy of all rows, and another of their gradients, would be a twentieth of a step.
         living = whole if len(rows) == len(whole) else whole.select(rows)
         moved = self.deformation.training_at(living, t_s, generator)

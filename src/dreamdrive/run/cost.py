@@ -9,7 +9,7 @@ from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import Source, open_source
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
-from dreamdrive.fit import Representation
+from dreamdrive.motion import choose_representation
 from dreamdrive.options import QUALITIES, QualityName
 from dreamdrive.prior.street_world import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
@@ -43,14 +43,6 @@ class _Measured:
 
 
 MEASURED = _Measured()
-_FIT: dict[Representation, float] = {
-    "static": 0.9,
-    "hybrid": 1.0,
-    "deformable": 2.2,
-    "hexplane": 2.5,
-    "vibration": 1.0,
-}
-"""The time of a step of the joint fit for one of hybrid, measured in the same way on 12 frames of 320x180."""
 
 LONG = 60
 """Frames from which on a clip is called long."""
@@ -123,7 +115,7 @@ def _first_size(source: Source) -> tuple[int, int]:
     return next(iter(source.read(range(1)))).size
 
 
-def seconds_of(planned: Planned, quality: QualityName, representation: Representation, cores: int) -> float:
+def seconds_of(planned: Planned, quality: QualityName, representation: str, cores: int) -> float:
     """About how long a run takes, with geometry found from the frames alone.
 
     Args:
@@ -137,7 +129,7 @@ def seconds_of(planned: Planned, quality: QualityName, representation: Represent
     more = frames / m.usual_frames
     geometry = frames * (m.frame + m.frame_megapixel * pixels) * more**m.frame_growth
     step = m.step + m.step_megapixel * pixels * more**m.step_growth
-    fits = step * (steps.static.steps + steps.fit.steps * _FIT[representation])
+    fits = step * (steps.static.steps + steps.fit.steps * choose_representation(representation).step)
     videos = frames * (m.video + m.video_megapixel * pixels)
     work = m.start + geometry + fits + m.score_megapixel * frames * pixels + videos
     return work * (m.serial + (1 - m.serial) / max(1, cores))
@@ -177,9 +169,7 @@ def check_memory(planned: Planned, free: int | None) -> None:
     )
 
 
-def announcement(
-    planned: Planned, quality: QualityName, representation: Representation, cores: int
-) -> tuple[str, ...]:
+def announcement(planned: Planned, quality: QualityName, representation: str, cores: int) -> tuple[str, ...]:
     """What a run will cost, and for a long clip that nobody shortened what would cost less."""
 
     def time_of(one: Planned) -> str:

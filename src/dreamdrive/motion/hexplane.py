@@ -12,16 +12,19 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from dreamdrive.scene.compiled_hexplane import dense_network, plane_features, steepness
+from dreamdrive.motion.compiled_hexplane import dense_network, plane_features, steepness
+from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 
 # Axes of the planes without time: xy, xz, yz; those with it are xt, yt, zt.
 _SPACE = ((0, 1), (0, 2), (1, 2))
+# Share of the Gaussians beyond each side of a fit's box: a few are at the far end of the street, and nodes
+# that reach out to them are missing nearby.
+OUTSIDE = 0.01
 
 
 @dataclass(frozen=True)
-class HexPlaneConfig:
+class HexPlaneConfig(MotionConfig):
     """Shape of a field and weights of its penalties; everything that is not learned or measured.
 
     Attributes:
@@ -97,6 +100,7 @@ class HexPlaneField(Motion):
     """
 
     kind = "hexplane"
+    config_type = HexPlaneConfig
     config: HexPlaneConfig
     low_m: Tensor
     high_m: Tensor
@@ -114,6 +118,26 @@ class HexPlaneField(Motion):
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self._build()
+
+    @classmethod
+    def start(cls, config: HexPlaneConfig, given: Start) -> tuple["HexPlaneField", Gaussians]:
+        """Planes over the box that holds nearly all Gaussians and over the time of the clip."""
+        given.refuse_tracks(cls.kind)
+        clip, means = given.clip, given.dynamic.means.numpy().astype(np.float64)
+        low, high = np.quantile(means, [OUTSIDE, 1 - OUTSIDE], axis=0)
+        bounds = Bounds(low, np.maximum(high, low + 1e-3), float(clip.times_s[0]), float(clip.times_s[-1]))
+        config = replace(config, times=max(2, len(clip) // 2), coefficients=given.dynamic.sh.shape[1])
+        return cls(config, bounds, given.seed), given.dynamic
+
+    @classmethod
+    def blank(cls, config: HexPlaneConfig) -> "HexPlaneField":
+        """One of this shape with any valid numbers in it."""
+        return cls(config, Bounds(np.zeros(3), np.ones(3), 0.0, 1.0))
+
+    def check(self, gaussians: Gaussians) -> None:
+        """Raise ``ValueError`` where they have another number of colour coefficients than the field."""
+        if gaussians.sh.shape[1] != self.config.coefficients:
+            raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
 
     def _build(self) -> None:
         c = self.config
@@ -157,8 +181,7 @@ class HexPlaneField(Motion):
         """
         if len(gaussians) == 0:
             return gaussians
-        if gaussians.sh.shape[1] != self.config.coefficients:
-            raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
+        self.check(gaussians)
         offsets = self._decoded(self.features(gaussians.means, t_s))
         by_mean, by_sh = offsets.split([3, offsets.shape[1] - 3], dim=1)
         return replace(
