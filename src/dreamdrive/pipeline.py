@@ -13,6 +13,7 @@ from jaxtyping import UInt8
 from dreamdrive.data import read_clip
 from dreamdrive.data.rig import is_rig
 from dreamdrive.decompose import cast, error_maps, group, score
+from dreamdrive.device import computing_on
 from dreamdrive.errors import InputError
 from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import backend_of, reconstruct
@@ -45,6 +46,7 @@ from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
+from dreamdrive.splat.cuda import why_unusable
 from dreamdrive.stages import (
     STAGES,
     Progress,
@@ -78,6 +80,7 @@ def generate(
     refine_poses: bool = False,
     quality: QualityName = "standard",
     representation: str = "hybrid",
+    device: str = "cpu",
     camera_height_m: float | None = None,
     recompute_from: str | None = None,
     force: bool = False,
@@ -101,6 +104,7 @@ def generate(
         refine_poses: Whether given poses tell only how long the path is, see ``geometry.refine``.
         quality: Name in ``options.QUALITIES``.
         representation: Name in ``motion.REPRESENTATIONS``.
+        device: "cpu" or "cuda": where networks and the fits are computed.
         camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
             better does; None assumes 1.5 m.
         recompute_from: Compute this stage and all later ones again.
@@ -130,6 +134,7 @@ def generate(
         "geometry": geometry_method,
         "quality": quality,
         "representation": representation,
+        "device": device,
         "camera_height_m": camera_height_m,
         "refine_poses": refine_poses,
         **_reading(control),
@@ -141,7 +146,7 @@ def generate(
     }
     recompute = recompute_from is not None
     check_writable(out)
-    with only_run(out):
+    with computing_on(device, why_unusable), only_run(out):
         workspace = open_workspace(out, request, force=force, recompute=recompute)
         if workspace is None:
             return read_outcome(inside(out, REPORT), already_finished=True)
@@ -187,6 +192,7 @@ def _make(
     chosen, height_m = request["options"], request["options"]["camera_height_m"]
     quality = QUALITIES[chosen["quality"]]
     seed = {name: stage_seed(control.seed, name) for name in STAGES}
+    device = torch.device(chosen["device"])
 
     of_geometry = [request["digests"].get(name) for name in _OF_GEOMETRY]
     files = {name: value for name, value in request["digests"].items() if name not in _OF_GEOMETRY}
@@ -224,17 +230,20 @@ def _make(
     static = stages.run(
         "static",
         ("initialise",),
-        [quality.static, seed["static"]],
-        lambda tell: fit_static(clip, geometry, seeds, quality.static, seed["static"], tell),
+        [quality.static, chosen["device"], seed["static"]],
+        lambda tell: fit_static(clip, geometry, seeds, quality.static, seed["static"], tell, device),
         check=partial(check_static, seeds),
     )
     mode = chosen["representation"]
     scored, parts = _decompose(stages, clip, geometry, seeds, static, quality, mode, seed["score"])
+    of_fit = [mode, quality.fit, quality.cast, quality.motion(mode), quality.densify]
     scene = stages.run(
         "fit",
         ("static", "group") if scored else ("static",),
-        [mode, quality.fit, quality.cast, quality.motion(mode), quality.densify, seed["fit"]],
-        lambda tell: _fitted(control, clip, geometry, parts, static, quality, mode, seed["fit"], tell),
+        [*of_fit, chosen["device"], seed["fit"]],
+        lambda tell: _fitted(
+            control, clip, geometry, parts, static, quality, mode, seed["fit"], tell, device
+        ),
         Storage[Scene](lambda path, made: save_scene(made, path, replace=True), load_scene),
         check=partial(check_scene, clip),
     )
@@ -335,10 +344,11 @@ def _fitted(
     representation: str,
     seed: int,
     progress: Progress,
+    device: torch.device,
 ) -> Scene:
     """The joint fit (eq. 11-14), with what a scene remembers of its making."""
     motion = quality.motion(representation)
-    scene = fit(clip, geometry, parts, start, quality.fit, motion, quality.densify, seed, progress)
+    scene = fit(clip, geometry, parts, start, quality.fit, motion, quality.densify, seed, progress, device)
     about = {
         "input": None if control.path is None else control.path.name,
         "source_index": clip.source_index.tolist(),

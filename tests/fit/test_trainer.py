@@ -33,7 +33,7 @@ def parts():
     life = torch.stack([torch.linspace(0, float(clip.times_s[-1]), count), torch.full((count,), 0.3)], 1)
     actor = torch.where(torch.arange(count) % 3 == 0, torch.arange(count) % 2, -1)
     seeds = replace(seeds, sh=colour, lifespan=life, actor=actor)
-    return training_views(clip, geometry), seeds, estimate_sky(clip, geometry)
+    return training_views(clip, geometry)[1], seeds, estimate_sky(clip, geometry)
 
 
 def model_of(parts) -> Model:

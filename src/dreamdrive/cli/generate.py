@@ -55,6 +55,7 @@ def generate(
     features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     representation: Literal["static", "deformable", "hexplane", "vibration", "hybrid"] = "hybrid",
+    device: Literal["cpu", "cuda"] = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
@@ -99,6 +100,7 @@ def generate(
         hold_out: Withhold every N-th frame to measure how well it is predicted.
         representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
             deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
+        device: Where networks and the fits are computed; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md).
         seed: Seed of everything random.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
@@ -140,6 +142,7 @@ def generate(
             geometry_weights=geometry_weights,
             quality=quality,
             representation=representation,
+            device=device,
             camera_height_m=camera_height,
             recompute_from=recompute_from,
             force=force,

@@ -9,7 +9,8 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
-from dreamdrive.scene.exposure import Exposure
+from dreamdrive.device import CPU, in_core
+from dreamdrive.scene.exposure import Exposure, transform_colour
 
 
 def recorded_picture(
@@ -31,6 +32,8 @@ def recorded_picture(
     """
     if sky.requires_grad:
         raise ValueError("sky: the recorded picture has no gradient for it; detach it")
+    if not in_core(colour):
+        return transform_colour(colour + (1 - alpha)[..., None] * sky, affine)
     return _RecordedPicture.apply(colour, alpha, sky, affine)  # pyright: ignore[reportReturnType]
 
 
@@ -88,5 +91,5 @@ class ExposureNetwork(nn.Module):
             raise ValueError(f"exposure: {len(times_s)} times for {len(self.embedding)} frames")
         index = np.flatnonzero(trained)
         several = None if camera is None or not camera.any() else camera[index]
-        transforms = torch.stack([self(int(i)) for i in index]).clone()
+        transforms = torch.stack([self(int(i)) for i in index]).to(CPU, copy=True)
         return Exposure(transforms, np.asarray(times_s)[index], several)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import torch
 
+from dreamdrive.device import CPU
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
@@ -45,6 +46,7 @@ def fit(
     densify: DensifySettings,
     seed: int,
     progress: Progress,
+    device: torch.device = CPU,
 ) -> Scene:
     """Optimise Gaussians, motion and exposure jointly (eq. 13-14).
 
@@ -60,28 +62,29 @@ def fit(
         densify: When and what to grow and prune.
         seed: Order of the frames, weights, places of split Gaussians.
         progress: Called with steps done and steps in all.
+        device: Where it is computed; the scene is on the CPU.
     """
-    views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
+    views = training_views(clip, geometry, device)
     moving, dynamic = None, parts.dynamic
     if len(dynamic) and motion is not None:
         moving, dynamic = start_motion(motion, Start(clip, geometry, dynamic, parts.tracks, seed))
     rates = LearningRates(interval_s=clip.interval_s)
     model = Model(
-        static=_parameters(parts.static, rates),
-        dynamic=_parameters(dynamic, rates),
-        deformation=moving,
+        static=_parameters(parts.static.to(device), rates),
+        dynamic=_parameters(dynamic.to(device), rates),
+        deformation=None if moving is None else moving.to(device),
         sky=start.sky,
-        exposure=ExposureNetwork(len(clip), seed),
+        exposure=ExposureNetwork(len(clip), seed).to(device),
     )
     half_size = (clip.size[0] / 2, clip.size[1] / 2)
-    densifiers = [GradientDensifier(densify, len(p), half_size) for p in model.parts()]
+    densifiers = [GradientDensifier(densify, len(p), half_size, device) for p in model.parts()]
     optimise(model, views, densifiers, options, seed, progress)
     empty = parts.static.select(torch.zeros(0, dtype=torch.int64))
     dynamic = model.dynamic.frozen() if model.dynamic is not None else empty
     return Scene(
         static=model.static.frozen() if model.static is not None else empty,
         dynamic=dynamic,
-        deformation=None if moving is None else moving.requires_grad_(False),
+        deformation=None if moving is None else moving.requires_grad_(False).to(CPU),
         actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
         sky=start.sky,
         exposure=model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera),

@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from dreamdrive.device import in_core
 from dreamdrive.motion.compiled_deformation import network_residual, posed
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.motion.tracks import Tracks, key_weights, multiply_quaternions, rotate
@@ -257,7 +258,7 @@ class DeformationField(Motion):
         """
         if len(gaussians) == 0:
             return gaussians.faded_at(t_s)
-        if gaussians.means.dtype == torch.float32 and gaussians.means.is_cpu:
+        if in_core(gaussians.means):
             return self._compiled_at(gaussians, t_s)
         offsets = self(gaussians.means, gaussians.quaternions, gaussians.actor, t_s)
         moved = replace(

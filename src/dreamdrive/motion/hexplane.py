@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from dreamdrive.device import in_core
 from dreamdrive.motion.compiled_hexplane import dense_network, plane_features, steepness
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.scene.gaussians import Gaussians
@@ -150,7 +151,7 @@ class HexPlaneField(Motion):
 
     def features(self, means: Float[Tensor, "n 3"], t_s: float) -> Float[Tensor, "n f"]:
         """Features (N, features * levels) of canonical means in metres at a time."""
-        if _compiled(means):
+        if in_core(means):
             lines = [self._slice(time, t_s)[:, :, 0] for time in self.time]
             return plane_features(means, self.low_m, self.high_m, list(self.space), lines)
         place = 2 * (means.detach() - self.low_m) / (self.high_m - self.low_m) - 1
@@ -192,7 +193,7 @@ class HexPlaneField(Motion):
 
     def _decoded(self, features: Float[Tensor, "n f"]) -> Float[Tensor, "n o"]:
         """Offsets of mean and colour of N features, side by side."""
-        if not _compiled(features):
+        if not in_core(features):
             hidden = self.trunk(features)
             return torch.cat([self.head_mean(hidden), self.head_sh(hidden)], dim=1)
         (middle, middle_bias, mean, mean_bias), (other, other_bias, sh, sh_bias) = (
@@ -225,11 +226,6 @@ class HexPlaneField(Motion):
         return torch.stack(terms).sum()
 
 
-def _compiled(values: Tensor) -> bool:
-    """Whether the compiled core takes them; all else goes through plain torch."""
-    return values.dtype == torch.float32 and values.is_cpu
-
-
 def _head(width: int, outputs: int) -> nn.Sequential:
     last = nn.Linear(width, outputs)
     nn.init.zeros_(last.weight)
@@ -245,6 +241,6 @@ def _sample(planes: Float[Tensor, "3 c h w"], places: Float[Tensor, "3 n 2"]) ->
 
 def _steepness(planes: Float[Tensor, "3 c r r"], weight: float) -> Float[Tensor, ""]:
     """Weighted mean squares of the differences between neighbours along each axis."""
-    if _compiled(planes):
+    if in_core(planes):
         return steepness(planes, weight)
     return weight * (planes.diff(dim=2).square().mean() + planes.diff(dim=3).square().mean())

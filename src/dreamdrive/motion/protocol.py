@@ -1,6 +1,7 @@
 """What scenes and fits ask of a representation of motion."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -80,6 +81,13 @@ class Motion(nn.Module, ABC):
     @abstractmethod
     def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         """The Gaussians as they are at ``t_s``, differentiable; the result has no life spans left."""
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "Motion":
+        """Times stay on the CPU whatever else moves: a step asks for each of them, and would wait for it."""
+        times = {name: values for name, values in self._buffers.items() if name.endswith("_s")}
+        super()._apply(fn, recurse)
+        self._buffers.update(times)
+        return self
 
     def check(self, gaussians: Gaussians) -> None:
         """Raise ``ValueError`` where these are not Gaussians that it can move."""

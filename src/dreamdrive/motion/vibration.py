@@ -93,7 +93,7 @@ class Vibration(Motion):
         to agree on where things go.
         """
         c = self.config
-        draw, place = torch.rand(2, generator=generator).tolist()
+        draw, place = torch.rand(2, generator=generator, device=generator.device).tolist()
         shift_s = (2 * place - 1) * c.shift_frames * c.interval_s if draw < c.shift_share else 0.0
         return self._shifted_at(gaussians, t_s, shift_s)
 

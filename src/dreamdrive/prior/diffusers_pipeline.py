@@ -10,8 +10,8 @@ from jaxtyping import Float, Int
 
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
-from dreamdrive.memory import best_device
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
@@ -52,7 +52,7 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
     Raises:
         InputError: A part is missing or of another kind.
     """
-    gpu = best_device().type == "cuda"
+    gpu = chosen_device().type == "cuda"
     try:
         pipeline = kind.from_pretrained(
             folder,

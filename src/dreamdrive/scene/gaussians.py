@@ -62,6 +62,10 @@ class Gaussians:
         rows = torch.nonzero(index).squeeze(1) if index.dtype == torch.bool else index
         return replace(self, **{name: value.index_select(0, rows) for name, value in self.tensors().items()})
 
+    def to(self, device: torch.device) -> "Gaussians":
+        """The same on a device."""
+        return replace(self, **{name: value.to(device) for name, value in self.tensors().items()})
+
     def without_features(self) -> "Gaussians":
         """The same without Z_ref, which rendering has no use for and would be copied about with."""
         return replace(self, features=None)
