@@ -150,7 +150,8 @@ def generate(
         workspace = open_workspace(out, request, force=force, recompute=recompute)
         if workspace is None:
             return read_outcome(inside(out, REPORT), already_finished=True)
-        _announce(control, prior, quality, representation, say)
+        # What a run takes was measured on CPUs.
+        _announce(control, prior, quality, representation, say if device == "cpu" else lambda sentence: None)
         stages = Stages(workspace.stages, recompute_from, progress, workspace.claim)
         made = _make(stages, control, geometry_files, network, request, say)
         return outcome_of(_publish(workspace, stages, control, made), REPORT, already_finished=False)

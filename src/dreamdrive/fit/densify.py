@@ -1,5 +1,6 @@
 """Growing and pruning of Gaussians while they are fitted."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -28,9 +29,10 @@ class Densifier(Protocol):
 
 @dataclass(frozen=True)
 class DensifySettings:
-    """Constants of ``GradientDensifier``, with the value of 3DGS where it differs.
+    """Which strategy, and the constants of ``GradientDensifier``, with the value of 3DGS where it differs.
 
     Attributes:
+        strategy: Name in ``DENSIFIERS``.
         start: Share of the steps after which growing begins (3DGS: 500 of 30,000).
         stop: Share of the steps after which it ends (3DGS: 15,000 of 30,000).
         every: Steps between two changes.
@@ -44,6 +46,7 @@ class DensifySettings:
         most: Growth stops at this many Gaussians; the largest gradients go first.
     """
 
+    strategy: str = "gradient"
     start: float = 0.15
     stop: float = 0.6
     every: int = 100
@@ -146,6 +149,9 @@ class GradientDensifier:
 class NoDensifier:
     """Keep the set as it was seeded."""
 
+    def __init__(self, *unused: object) -> None:
+        pass
+
     def observe(
         self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
     ) -> None:
@@ -153,3 +159,10 @@ class NoDensifier:
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
         """Nothing is changed."""
+
+
+DENSIFIERS: dict[str, Callable[[DensifySettings, int, tuple[float, float], torch.device], Densifier]] = {
+    "gradient": GradientDensifier,
+    "none": NoDensifier,
+}
+"""Every strategy by name, made from settings, number of Gaussians, half the image in pixels, device."""

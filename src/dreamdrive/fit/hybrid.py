@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import torch
 
 from dreamdrive.device import CPU
-from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.densify import DENSIFIERS, DensifySettings
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
@@ -77,7 +77,7 @@ def fit(
         exposure=ExposureNetwork(len(clip), seed).to(device),
     )
     half_size = (clip.size[0] / 2, clip.size[1] / 2)
-    densifiers = [GradientDensifier(densify, len(p), half_size, device) for p in model.parts()]
+    densifiers = [DENSIFIERS[densify.strategy](densify, len(p), half_size, device) for p in model.parts()]
     optimise(model, views, densifiers, options, seed, progress)
     empty = parts.static.select(torch.zeros(0, dtype=torch.int64))
     dynamic = model.dynamic.frozen() if model.dynamic is not None else empty

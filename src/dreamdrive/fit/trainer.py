@@ -194,6 +194,8 @@ class Trainer:
             next(densifiers).observe(rows, gradient[static:], rendered.visible[static:])
 
 
+# SSIM takes differences of squares, for which the ten bits of TF32 are too few.
+@torch.backends.cudnn.flags(enabled=True, allow_tf32=False)
 @one_torch_thread()
 def optimise(
     model: Model,
