@@ -7,9 +7,7 @@ them, so that an interrupted benchmark goes on. A run that fails is named at the
 through ``DREAMDRIVE_DATA`` (default ``../shared/data``). Truth is used to measure only.
 """
 
-import argparse
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -18,16 +16,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from _report_file import write
-from pandaset_truth import camera_path, moving_masks
 
+from common.options import parser_of
+from common.pandaset_truth import camera_path, moving_masks
+from common.places import DATA, DREAMDRIVE
+from common.report import as_json, exit_code, write
 from dreamdrive.evaluate.paths import compare_paths
-from dreamdrive.evaluate.retrieval import retrieval
 from dreamdrive.scene.folder import load_scene
 from dreamdrive.splat.scene_view import render_scene
 
-ROOT = Path(__file__).resolve().parents[1]
-DATA = Path(os.environ.get("DREAMDRIVE_DATA", ROOT / "../shared/data")).resolve()
 HELD_OUT = ["--hold-out", "8"]
 
 
@@ -41,12 +38,19 @@ class Run:
     truth: str | None = None
 
 
-PANDASET = ["--fps", "10", "--size", "480x270", "--camera-height", "2.2"]
 # The other clips show what the geometry and the split make of them; a draft is enough for that.
-SHORT = [*HELD_OUT, "--quality", "draft"]
+DRAFT = ["--quality", "draft"]
+SHORT = [*HELD_OUT, *DRAFT]
+PANDASET = ["--fps", "10", "--size", "480x270", "--camera-height", "2.2"]
+CAMERAS = ["--geometry-files", str(DATA / "clips/pandaset_002/cameras.json")]
 KITTI = ["--fps", "10", "--frames", "0:48:2", "--size", "480x144", "--camera-height", "1.65", *SHORT]
-DRIVE = [*PANDASET, "--frames", "20:68:2", *HELD_OUT]
 UDACITY = ["--frames", "0:48:2", "--size", "480x270", *SHORT]
+
+
+def drive(*options: str) -> Run:
+    """The moving part of the PandaSet clip."""
+    usual = [*PANDASET, "--frames", "20:68:2", *HELD_OUT]
+    return Run("pandaset_002", "front_camera", [*usual, *options], "pandaset")
 
 
 def with_lens(clip: str) -> list[str]:
@@ -55,33 +59,12 @@ def with_lens(clip: str) -> list[str]:
 
 
 RUNS = {
-    "pandaset": Run("pandaset_002", "front_camera", DRIVE, "pandaset"),
-    "pandaset-draft": Run("pandaset_002", "front_camera", [*DRIVE, "--quality", "draft"], "pandaset"),
-    "pandaset-files-draft": Run(
-        "pandaset_002",
-        "front_camera",
-        [*DRIVE, "--quality", "draft", "--geometry-files", str(DATA / "clips/pandaset_002/cameras.json")],
-        "pandaset",
-    ),
-    "pandaset-files-refined-draft": Run(
-        "pandaset_002",
-        "front_camera",
-        [
-            *DRIVE,
-            "--quality",
-            "draft",
-            "--refine-poses",
-            "--geometry-files",
-            str(DATA / "clips/pandaset_002/cameras.json"),
-        ],
-        "pandaset",
-    ),
-    "pandaset-static": Run(
-        "pandaset_002", "front_camera", [*DRIVE, "--representation", "static"], "pandaset"
-    ),
-    "pandaset-deformable": Run(
-        "pandaset_002", "front_camera", [*DRIVE, "--representation", "deformable"], "pandaset"
-    ),
+    "pandaset": drive(),
+    "pandaset-draft": drive(*DRAFT),
+    "pandaset-files-draft": drive(*DRAFT, *CAMERAS),
+    "pandaset-files-refined-draft": drive(*DRAFT, "--refine-poses", *CAMERAS),
+    "pandaset-static": drive("--representation", "static"),
+    "pandaset-deformable": drive("--representation", "deformable"),
     "pandaset-standing": Run("pandaset_002", "front_camera", [*PANDASET, "--frames", "0:20:1", *SHORT]),
     "udacity": Run("udacity_highway_two_cars", "video.mp4", UDACITY),
     "udacity-lens": Run(
@@ -96,13 +79,8 @@ for _name in ("kitti_odom04_follow_van", "kitti_odom06_avenue", "kitti_odom07_le
 
 def main() -> int:
     """Run, measure, print each row and write all as JSON; 1 if a run failed."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__, runs="runs/clips", resume=True)
     parser.add_argument("names", nargs="*", help=f"which of {', '.join(RUNS)}; all unless given")
-    parser.add_argument("--resume", action="store_true", help="keep runs that are finished")
-    parser.add_argument("--runs", type=Path, default=ROOT / "runs" / "clips")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     unknown = set(args.names) - set(RUNS)
     if unknown:
@@ -118,16 +96,14 @@ def main() -> int:
             print(f"{name}: {error}", file=sys.stderr, flush=True)
             continue
         print(json.dumps(rows[-1]), flush=True)
-        write(args.json, json.dumps({"rows": rows}, indent=1) + "\n")
-    for name in failed:
-        print(f"failed: {name}", file=sys.stderr)
-    return 1 if failed else 0
+        write(args.json, as_json({"rows": rows}))
+    return exit_code(failed)
 
 
 def measure(name: str, run: Run, out: Path) -> dict:
     """Generate a scene, unless it is there already, and compare it with what is known of the clip."""
-    program = [str(Path(sys.executable).parent / "dreamdrive"), "generate"]
-    command = [*program, str(DATA / "clips" / run.clip / run.source), *run.options, "-o", str(out)]
+    source = DATA / "clips" / run.clip / run.source
+    command = [*DREAMDRIVE, "generate", str(source), *run.options, "-o", str(out)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     report = json.loads((out / "report.json").read_text())
     row = {
@@ -167,7 +143,7 @@ def compare_with_boxes(scene, clip_dir: Path, report: dict, out: Path) -> dict:
     frames = report["frames"]["source_index"]
     size = tuple(report["frames"]["size"])
     truth = moving_masks(clip_dir, frames, size)
-    shares, squared, count = [], 0, 0
+    shares, errors = [], {}
     for i, (camera, t_s) in enumerate(zip(scene.cameras, scene.times_s.tolist(), strict=True)):
         view = render_scene(scene, camera, t_s)
         shares.append(view.dynamic_share.numpy())
@@ -175,14 +151,9 @@ def compare_with_boxes(scene, clip_dir: Path, report: dict, out: Path) -> dict:
             name = clip_dir / "front_camera" / f"{frames[i]:02d}.jpg"
             frame = cv2.resize(cv2.imread(str(name)), size, interpolation=cv2.INTER_AREA)[..., ::-1]
             rendered = cv2.imread(str(out / "held_out" / f"{frames[i]:04d}.png"))[..., ::-1]
-            difference = (rendered.astype(float) - frame)[truth.counted[i]] / 255
-            squared += (difference**2).sum()
-            count += difference.size
+            errors[i] = (rendered.astype(float) - frame) / 255
     paths = path_figures(scene, camera_path(clip_dir, frames))
-    judged = ~truth.ignored
-    iou = retrieval(truth.counted[judged], np.stack(shares)[judged]).iou
-    hull_psnr = float(-10 * np.log10(squared / count))
-    return {"moving_iou": iou, "moving_psnr": hull_psnr, **paths}
+    return {**truth.figures(shares, errors), **paths}
 
 
 if __name__ == "__main__":

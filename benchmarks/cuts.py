@@ -7,8 +7,6 @@ from drawn worlds, clean and as a video model might have drawn them. A cut count
 its very frame; whatever else is named is a false alarm.
 """
 
-import argparse
-import json
 import subprocess
 import sys
 import time
@@ -19,8 +17,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from _cut_cases import (
-    ROOT,
+
+from common.options import parser_of
+from common.places import DREAMDRIVE
+from common.report import as_json, write
+from cuts.cases import (
     Case,
     apart,
     at_the_ends,
@@ -34,8 +35,6 @@ from _cut_cases import (
     read,
     softened,
 )
-from _report_file import write
-
 from dreamdrive.data.cuts import find_cuts
 
 SEEDS = range(8)
@@ -57,19 +56,16 @@ class Row:
 
 def main() -> int:
     """Measure, print each group and write all as JSON."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--worlds", type=Path, default=ROOT / "runs" / "cut_worlds")
+    parser = parser_of(__doc__)
+    parser.add_argument("--worlds", type=Path, default=Path("runs/cut_worlds"), metavar="DIR")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="take every Nth recording only")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     cv2.setNumThreads(1)
     rows: dict[str, Row] = {}
     for case in islice(cases(args.worlds), 0, None, args.every):
         measure(case, rows)
         report = {"every": args.every, "groups": summary(rows)}
-        write(args.json, json.dumps(report, indent=1) + "\n")
+        write(args.json, as_json(report))
     for group, row in rows.items():
         print(
             f"{group:45s} recordings {row.recordings:4d}  cuts {row.cuts:4d}  found {row.found:4d}  "
@@ -97,11 +93,10 @@ def cases(worlds: Path) -> Iterator[Case]:
 
 def drawn(folder: Path, options: list[str]) -> dict[str, np.ndarray]:
     """The streets of all seeds, kept in a folder."""
-    program = [str(Path(sys.executable).parent / "dreamdrive"), "world", "make"]
     for seed in SEEDS:
         out = folder / str(seed)
         if not out.exists():
-            command = [*program, "--seed", str(seed), *WORLD, *options, "-o", str(out)]
+            command = [*DREAMDRIVE, "world", "make", "--seed", str(seed), *WORLD, *options, "-o", str(out)]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return {f"seed {seed}": read(folder / str(seed)) for seed in SEEDS}
 

@@ -3,31 +3,31 @@
     python benchmarks/gpu.py [--gaussians N ...] [--sizes 960x576 ...] [--seconds S] [--json FILE]
 
 Both render colour, alpha and depth of the street scene with spherical harmonics of degree 3 from eight places
-along the road, and take the training steps that ``_gpu_training.py`` describes. They run in turn, in blocks
-of ten with the GPU idle before and after. Figures are medians over blocks; the ratio says how many times
+along the road, and take the training steps of ``splat/gpu_training.py``. They run in turn, in blocks of ten
+with the GPU idle before and after. Figures are medians over blocks; the ratio says how many times
 faster ours is. Below them stand the difference of the first images and the first and last losses of both:
 where these disagree the two did not do the same work, and the exit code is 1.
 """
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from statistics import median
 from types import ModuleType
 from typing import Any
 
 import torch
-from _gpu_training import gsplat_step, intrinsics, our_step, ssim_of_the_peer
-from _street_scenes import street
 from torch import Tensor
 
+from common.options import parser_of
+from common.report import as_json, write
 from dreamdrive.scene.gaussians import SH_C0
 from dreamdrive.splat import rasterize
 from dreamdrive.splat.cuda import load_gsplat, why_unusable
 from dreamdrive.splat.reference import NEAR_M
+from splat.gpu_training import gsplat_step, intrinsics, our_step, ssim_of_the_peer
+from splat.streets import pinhole_of, street
 
 BLOCK = 10
 VIEWS = 8
@@ -63,10 +63,9 @@ def scene(
         "opacities": values["opacities"],
         "sh": sh,
     }
-    names = {"fx_px": "fx", "fy_px": "fy", "cx_px": "cx", "cy_px": "cy", "width_px": "W", "height_px": "H"}
     poses = values["viewmat"].repeat(VIEWS, 1, 1)
     poses[:, 2, 3] -= STRIDE_M * torch.arange(VIEWS, device=device)
-    return gaussians, {ours: arrays[theirs].item() for ours, theirs in names.items()}, poses
+    return gaussians, pinhole_of(arrays), poses
 
 
 def renderings(
@@ -193,15 +192,12 @@ def print_row(row: dict[str, Any]) -> None:
 
 def options_of() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--gaussians", nargs="+", type=int, default=[500_000, 2_000_000], metavar="N")
     parser.add_argument(
         "--sizes", nargs="+", type=size_of, default=[(960, 576), (1920, 1080)], metavar="WIDTHxHEIGHT"
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each figure")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
     return parser.parse_args()
 
 
@@ -231,7 +227,7 @@ def main() -> int:
             "gsplat": gsplat.__version__,
             "ssim_of_the_peer": source,
         }
-        options.json.write_text(json.dumps({"machine": machine, "rows": rows}, indent=2) + "\n")
+        write(options.json, as_json({"machine": machine, "rows": rows}))
     return 1 if any(map(disagreements, rows)) else 0
 
 

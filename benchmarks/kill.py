@@ -7,8 +7,6 @@ One run is left alone; its time is the range that the moments are drawn from. Ea
 same command is given again. What is compared are all files of scene, videos and withheld frames.
 """
 
-import argparse
-import json
 import shutil
 import signal
 import subprocess
@@ -19,20 +17,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from _report_file import write
 
-SMALL = [
-    "--prior",
-    "street-world",
-    "--frames",
-    "0:12",
-    "--size",
-    "128x80",
-    "--quality",
-    "draft",
-    "--hold-out",
-    "4",
-]
+from common.options import parser_of
+from common.places import DREAMDRIVE
+from common.report import as_json, write
+
+SMALL = ["--prior", "street-world", "--frames", "0:12", "--size", "128x80"]
+SMALL += ["--quality", "draft", "--hold-out", "4"]
 COMPARED = ("scene", "video", "held_out")
 
 
@@ -53,8 +44,8 @@ class Kill:
 
 def start(out: Path, arguments: list[str]) -> "subprocess.Popen[str]":
     """A run in a process of its own."""
-    command = [sys.executable, "-u", "-c", "from dreamdrive.cli.main import main; main()", "generate"]
-    return subprocess.Popen([*command, *arguments, "-o", str(out)], stdout=subprocess.PIPE, text=True)
+    command = [*DREAMDRIVE, "generate", *arguments, "-o", str(out)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
 def finish(out: Path, arguments: list[str]) -> float:
@@ -114,11 +105,9 @@ def measure(folder: Path, arguments: list[str], times: int, seed: int) -> list[K
 
 def main() -> None:
     """Measure and say."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=shape)
+    parser = parser_of(__doc__)
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path)
     parser.add_argument("arguments", nargs="*", default=SMALL)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -126,7 +115,7 @@ def main() -> None:
     same = sum(not kill.different for kill in kills)
     print(f"{same} of {len(kills)} resumed runs are an undisturbed one, byte for byte")
     values = {"arguments": given.arguments, "kills": [asdict(kill) for kill in kills]}
-    write(given.json, json.dumps(values, indent=1) + "\n")
+    write(given.json, as_json(values))
     sys.exit(same != len(kills))
 
 

@@ -16,14 +16,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from _machine import add_options, describe_machine, undisturbed
-from _markdown import replace_section
-from _memory import peak_bytes, resident_bytes
-from _passes import forward_backward_of, forward_of, times_ms, view_of
-from _scale_report import markdown, plot, text
-from _street_scenes import SIZES, street
 
-from dreamdrive.splat import one_torch_thread, set_threads, threads
+from common.machine import add_patience, add_threads, describe_machine, undisturbed, use_threads
+from common.markdown import replace_section
+from common.memory import peak_bytes, resident_bytes
+from common.options import parser_of
+from common.report import as_json, write
+from dreamdrive.splat import one_torch_thread, threads
+from splat.passes import forward_backward_of, forward_of, times_ms, view_of
+from splat.scale_report import markdown, plot, text
+from splat.streets import SIZES, street
 
 SIZE, COUNT = (960, 576), 500_000
 COUNTS = (50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000)
@@ -100,17 +102,12 @@ def measure_all(options: argparse.Namespace) -> list[dict[str, object]]:
 
 def parse() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--quick", action="store_true", help="a few points only")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="where a picture of them goes")
+    parser = parser_of(__doc__)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="a file whose section is written anew")
-    parser.add_argument(
-        "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
-    )
-    add_options(parser)
+    parser.add_argument("--quick", action="store_true", help="a few points only")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="where a picture of them goes")
+    add_threads(parser)
+    add_patience(parser)
     parser.add_argument("--point", type=Path, metavar="FILE.npz", help="measure one scene, print JSON, stop")
     return parser.parse_args()
 
@@ -118,8 +115,7 @@ def parse() -> argparse.Namespace:
 def main() -> None:
     """Measure all points, or the one that this process is for."""
     options = parse()
-    if options.threads is not None:
-        set_threads(options.threads)
+    use_threads(options.threads)
     if options.point is not None:
         with one_torch_thread():
             print(json.dumps(measure(options.point)))
@@ -127,9 +123,7 @@ def main() -> None:
     rows = measure_all(options)
     report = {"machine": describe_machine() | {"others": max(row["others"] for row in rows)}, "rows": rows}
     print(text(report))
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(report, indent=2) + "\n")
+    write(options.json, as_json(report))
     if options.plot:
         plot(report, options.plot)
     if options.markdown:

@@ -15,25 +15,26 @@ Without a C++ compiler the second and third are left out.
 """
 
 import argparse
-import json
 import time
 from pathlib import Path
 
 import numpy as np
 import torch
-from _machine import add_options, describe_machine, undisturbed
-from _markdown import replace_section
-from _opensplat import load_opensplat, opensplat_passes
-from _passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
-from _peer import THREADS as PEER_THREADS
-from _peer import TIMES_MS, compare, compare_older
-from _programs import Scene, common_image, measure_peaks, walk
-from _roofline import FORWARD, STAGES, least_ms, roofline
-from _splat_report import markdown, text
-from _street_scenes import COMMON, load
 
+from common.machine import add_patience, add_threads, describe_machine, undisturbed, use_threads
+from common.markdown import replace_section
+from common.options import parser_of
+from common.report import as_json, write
 from dreamdrive import _native
-from dreamdrive.splat import one_torch_thread, rasterize, set_threads
+from dreamdrive.splat import one_torch_thread, rasterize
+from splat.opensplat import load_opensplat, opensplat_passes
+from splat.passes import View, best_and_median, forward_backward_of, forward_of, times_ms, view_of
+from splat.peer import THREADS as PEER_THREADS
+from splat.peer import TIMES_MS, compare, compare_older
+from splat.programs import Scene, common_image, measure_peaks, walk
+from splat.report import markdown, text
+from splat.roofline import FORWARD, STAGES, least_ms, roofline
+from splat.streets import COMMON, load
 
 LANES = {"baseline": 4, "avx2": 8, "avx512": 16}
 
@@ -148,22 +149,15 @@ def against_twin(scene: Scene) -> dict:
 
 def parse() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--scenes", nargs="+", default=["a"], metavar="SCENE", help="t, a, b, c or FILE.npz")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
+    parser = parser_of(__doc__)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="a file whose section is written anew")
-    parser.add_argument(
-        "--threads", type=int, metavar="N", help="threads (default: all cores this process may use)"
-    )
+    parser.add_argument("--scenes", nargs="+", default=["a"], metavar="SCENE", help="t, a, b, c or FILE.npz")
     parser.add_argument("--repeat", type=int, default=15, metavar="N", help="runs a figure is the median of")
-    add_options(parser)
+    add_threads(parser)
+    add_patience(parser)
     parser.add_argument("--opensplat", type=Path, metavar="DIR", help="checkout of OpenSplat to measure too")
     options = parser.parse_args()
-    if options.threads is not None:
-        set_threads(options.threads)
-        torch.set_num_threads(options.threads)
+    use_threads(options.threads)
     options.threads = _native.threads()
     return options
 
@@ -182,9 +176,7 @@ def main() -> None:
         "statistic": f"median of {options.repeat}",
     }
     print(text(report))
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(report, indent=2) + "\n")
+    write(options.json, as_json(report))
     if options.markdown:
         replace_section(options.markdown, "splat", markdown(report))
 

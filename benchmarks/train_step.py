@@ -6,24 +6,22 @@ The step is the trainer's own, on a street of Gaussians of which a tenth go thro
 time is the mean over ten steps; the best of ``--repeat`` rounds counts, as others may use the machine. The
 split is torch's profile of the step in the same rounds: each stage's own share, backward by the forward stage
 it belongs to. The peer is the step written with plain torch (torch.optim.Adam, SSIM by conv2d;
-benchmarks/_plain_step.py) around the same splat, with one torch thread and with as many as the machine has,
-in turn with ours.
+splat/plain_step.py) around the same splat, with one torch thread and with as many as the machine has, in turn
+with ours.
 """
 
-import argparse
 import functools
-import json
 import time
 from collections import defaultdict
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
-from pathlib import Path
 from unittest.mock import patch
 
 import torch
-from _fit_scene import FIRST_STEP, OPTIONS, FitScene, make
-from _plain_step import PlainTrainer
 
+from common.machine import add_threads, describe_machine, use_threads
+from common.options import parser_of
+from common.report import as_json, write
 from dreamdrive import _native
 from dreamdrive.fit import trainer as trainer_module
 from dreamdrive.fit.exposure import ExposureNetwork
@@ -31,7 +29,9 @@ from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.trainer import Model, Trainer
 from dreamdrive.motion import deformation as deformation_module
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.splat import native_info, one_torch_thread, set_threads
+from dreamdrive.splat import one_torch_thread
+from splat.fit_scene import FIRST_STEP, OPTIONS, FitScene, make
+from splat.plain_step import PlainTrainer
 
 STEPS = 10  # of one round; one of them looks at the shapes
 # Whose calls are timed, and as what.
@@ -134,7 +134,8 @@ def steps_of(scene: FitScene, trainer: Trainer | PlainTrainer) -> Callable[[int]
 def print_table(report: dict[str, object]) -> None:
     """What was measured, for people."""
     whole = report["step_ms"]
-    print(f"{report['gaussians']} Gaussians, {report['size']}, {report['source']}, {report['machine']}")
+    machine = f"{report['machine']['isa']}, {report['machine']['threads']} threads"
+    print(f"{report['gaussians']} Gaussians, {report['size']}, {report['source']}, {machine}")
     print(f"\n{'stage':<28}{'forward ms':>12}{'backward ms':>13}{'share':>8}")
     for row in report["stages"]:
         share = (row["forward_ms"] + row["backward_ms"]) / whole
@@ -146,18 +147,13 @@ def print_table(report: dict[str, object]) -> None:
 
 def main() -> None:
     """Measure the step and its peer."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go")
+    parser = parser_of(__doc__)
+    add_threads(parser)
     parser.add_argument("--gaussians", type=int, default=100_000, metavar="N")
     parser.add_argument("--size", default="480x270", metavar="WxH")
-    parser.add_argument("--threads", type=int, metavar="N", help="threads (default: all cores)")
     parser.add_argument("--repeat", type=int, default=5, metavar="N", help="rounds the best is taken of")
     options = parser.parse_args()
-    if options.threads is not None:
-        set_threads(options.threads)
-        torch.set_num_threads(options.threads)
+    use_threads(options.threads)
     width, height = (int(side) for side in options.size.split("x"))
     _native.keep_freed_memory()
     scene = make(width, height, options.gaussians)
@@ -189,11 +185,10 @@ def main() -> None:
         "steps_per_s": 1e3 / whole,
         "stages": split_ms(profiles, whole),
         "peers": peers,
-        "machine": native_info(),
+        "machine": describe_machine(),
     }
     print_table(report)
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=2) + "\n")
+    write(options.json, as_json(report))
 
 
 if __name__ == "__main__":

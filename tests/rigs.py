@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from dreamdrive.data.world import Drive, Mount, StreetOptions, draw_street, drive, front_from_mount
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import Drive, Mount, StreetOptions, draw_street, drive, front_from_mount
 from tests.streets import street_clip
 
 MOUNTED: tuple[Mount, ...] = ("front", "front_left")

@@ -4,11 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from dreamdrive.data.world import Drive, drive, make_street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
 from dreamdrive.scene.layout import Area, Box, Ego, Layout, TrackPoint
+from dreamdrive.world import Drive, drive, make_street
 
 
 def street_clip(street: Drive, hold_out: int | None = None) -> Clip:

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import Control, InputError, Outcome, codec, generate, load_scene, options, pipeline
+from dreamdrive import Control, InputError, Outcome, generate, load_scene, options, pipeline
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, StaticFit
 from dreamdrive.geometry import reconstruct
+from dreamdrive.run import codec, production
 from dreamdrive.run.lock import only_run
+from dreamdrive.run.stages import STAGES
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.stages import STAGES
 
 TINY = Control(frames="0:6", size=(64, 40), hold_out=4, seed=1)
 
@@ -39,7 +40,7 @@ def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def make(out: Path, control: Control = TINY, **changes: object) -> Outcome:
-    settings: dict[str, object] = {"prior": "street-world", "quality": "draft", **changes}
+    settings: dict[str, object] = {"prior": "street-world", "options": "draft", **changes}
     return generate(control, out, **settings)  # type: ignore[arg-type]
 
 
@@ -156,7 +157,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, victim, killed)
+        patch.setattr(production if victim == "write_videos" else pipeline, victim, killed)
         with pytest.raises(KeyboardInterrupt):
             make(tmp_path)
     assert not (tmp_path / "report.json").exists()
@@ -182,7 +183,8 @@ def test_from_recomputes_and_gives_the_same_bytes(finished: Path, tmp_path: Path
 @pytest.mark.parametrize("representation", ["static", "deformable", "hexplane", "vibration"])
 def test_the_baselines_come_from_the_same_code(tmp_path: Path, representation: str) -> None:
     taken: dict[str, int] = {}
-    make(tmp_path, representation=representation, progress=lambda stage, done, _: taken.update({stage: done}))
+    chosen = replace(options.QUALITIES["draft"], representation=representation)
+    make(tmp_path, options=chosen, progress=lambda stage, done, _: taken.update({stage: done}))
     steps = json.loads((tmp_path / "report.json").read_text())["steps"]
     assert steps == {"static": taken["static"], "fit": taken["fit"]} == {"static": 6, "fit": 8}
     scene = load_scene(tmp_path / "scene")
@@ -231,39 +233,6 @@ def _size(path: Path) -> tuple[int, int, int]:
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         return sum(1 for _ in container.decode(stream)), stream.width, stream.height
-
-
-def test_the_lens_of_a_model_is_taken_out_of_the_frames(tmp_path: Path) -> None:
-    frames = [{"file_path": f"{i}.png", "transform_matrix": np.eye(4).tolist()} for i in range(2)]
-    shared = {"w": 64, "h": 40, "fl_x": 60.0, "k1": -0.1}
-    path = tmp_path / "transforms.json"
-    path.write_text(json.dumps({**shared, "frames": frames}))
-    assert pipeline._with_lens(Control(), path).intrinsics == path
-    assert pipeline._with_lens(Control(), tmp_path).intrinsics == path
-    own = Control(intrinsics=tmp_path / "own.json")
-    assert pipeline._with_lens(own, path) == own
-    path.write_text(json.dumps({**shared, "k1": 0.0, "frames": frames}))
-    assert pipeline._with_lens(Control(), path) == Control()
-
-
-def test_all_that_decides_over_the_geometry_decides_over_the_result(tmp_path: Path) -> None:
-    path = tmp_path / "poses.txt"
-    path.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
-    before = pipeline._digests(Control(), path, None)
-    (tmp_path / "geometry.json").write_text("{}")
-    assert pipeline._digests(Control(), path, None) != before
-
-
-@pytest.mark.parametrize("folder", ["frames", "rig"])
-def test_pictures_in_folders_below_the_input_count(tmp_path: Path, folder: str) -> None:
-    picture = tmp_path / ("frames" if folder == "frames" else "left") / "0000.png"
-    picture.parent.mkdir()
-    if folder == "rig":
-        (tmp_path / "rig.json").write_text("{}")
-    picture.write_bytes(b"one")
-    before = pipeline._digests(Control(tmp_path), None, None)
-    picture.write_bytes(b"two")
-    assert pipeline._digests(Control(tmp_path), None, None) != before
 
 
 def spoiled(value: object) -> object:

@@ -11,7 +11,7 @@ from dreamdrive.geometry import BACKENDS
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import QUALITIES, QualityName
 from dreamdrive.prior import PRIORS
-from dreamdrive.stages import STAGES
+from dreamdrive.run.stages import STAGES
 from tests.conftest import ROOT
 
 PUBLIC = [

@@ -3,17 +3,17 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from dreamdrive.decompose import GroupOptions, ScoreOptions
-from dreamdrive.decompose.actors import ActorOptions
+from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
-from dreamdrive.motion import MotionConfig, choose_representation
+from dreamdrive.geometry import GeometryOptions
+from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig, RepresentationName
 
 QualityName = Literal["draft", "standard", "high"]
 
 
 @dataclass(frozen=True)
-class Quality:
-    """How much work each stage does.
+class Options:
+    """How a scene is built: the options of each stage.
 
     Attributes:
         static: The fit as if nothing moved.
@@ -23,7 +23,11 @@ class Quality:
         group: The vote.
         cast: The actors' tracks.
         densify: Growing and pruning in the joint fit.
-        width: Units of the layers of every motion's network (the paper's baseline: 256; 64 suits two cores).
+        network: Size of the deformation field; its width is that of every representation.
+        representation: ``"hybrid"``, or one of its baselines.
+        device: Where networks and both fits are computed.
+        geometry: How cameras and depth are found.
+        seed: Seed of everything random.
     """
 
     static: FitOptions
@@ -33,26 +37,37 @@ class Quality:
     group: GroupOptions = field(default_factory=GroupOptions)
     cast: ActorOptions = field(default_factory=ActorOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
-    width: int = 64
+    network: DeformationConfig = field(default_factory=DeformationConfig)
+    representation: RepresentationName = "hybrid"
+    device: Literal["cpu", "cuda"] = "cpu"
+    geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    seed: int = 0
 
-    def motion(self, representation: str) -> MotionConfig | None:
+    @property
+    def motion(self) -> MotionConfig:
         """What the joint fit learns motion by; all networks have the same width."""
-        motion = choose_representation(representation).motion
-        return None if motion is None else motion.config_type.sized(self.width)
+        motion = REPRESENTATIONS[self.representation].motion
+        if motion is None or motion.config_type is type(self.network):
+            return self.network
+        return motion.config_type.sized(self.network.width)
 
-    def steps(self, representation: str) -> dict[str, int]:
+    @property
+    def steps(self) -> dict[str, int]:
         """Optimisation steps of each stage: those on Gaussians are the same for all representations.
 
         ``score`` trains the classifier of the decomposition and changes no Gaussian.
         """
         fits = {"static": self.static.steps, "fit": self.fit.steps}
-        scored = choose_representation(representation).moves == "scored"
-        return {**fits, "score": self.score.steps} if scored else fits
+        return (
+            {**fits, "score": self.score.steps}
+            if REPRESENTATIONS[self.representation].moves == "scored"
+            else fits
+        )
 
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
-QUALITIES: dict[QualityName, Quality] = {
-    "draft": Quality(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300, plane_rate=5e-2)),
-    "standard": Quality(FitOptions(steps=400), ScoreOptions(), FitOptions(steps=1600)),
-    "high": Quality(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
+QUALITIES: dict[QualityName, Options] = {
+    "draft": Options(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300, plane_rate=5e-2)),
+    "standard": Options(FitOptions(steps=400), ScoreOptions(), FitOptions(steps=1600)),
+    "high": Options(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
 }

@@ -1,22 +1,15 @@
 """The benchmark of recorded clips: its camera paths, what counts as made, and what a failure leaves."""
 
-import importlib
 import json
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
-
-
-@pytest.fixture
-def clips(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(FOLDER))
-    return importlib.import_module("clips")
+import clips
 
 
 def straight(metres: float) -> np.ndarray:
@@ -25,7 +18,7 @@ def straight(metres: float) -> np.ndarray:
     return poses
 
 
-def test_kitti_rows_give_the_path(clips: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kitti_rows_give_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "clips" / "one"
     folder.mkdir(parents=True)
     np.savetxt(folder / "poses.txt", straight(70.0)[:, :3].reshape(8, 12))
@@ -46,7 +39,7 @@ def test_kitti_rows_give_the_path(clips: ModuleType, tmp_path: Path, monkeypatch
 
 
 def test_a_run_that_fails_is_named_and_the_others_go_on(
-    clips: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def measure(name: str, run: object, out: Path) -> dict[str, str]:
         if name == "udacity":

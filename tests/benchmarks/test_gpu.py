@@ -1,37 +1,21 @@
 """What the benchmark of the GPU computes without one."""
 
-from types import ModuleType
-
 import pytest
 import torch
-from tests.conftest import ROOT
 
+import gpu
 from dreamdrive.splat.ssim import ssim_map_reference
+from splat import gpu_training as training
 
 
-@pytest.fixture
-def gpu(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    import gpu
-
-    return gpu
-
-
-@pytest.fixture
-def training(gpu: ModuleType) -> ModuleType:
-    import _gpu_training
-
-    return _gpu_training
-
-
-def test_without_a_gpu_it_says_so(gpu, monkeypatch):
+def test_without_a_gpu_it_says_so(monkeypatch):
     monkeypatch.setattr("sys.argv", ["gpu.py"])
     monkeypatch.setattr(gpu, "why_unusable", lambda: "torch finds no CUDA device")
     with pytest.raises(SystemExit, match=r"^gpu\.py measures a GPU, .*: torch finds no CUDA device$"):
         gpu.main()
 
 
-def test_help_needs_no_gpu(gpu, monkeypatch, capsys):
+def test_help_needs_no_gpu(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["gpu.py", "--help"])
     with pytest.raises(SystemExit) as done:
         gpu.main()
@@ -39,7 +23,7 @@ def test_help_needs_no_gpu(gpu, monkeypatch, capsys):
     assert "--gaussians" in capsys.readouterr().out
 
 
-def test_the_scene_has_the_size_asked_for_and_is_driven_through(gpu):
+def test_the_scene_has_the_size_asked_for_and_is_driven_through():
     gaussians, camera, poses = gpu.scene(96, 64, 500, "cpu")
     assert {name: tuple(value.shape) for name, value in gaussians.items()} == {
         "means": (500, 3),
@@ -52,7 +36,7 @@ def test_the_scene_has_the_size_asked_for_and_is_driven_through(gpu):
     assert torch.allclose(poses[:-1, 2, 3] - poses[1:, 2, 3], torch.tensor(gpu.STRIDE_M))
 
 
-def test_figures_are_medians_and_bests(gpu):
+def test_figures_are_medians_and_bests():
     figures = gpu.figures([1.0, 2.0, 4.0], [8.0, 4.0, 2.0])
     assert figures == {
         "ours_per_s": 5,
@@ -70,7 +54,7 @@ def gpu_row(**other):
     return {**case, "mean_abs_difference": 1e-6, "loss_first_and_last": losses, **other}
 
 
-def test_differences_are_printed(gpu, capsys):
+def test_differences_are_printed(capsys):
     assert gpu.disagreements(gpu_row()) == []
     gpu.print_row(gpu_row())
     out = capsys.readouterr().out
@@ -88,7 +72,7 @@ def test_differences_are_printed(gpu, capsys):
         ({"loss_first_and_last": {"ours": [0.2, 0.2], "gsplat": [0.2, 0.1]}}, "the last losses differ by"),
     ],
 )
-def test_other_work_is_a_disagreement(gpu, capsys, other, told):
+def test_other_work_is_a_disagreement(capsys, other, told):
     (trouble,) = gpu.disagreements(gpu_row(**other))
     assert trouble.startswith(told)
     gpu.print_row(gpu_row(**other))
@@ -96,9 +80,7 @@ def test_other_work_is_a_disagreement(gpu, capsys, other, told):
 
 
 @pytest.mark.parametrize(("difference", "code"), [(1e-6, 0), (0.01, 1)])
-def test_a_disagreement_fails_and_the_slower_ssim_of_the_peer_is_said(
-    gpu, monkeypatch, capsys, difference, code
-):
+def test_a_disagreement_fails_and_the_slower_ssim_of_the_peer_is_said(monkeypatch, capsys, difference, code):
     monkeypatch.setattr("sys.argv", ["gpu.py", "--sizes", "96x64", "--gaussians", "500"])
     monkeypatch.setattr(gpu, "why_unusable", lambda: None)
     monkeypatch.setattr(gpu, "load_gsplat", lambda: None)
@@ -109,7 +91,7 @@ def test_a_disagreement_fails_and_the_slower_ssim_of_the_peer_is_said(
     assert "fused_ssim is not installed: gsplat's steps take SSIM in plain torch" in capsys.readouterr().out
 
 
-def test_loss_in_closed_form_has_the_value_and_gradient_of_autograd(training):
+def test_loss_in_closed_form_has_the_value_and_gradient_of_autograd():
     g = torch.Generator().manual_seed(0)
     image, target = torch.rand(2, 23, 31, 3, generator=g, dtype=torch.float64)
     loss, gradient = training.loss_and_gradient(image, target)

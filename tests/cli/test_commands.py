@@ -109,7 +109,7 @@ def test_the_doctor_says_what_is_there(run: Run) -> None:
 
 
 def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dreamdrive.report.PACKAGES", ("torch", "not-installed-package"))
+    monkeypatch.setattr("dreamdrive.run.report.PACKAGES", ("torch", "not-installed-package"))
     monkeypatch.setattr("dreamdrive.cli.doctor.available_memory_mb", lambda: 500)
     result = run("doctor")
     assert result.code == 2

@@ -11,7 +11,7 @@ from dreamdrive.drive import MANOEUVRES
 from dreamdrive.geometry import BACKENDS
 from dreamdrive.options import QUALITIES
 from dreamdrive.prior import PRIORS
-from dreamdrive.stages import STAGES
+from dreamdrive.run.stages import STAGES
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "commands.md"
 NOTHING = "\N{EN DASH}"

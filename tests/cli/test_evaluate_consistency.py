@@ -8,10 +8,10 @@ import pytest
 
 from dreamdrive.cli.evaluate_consistency import consistency
 from dreamdrive.data import read_trajectory, write_trajectory
-from dreamdrive.data.world import make_street
-from dreamdrive.data.world.files import write_world
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world import make_street
+from dreamdrive.world.files import write_world
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,12 @@ import torch
 from tests.cli.conftest import Run
 from tests.streets import bare_street, street_clip, true_geometry
 
-from dreamdrive import codec
-from dreamdrive.data.world import Drive
-from dreamdrive.data.world.files import write_world
+from dreamdrive.run import codec
 from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive
+from dreamdrive.world.files import write_world
 
 SIZE = (80, 48)
 

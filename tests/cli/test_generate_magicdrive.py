@@ -10,7 +10,7 @@ from tests.test_pipeline import shorten
 
 from dreamdrive import load_scene
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import draw_street
+from dreamdrive.world import draw_street
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from tests.prior.vista.photos import save_photo
 from tests.prior.vista.tiny import official, save_official
 
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import draw_street
 from dreamdrive.prior.vista.kinds import SVD, VISTA
+from dreamdrive.world import draw_street
 
 Arguments = list[object]
 

@@ -10,7 +10,7 @@ from tests.test_pipeline import shorten
 
 from dreamdrive import load_scene
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import MOUNTS, draw_street
+from dreamdrive.world import MOUNTS, draw_street
 
 
 def test_a_world_is_written_with_all_truth(run: Run, tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_mistakes_are_told(run: Run, tmp_path: Path) -> None:
 def test_a_world_that_memory_cannot_hold_is_refused_before_it_is_drawn(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dreamdrive.memory.free_bytes", lambda: 1_000_000_000)
+    monkeypatch.setattr("dreamdrive.machine.free_bytes", lambda: 1_000_000_000)
     result = run("world", "make", "--size", "4000x2000", "--frames", 100, "-o", tmp_path / "w")
     assert result.code == 2
     assert result.err == (

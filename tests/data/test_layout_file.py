@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from dreamdrive.data.layout_file import problems, read_layout, schema_text, write_layout
-from dreamdrive.data.layout_picture import draw_layout
-from dreamdrive.data.world import draw_street
 from dreamdrive.errors import InputError
 from dreamdrive.scene.layout import Area, Box, Ego, Layout, TrackPoint
+from dreamdrive.world import draw_street
+from dreamdrive.world.layout_picture import draw_layout
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -13,8 +13,8 @@ from tests.data.pictures import approach
 from tests.rigs import drives, rig_clip, true_poses
 
 from dreamdrive.data.rig import RIG, is_rig, read_rig, read_rig_clip
-from dreamdrive.data.world.files import write_world
 from dreamdrive.errors import InputError
+from dreamdrive.world.files import write_world
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.data.corruption import Corruption, corrupt, parse_corruption
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.consistency import GAPS, Consistency, evaluate_consistency
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world import Drive, make_street
+from dreamdrive.world.corruption import Corruption, corrupt, parse_corruption
 
 
 def evaluate(street: Drive, frames: np.ndarray, asked: Trajectory | None, **options: object) -> Consistency:

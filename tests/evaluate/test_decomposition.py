@@ -10,7 +10,6 @@ import torch
 from scipy.spatial.transform import Rotation
 from tests.streets import street_clip, true_geometry
 
-from dreamdrive.data.world import Drive, make_street
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition
 from dreamdrive.evaluate.true_labels import true_labels
@@ -25,6 +24,7 @@ from dreamdrive.motion import (
 )
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive, make_street
 
 FRAMES, SIZE = 6, (160, 96)
 

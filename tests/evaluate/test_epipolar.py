@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.evaluate.epipolar import epipolar_share, match
-from dreamdrive.geometry.classical.features import Features
+from dreamdrive.geometry.evidence.features import Features
 from dreamdrive.scene.camera import Camera
 
 CAMERA = Camera(300.0, 310.0, 200.0, 120.0, 400, 240)

@@ -6,9 +6,9 @@ import pytest
 import torch
 from tests.splat.scenes import relative
 
-from benchmarks import _plain_step as plain
 from dreamdrive.fit.losses import geometry_loss, render_loss, shape_loss
 from dreamdrive.splat import set_threads, ssim, threads
+from splat import plain_step as plain
 
 
 def images(height: int = 75, width: int = 32) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from benchmarks._plain_step import PlainTrainer
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
@@ -18,6 +17,7 @@ from dreamdrive.fit.trainer import FitOptions, Model, Trainer, optimise
 from dreamdrive.fit.views import View, training_views
 from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.splat import one_torch_thread, set_threads, threads
+from splat.plain_step import PlainTrainer
 
 OPTIONS = FitOptions(steps=20, sh_after=0.0, warm_up=0.0)
 

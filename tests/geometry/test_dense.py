@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
-from dreamdrive.geometry.classical import view as viewing
-from dreamdrive.geometry.classical.dense import densify
+from dreamdrive.geometry.dense import densify
+from dreamdrive.geometry.depth import view as viewing
 
 
 @pytest.fixture(scope="module")

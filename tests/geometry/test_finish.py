@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from tests.geometry.toy import HEIGHT_M, Toy, drive
 
-from dreamdrive.geometry.classical.evidence import look
+from dreamdrive.geometry.cameras.standing import stands
+from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.standing import stands
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground
 

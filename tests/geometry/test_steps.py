@@ -3,13 +3,14 @@
 from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.geometry import reconstruct
-from dreamdrive.geometry.classical.dense import PASSES
-from dreamdrive.geometry.classical.reconstruct import STEPS
+from dreamdrive.geometry.cameras.mapping import STEPS
+from dreamdrive.geometry.dense import PASSES
+from dreamdrive.progress import Work
 
 
 def test_a_drive_takes_all_steps_and_one_that_stands_jumps() -> None:
     seen: list[tuple[int, int]] = []
-    reconstruct(make_clip(straight([0.5] * 7)), progress=lambda done, total: seen.append((done, total)))
+    reconstruct(make_clip(straight([0.5] * 7)), work=Work(lambda done, total: seen.append((done, total))))
     total = 8 * (1 + STEPS + PASSES)
     assert {whole for _, whole in seen} == {total}
     steps = [done for done, _ in seen]
@@ -17,5 +18,5 @@ def test_a_drive_takes_all_steps_and_one_that_stands_jumps() -> None:
     assert steps.count(total) == 1
     assert set(range(8 * (1 + STEPS), total + 1)) <= set(steps)
     seen.clear()
-    reconstruct(make_clip(straight([0.0] * 7)), progress=lambda done, total: seen.append((done, total)))
+    reconstruct(make_clip(straight([0.0] * 7)), work=Work(lambda done, total: seen.append((done, total))))
     assert seen[-1] == (total, total)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from dreamdrive.geometry.classical.poses import Posed
+from dreamdrive.geometry.cameras.posing import Posed
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Ground, Scale

@@ -19,16 +19,16 @@ from dreamdrive.data.picture_file import MAX_PIXELS
 from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.export import read_ply, write_ply
-from dreamdrive.geometry.dust3r.network.checkpoint import load_dust3r
-from dreamdrive.geometry.feedforward.load import read_stored
-from dreamdrive.geometry.files.depth import read_depth
+from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
+from dreamdrive.geometry.backends.feedforward.load import read_stored
+from dreamdrive.geometry.backends.files.depth import read_depth
+from dreamdrive.models.weights import load_network
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.stored import open_weights
-from dreamdrive.weights import load_network
 from tests.data.pictures import texture
 from tests.export.test_ply import gaussians
-from tests.geometry.dust3r.network.golden import tiny
-from tests.geometry.dust3r.network.test_checkpoint import save_hub, save_pth
+from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
 from tests.mutation.reader import Reader
 from tests.prior.vista.tiny import save_official
 

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from dreamdrive import codec
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
-from dreamdrive.data.world.files import read_world, write_world
 from dreamdrive.errors import InputError
 from dreamdrive.export.ply import read_ply, write_ply
+from dreamdrive.run import codec
 from dreamdrive.scene import folder as scene_folder
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.files import read_world, write_world
 from tests.mutation.reader import Reader
 from tests.scene.scenes import gaussians, make_baseline, make_scene
 from tests.streets import small_street, street_clip, true_geometry

@@ -15,17 +15,17 @@ from dreamdrive.data.poses import read_poses, read_trajectory
 from dreamdrive.data.rig import read_rig, write_rig
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.geometry_truth import read_geometry_truth
-from dreamdrive.geometry.dust3r.network.config import config_from_call, config_from_json
-from dreamdrive.geometry.files import attach, bent_model
-from dreamdrive.geometry.files.formats import companions
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import read_text
+from dreamdrive.geometry.backends.dust3r.network.config import config_from_call, config_from_json
+from dreamdrive.geometry.backends.files import attach, bent_model
+from dreamdrive.geometry.backends.files.formats import companions
 from dreamdrive.prior.magicdrive.config import read_settings
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.camera import FARTHEST_M
-from dreamdrive.scene.files import read_text
-from dreamdrive.scene.json_file import read_json
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
-from tests.geometry.dust3r.network.test_config import CALL, HUB
-from tests.geometry.files import drives
+from tests.geometry.backends.dust3r.network.test_config import CALL, HUB
+from tests.geometry.backends.files import drives
 from tests.mutation.reader import Reader
 from tests.prior.magicdrive.tiny import official_configs
 from tests.streets import small_street

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.world import draw_street
 from dreamdrive.errors import InputError
 from dreamdrive.prior.street_world import STREET_WORLD, street_world
 from dreamdrive.scene.control import Control
+from dreamdrive.world import draw_street
 
 SMALL = (64, 48)
 

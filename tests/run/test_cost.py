@@ -10,6 +10,7 @@ import pytest
 from dreamdrive.data import read_clip
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.errors import InputError
+from dreamdrive.options import QUALITIES
 from dreamdrive.run.cost import Planned, announcement, bytes_of, check_memory, plan, seconds_of
 from dreamdrive.scene.control import Control
 
@@ -33,30 +34,30 @@ RUNS = [
 def test_estimates_meet_what_was_measured(run: tuple) -> None:
     frames, size, quality, seconds, megabytes = run
     planned = replace(CLIP, frames=frames, size=size)
-    assert seconds_of(planned, quality, "hybrid", 1) == pytest.approx(seconds, rel=0.3)
+    assert seconds_of(planned, QUALITIES[quality], 1) == pytest.approx(seconds, rel=0.3)
     assert bytes_of(planned) / 1e6 == pytest.approx(megabytes, rel=0.15)
 
 
 def test_more_cores_are_quicker_and_more_steps_slower() -> None:
-    one, two, many = (seconds_of(CLIP, "standard", "hybrid", cores) for cores in (1, 2, 64))
+    one, two, many = (seconds_of(CLIP, QUALITIES["standard"], cores) for cores in (1, 2, 64))
     assert one > two > many > one / 4
-    assert seconds_of(CLIP, "high", "hybrid", 2) > 3 * two
-    assert seconds_of(CLIP, "standard", "deformable", 2) > 1.3 * two
+    assert seconds_of(CLIP, QUALITIES["high"], 2) > 3 * two
+    assert seconds_of(CLIP, replace(QUALITIES["standard"], representation="deformable"), 2) > 1.3 * two
 
 
 def test_a_short_clip_gets_one_line() -> None:
-    assert announcement(CLIP, "draft", "hybrid", 2) == (
+    assert announcement(CLIP, QUALITIES["draft"], 2) == (
         "24 frames at 480x270 take about 45 s on 2 cores, and 1.2 GB of memory",
     )
 
 
 def test_a_long_clip_that_nobody_shortened_gets_a_cheaper_choice() -> None:
     long = replace(CLIP, frames=160, rate_hz=25.0, size=(480, 270), chosen=False)
-    first, second = announcement(long, "standard", "hybrid", 1)
+    first, second = announcement(long, QUALITIES["standard"], 1)
     assert first == "160 frames at 480x270 take about 12 min on 1 core, and 4.7 GB of memory"
     assert second == ("That is a long clip: --frames 0:142:3 takes 48 of its frames, in about 4 min 30 s")
-    assert len(announcement(replace(long, chosen=True), "standard", "hybrid", 1)) == 1
-    assert len(announcement(replace(long, frames=60), "standard", "hybrid", 1)) == 1
+    assert len(announcement(replace(long, chosen=True), QUALITIES["standard"], 1)) == 1
+    assert len(announcement(replace(long, frames=60), QUALITIES["standard"], 1)) == 1
 
 
 def test_what_memory_cannot_hold_is_refused_with_what_fits() -> None:

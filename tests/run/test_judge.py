@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.held_out import Likeness
+from dreamdrive.run.held_out import Likeness
 from dreamdrive.run.judge import Facts, facts_of, limits_of, rough_because
 from dreamdrive.scene.geometry import Scale
 

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from benchmarks import _plain_step as plain
 from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure, transform_colour
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import set_threads, threads
+from splat import plain_step as plain
 
 
 def camera(yaw_deg: float = 0.0, pitch_deg: float = 0.0, position: tuple[float, ...] = (0, 0, 0)) -> Camera:

@@ -15,7 +15,7 @@ _NEEDED_MB = 3000
 def doctor() -> None:
     """Show versions, instruction set, threads and memory, and say what is missing and how to get it."""
     from dreamdrive import __version__
-    from dreamdrive.report import PACKAGES, package_versions
+    from dreamdrive.run import PACKAGES, package_versions
 
     table = Table(show_header=False, box=None)
     table.add_row("dreamdrive", __version__)
@@ -80,7 +80,7 @@ def _backends(console: Console) -> None:
 def _gpu() -> str:
     """Whether Gaussians can be splatted on a GPU, which no command needs."""
     try:
-        from dreamdrive.splat.cuda import why_unusable
+        from dreamdrive.splat import why_unusable
     except ImportError:
         return "unknown without torch and the native core; not needed"
     trouble = why_unusable()

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import inside
+from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
 
@@ -27,7 +27,7 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
         InputError: There is neither a scene nor the stages of one, or they are damaged or do not belong
             together.
     """
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
 
@@ -51,7 +51,7 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
     """A finished scene, with the geometry it was made from where that was kept."""
     import numpy as np
 
-    from dreamdrive.evaluate.estimate import Estimate
+    from dreamdrive.evaluate import Estimate
 
     scene = open_scene(out)
     about = scene.provenance
@@ -77,18 +77,18 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
 
 
 def _check_agreement(out: Path, clip: "Clip", geometry: "Geometry") -> None:
-    from dreamdrive.run.agreement import check_clip, check_geometry
+    from dreamdrive.run import check
 
     try:
-        check_clip(clip)
-        check_geometry(clip, geometry)
+        check.clip(clip)
+        check.geometry(clip, geometry)
     except ValueError as error:
         raise InputError(f"{out}: its stages do not belong together ({error}); run generate again") from error
 
 
 def _stage(folder: Path, kind: type[T]) -> T | None:
     """What a stage left; None where there is nothing."""
-    from dreamdrive import codec
+    from dreamdrive.run import codec
 
     if not (folder / codec.JSON_NAME).is_file():
         return None

@@ -9,7 +9,7 @@ from tyro.conf import Positional, arg
 from dreamdrive.cli.tables import fixed, print_table, write_json
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.consistency import Consistency
+    from dreamdrive.evaluate import Consistency
 
 
 def consistency(
@@ -32,7 +32,7 @@ def consistency(
         json: Write the figures to this file as well.
     """
     from dreamdrive.data import read_clip, read_trajectory
-    from dreamdrive.evaluate.consistency import evaluate_consistency
+    from dreamdrive.evaluate import evaluate_consistency
 
     asked = None if trajectory is None else read_trajectory(trajectory)
     clip = read_clip(video, fps=fps, intrinsics=intrinsics, hfov_deg=hfov)

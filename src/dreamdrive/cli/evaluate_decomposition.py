@@ -12,8 +12,7 @@ from dreamdrive.cli.tables import fixed, print_table, write_json
 from dreamdrive.errors import InputError
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.decomposition import Decomposition
-    from dreamdrive.evaluate.truth import Truth
+    from dreamdrive.evaluate import Decomposition, Truth
     from dreamdrive.scene.scene import Scene
 
 
@@ -31,7 +30,7 @@ def decomposition(
         json: Write the figures to this file as well.
     """
     use_all_cores()
-    from dreamdrive.evaluate.decomposition import evaluate_decomposition
+    from dreamdrive.evaluate import evaluate_decomposition
 
     scene = open_scene(out)
     console = Console()
@@ -47,9 +46,8 @@ def decomposition(
 def _truth(scene: "Scene", world: Path) -> "Truth":
     """The truth of the scene's frames."""
     from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.data.world import drive
-    from dreamdrive.data.world.files import read_world
-    from dreamdrive.evaluate.truth import Truth
+    from dreamdrive.evaluate import Truth
+    from dreamdrive.world import drive, read_world
 
     if not world.exists():
         raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")

@@ -10,7 +10,7 @@ from dreamdrive.cli.estimate import open_estimate
 from dreamdrive.cli.tables import fixed, print_table, write_json
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.geometry import DepthFigures, GeometryFigures
+    from dreamdrive.evaluate import DepthFigures, GeometryFigures
 
 
 def geometry(
@@ -29,10 +29,8 @@ def geometry(
         json: Write the figures to this file as well.
         picture: Draw errors of depth and both paths into this PNG.
     """
-    from dreamdrive.evaluate.geometry import evaluate_geometry
-    from dreamdrive.evaluate.geometry_picture import draw_geometry_errors
-    from dreamdrive.evaluate.geometry_truth import read_geometry_truth
-    from dreamdrive.pictures import write_png
+    from dreamdrive.evaluate import evaluate_geometry, read_geometry_truth
+    from dreamdrive.show import draw_geometry_errors, write_png
 
     console = Console()
     with console.status("reading the truth and comparing"):

@@ -12,7 +12,7 @@ from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.tables import interval, number, print_table, write_json
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate.video import VideoReport
+    from dreamdrive.evaluate import VideoReport
 
 _File = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 
@@ -56,9 +56,8 @@ def evaluate_video(
     """
     use_all_cores()
     from dreamdrive import __version__
-    from dreamdrive.evaluate.extractors import WeightFiles
-    from dreamdrive.evaluate.video import VideoSettings
-    from dreamdrive.evaluate.video import evaluate_video as run
+    from dreamdrive.evaluate import VideoSettings, WeightFiles
+    from dreamdrive.evaluate import evaluate_video as run
 
     settings = VideoSettings(window, stride, resize, covariance, seed, resamples, stlpips)
     files = WeightFiles(inception, i3d, lpips_trunk, lpips_heads, transnet)

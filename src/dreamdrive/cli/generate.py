@@ -1,6 +1,7 @@
 """``dreamdrive generate``: from a recording to a scene and its videos."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -34,8 +35,9 @@ def generate(
         arg(metavar="NAME", help_behavior_hint=""),
     ] = None,
     geometry: Annotated[
-        Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"], arg(metavar="NAME")
-    ] = "classical",
+        Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"] | None,
+        arg(metavar="NAME", help_behavior_hint="(default: classical)"),
+    ] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     geometry_weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
@@ -54,7 +56,11 @@ def generate(
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    representation: Literal["static", "deformable", "hexplane", "vibration", "hybrid"] = "hybrid",
+    options: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    representation: Annotated[
+        Literal["static", "deformable", "hexplane", "vibration", "hybrid"] | None,
+        arg(help_behavior_hint="(default: hybrid)"),
+    ] = None,
     device: Literal["cpu", "cuda"] = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
@@ -98,6 +104,7 @@ def generate(
         steps: Steps of a video model's sampler.
         features: Features of a recording's frames that another program computed, see docs/replay.md.
         hold_out: Withhold every N-th frame to measure how well it is predicted.
+        options: Options of any stage as TOML, in place of those of the quality: docs/options.md.
         representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
             deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
         device: Where networks and the fits are computed; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md).
@@ -108,8 +115,9 @@ def generate(
     """
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
+    from dreamdrive.options import QUALITIES
     from dreamdrive.pipeline import generate as run
-    from dreamdrive.run.outcome import lines_of
+    from dreamdrive.run import lines_of, read_options
     from dreamdrive.scene.control import Control
 
     stop_like_an_interruption()
@@ -129,21 +137,21 @@ def generate(
         hold_out=hold_out,
         seed=seed,
     )
+    chosen = QUALITIES[quality] if options is None else read_options(options, QUALITIES[quality])
+    how = {"method": geometry, "camera_height_m": camera_height, "refine_poses": refine_poses or None}
+    how = replace(chosen.geometry, **{name: value for name, value in how.items() if value is not None})
+    representation = representation or chosen.representation
+    chosen = replace(chosen, geometry=how, representation=representation, device=device)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(
             control,
             out,
             prior=prior,
-            geometry_method=geometry,
             geometry_files=geometry_files,
-            refine_poses=refine_poses,
             weights=weights,
             geometry_weights=geometry_weights,
-            quality=quality,
-            representation=representation,
-            device=device,
-            camera_height_m=camera_height,
+            options=chosen,
             recompute_from=recompute_from,
             force=force,
             progress=bars,

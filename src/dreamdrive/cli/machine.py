@@ -4,7 +4,7 @@ import os
 import signal
 from types import FrameType
 
-from dreamdrive.memory import available_cores, free_bytes
+from dreamdrive.machine import available_cores, free_bytes
 
 
 def available_memory_mb() -> int | None:

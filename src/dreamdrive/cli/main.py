@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.logging import RichHandler
 
 import dreamdrive
+from dreamdrive.cli.clean import clean
 from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
@@ -23,6 +24,7 @@ COMMANDS = {
     "generate": generate,
     "render": render,
     "export": export,
+    "clean": clean,
     "evaluate": evaluate,
     "world": world,
     "prior": prior,

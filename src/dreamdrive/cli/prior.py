@@ -88,7 +88,7 @@ def sample(
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.data.recording import rate_hz
     from dreamdrive.device import computing_on
-    from dreamdrive.sampling import sample as run
+    from dreamdrive.run import sample as run
     from dreamdrive.scene.control import Control
 
     control = Control(
@@ -167,7 +167,7 @@ def features(
     _check_packages()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.device import computing_on
-    from dreamdrive.sampling import clip_features
+    from dreamdrive.run import clip_features
 
     options = {"block": block, "sigma": sigma, "channels": channels}
     console = Console(highlight=False)

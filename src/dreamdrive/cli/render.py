@@ -44,9 +44,9 @@ def render(
     if not trajectory:
         raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
     use_all_cores()
-    from dreamdrive.drives import check_numbers, drives_of
-    from dreamdrive.rendering import Look, check_size, video_rate, write_drive
-    from dreamdrive.rendering_places import places
+    from dreamdrive.drive import check_numbers, drives_of
+    from dreamdrive.show import Look, check_size, video_rate, write_drive
+    from dreamdrive.show.places import places
 
     look = Look(show, format, None if size is None else parse_size(size), fps)
     check_numbers(shift_m, fps)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import inside
+from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
     from dreamdrive.scene.scene import Scene

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from dreamdrive.scene.atomic import new_file
+from dreamdrive.files.atomic import new_file
 
 _UNLIMITED = 1000
 """Characters that no table is wide."""

@@ -46,12 +46,21 @@ def make(
         force: Replace a world that is there already.
     """
     use_all_cores()
-    from dreamdrive.data import corruption
     from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.data.world import MOUNTS, Drive, Mount, StreetOptions, World, draw_street, drive
-    from dreamdrive.data.world.files import MARK, write_world
-    from dreamdrive.memory import free_bytes
-    from dreamdrive.scene.atomic import check_free
+    from dreamdrive.files.atomic import check_free
+    from dreamdrive.machine import free_bytes
+    from dreamdrive.world import (
+        MARK,
+        MOUNTS,
+        Drive,
+        Mount,
+        StreetOptions,
+        World,
+        corruption,
+        draw_street,
+        drive,
+        write_world,
+    )
 
     wanted = parse_size(size)
     if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(wanted) < 16:

@@ -3,5 +3,3 @@
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.data.lens import Lens
 from dreamdrive.data.poses import read_trajectory, write_trajectory
-
-__all__ = ["Lens", "read_clip", "read_trajectory", "write_trajectory"]

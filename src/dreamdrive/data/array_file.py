@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Shaped, UInt8
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import open_file
-from dreamdrive.scene.tensor_file import briefly
-from dreamdrive.scene.zip_file import directory_bytes
+from dreamdrive.files.paths import open_file
+from dreamdrive.files.tensor_file import briefly
+from dreamdrive.files.zip_file import directory_bytes
 
 ARRAY_BYTES = 256_000_000
 """Bytes that arrays may take, a number counting as at least four: depth of 64 megapixels."""

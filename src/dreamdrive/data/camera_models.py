@@ -15,8 +15,8 @@ import msgspec
 from dreamdrive.data.colmap_binary import check_binary
 from dreamdrive.data.distortion import Distortion, check_bend
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.json_file import read_json
 
 _COLMAP = {
     "SIMPLE_PINHOLE": "f cx cy",

@@ -22,7 +22,7 @@ from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.data.source import Source, one_frame, open_source
 from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
-from dreamdrive.memory import free_bytes
+from dreamdrive.machine import free_bytes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.trajectory import Trajectory

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import read_bytes
+from dreamdrive.files.paths import read_bytes
 
 _MOST_BYTES = 2_000_000_000
 _COUNT, _SHORT, _MODEL = struct.Struct("<Q"), struct.Struct("<I"), struct.Struct("<i")

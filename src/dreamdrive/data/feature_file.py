@@ -19,9 +19,9 @@ from safetensors.numpy import save
 from dreamdrive.data.lens import Lens
 from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
-from dreamdrive.scene.atomic import new_file
-from dreamdrive.scene.json_file import parse_json
-from dreamdrive.scene.tensor_file import DAMAGE, briefly, header_problem
+from dreamdrive.files.atomic import new_file
+from dreamdrive.files.json_file import parse_json
+from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
 
 MAX_CHANNELS = 128
 """More a name are refused: each pixel of the frames carries all of them. The first components do as well."""

@@ -9,8 +9,8 @@ from typing import Any, Literal, cast
 from dreamdrive.data.camera_models import LensCamera, model_cameras
 from dreamdrive.data.distortion import Distortion, check_bend
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.json_file import read_json
 
 DEFAULT_FOCAL = 0.85
 """Focal length over the longer side of the image where nothing is known: 61 degrees, a usual dashcam."""

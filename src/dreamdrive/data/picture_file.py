@@ -8,7 +8,7 @@ from jaxtyping import Shaped
 
 from dreamdrive.data.picture_header import Header, parse_header
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import read_bytes
+from dreamdrive.files.paths import read_bytes
 
 MAX_PIXELS = 64_000_000
 """Pixels that a picture may have: twice as many as a frame of 8K video, 0.2 GB."""

@@ -11,9 +11,9 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import read_text
 from dreamdrive.scene.camera import FARTHEST_M
-from dreamdrive.scene.files import read_text
-from dreamdrive.scene.json_file import read_json
 from dreamdrive.scene.trajectory import LATEST_S
 
 FORMATS = (

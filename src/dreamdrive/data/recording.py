@@ -22,7 +22,7 @@ from dreamdrive.data.feature_file import FeatureFile, write_features
 from dreamdrive.data.poses import write_trajectory
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.video_writer import write_video
-from dreamdrive.scene.atomic import new_folder
+from dreamdrive.files.atomic import new_folder
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.trajectory import Trajectory
 

@@ -11,10 +11,10 @@ from jaxtyping import Float
 
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import is_path
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.files import is_path
-from dreamdrive.scene.json_file import read_json
 
 RIG = "rig.json"
 MOST_CAMERAS = 32

@@ -17,7 +17,7 @@ from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.mp4_tables import check_tables
 from dreamdrive.data.select import UNBOUNDED, out_of_range
 from dreamdrive.errors import InputError
-from dreamdrive.scene.files import open_file
+from dreamdrive.files.paths import open_file
 
 MAX_PIXELS = 36_000_000
 """Pixels that a frame may have, those of 8K video: a decoder keeps up to 16 frames of a video."""

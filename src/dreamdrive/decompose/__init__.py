@@ -2,18 +2,6 @@
 
 from dreamdrive.decompose.actors import ActorOptions, Cast, cast
 from dreamdrive.decompose.errors import error_maps
+from dreamdrive.decompose.flow import neighbour_flow
 from dreamdrive.decompose.group import Grouping, GroupOptions, group
 from dreamdrive.decompose.score import ScoreNetwork, ScoreOptions, score
-
-__all__ = [
-    "ActorOptions",
-    "Cast",
-    "GroupOptions",
-    "Grouping",
-    "ScoreNetwork",
-    "ScoreOptions",
-    "cast",
-    "error_maps",
-    "group",
-    "score",
-]

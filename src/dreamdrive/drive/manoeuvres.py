@@ -2,12 +2,14 @@
 
 import logging
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 
 TURN_RAD = np.deg2rad(30.0)
@@ -20,6 +22,9 @@ STEEPEST_RAD = np.deg2rad(20.0)
 """Largest heading across the lane in a lane change; a short drive reaches a part of the next lane."""
 TIGHTEST_M = 8.0
 """Smallest radius of a turn, about that of a car at full lock; a short drive turns less than asked."""
+
+SMOOTH_HZ = 20.0
+"""Videos of drives have at least this rate: a scene has a view at any time, not only at recorded ones."""
 
 _log = logging.getLogger("dreamdrive")
 
@@ -129,6 +134,23 @@ def resampled(path: Trajectory, fps: float) -> Trajectory:
     start_s, end_s = float(path.times_s[0]), float(path.times_s[-1])
     times_s = start_s + np.arange(int((end_s - start_s) * fps + 1e-6) + 1) / fps
     return Trajectory(path.at(times_s), times_s)
+
+
+def frame_rate(path: Trajectory) -> float:
+    """Frames a second of a drive: one over the median step; 10 for a single pose."""
+    return float(1 / np.median(np.diff(path.times_s))) if len(path) > 1 else 10.0
+
+
+def smooth(path: Trajectory) -> Trajectory:
+    """A drive with as many poses between the recorded ones as ``SMOOTH_HZ`` takes."""
+    rate = frame_rate(path)
+    return resampled(path, rate * float(np.ceil(SMOOTH_HZ / rate)))
+
+
+def up_of(scene: Scene) -> Float[np.ndarray, "3"]:
+    """Unit vector away from the road; that of a level camera where no road was found."""
+    up: Any = scene.provenance.get("up")
+    return np.array([0.0, -1.0, 0.0] if up is None else up, dtype=np.float64)
 
 
 def _share(values: np.ndarray) -> np.ndarray:

@@ -1,1 +1,11 @@
 """How good results are: figures with their sample counts, floors and intervals."""
+
+from dreamdrive.evaluate.consistency import Consistency, evaluate_consistency
+from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition
+from dreamdrive.evaluate.estimate import Estimate
+from dreamdrive.evaluate.extractors import WeightFiles
+from dreamdrive.evaluate.geometry import DepthFigures, GeometryFigures, evaluate_geometry
+from dreamdrive.evaluate.geometry_truth import GeometryTruth, read_geometry_truth
+from dreamdrive.evaluate.paths import compare_paths
+from dreamdrive.evaluate.truth import Truth
+from dreamdrive.evaluate.video import VideoReport, VideoSettings, evaluate_video

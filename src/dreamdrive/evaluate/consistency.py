@@ -12,9 +12,8 @@ from dreamdrive.evaluate.epipolar import EpipolarShare, epipolar_share
 from dreamdrive.evaluate.paths import PathError, compare_paths
 from dreamdrive.evaluate.recover import Recovered, recover
 from dreamdrive.evaluate.warp_error import WarpError, warp_error
-from dreamdrive.geometry.classical import evidence, features
-from dreamdrive.geometry.classical.evidence import Evidence
-from dreamdrive.geometry.classical.features import Features
+from dreamdrive.geometry.evidence import Evidence, Features, features
+from dreamdrive.geometry.evidence import look as evidence
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.trajectory import Trajectory

@@ -16,7 +16,7 @@ from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
-from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.splat import render_scene
 
 EDGE_SHARE = 1 / 64
 """Width of the rim around moving things, over that of the picture, which counts as no static surface."""

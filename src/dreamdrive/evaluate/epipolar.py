@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.classical.features import Features
+from dreamdrive.geometry.evidence import Features
 from dreamdrive.scene.camera import Camera
 
 WITHIN_PX = 2.0

@@ -11,11 +11,18 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks import efficientnet_lite, i3d, inception, lpips, stlpips, transnet
-from dreamdrive.evaluate.networks.packaged import MissingWeightsError
-from dreamdrive.evaluate.networks.resize import Resize
+from dreamdrive.evaluate.networks import (
+    MissingWeightsError,
+    Resize,
+    efficientnet_lite,
+    i3d,
+    inception,
+    lpips,
+    stlpips,
+    transnet,
+)
 from dreamdrive.evaluate.pixels import psnr, ssim
-from dreamdrive.weights import sha256
+from dreamdrive.models import sha256
 
 Stlpips = Literal["alex", "vgg", "both"]
 """Trunk of the shift-tolerant LPIPS; that of VGG takes four times as long."""

@@ -8,12 +8,11 @@ from jaxtyping import Bool, Float, Shaped
 
 from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.size import Sizing, choose_size
-from dreamdrive.data.world import Drive, drive
-from dreamdrive.data.world.files import read_world
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.recorded_truth import Points, Recorded, read_cameras_json, read_poses_txt
 from dreamdrive.scene.camera import Camera
+from dreamdrive.world import Drive, drive, read_world
 
 EXPECTED = (
     "a folder of dreamdrive world make, a layout as JSON, a folder with PandaSet's cameras.json, or one with "

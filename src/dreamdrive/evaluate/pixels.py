@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
-from dreamdrive.splat.ssim import C1, C2, SIGMA_PX, WINDOW, ssim_map
+from dreamdrive.splat import C1, C2, SIGMA_PX, WINDOW, ssim_map
 
 SsimBorder = Literal["zero", "reflect", "valid"]
 """What lies outside the image: zeros as in 3DGS, its reflection as in torchmetrics (all pixels count), or

@@ -15,8 +15,8 @@ from dreamdrive.data.camera_models import IndexedPinhole, MatrixPinhole, NamedFr
 from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.pose_files import read_pose_file
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.scene.camera import FARTHEST_M, MAX_SIDE_PX, Camera
-from dreamdrive.scene.json_file import of_type, read_json
 
 _PNG_PER_M = 256.0
 """Grey levels a metre in KITTI's 16-bit depth pictures."""

@@ -9,12 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.classical import odometry, sfm
-from dreamdrive.geometry.classical.evidence import Evidence
-from dreamdrive.geometry.classical.features import Features
-from dreamdrive.geometry.classical.focal import settle
-from dreamdrive.geometry.classical.paths import fill
-from dreamdrive.geometry.classical.poses import MIN_TRACKS
+from dreamdrive.geometry.cameras import MIN_TRACKS, fill, odometry, settle, sfm
+from dreamdrive.geometry.evidence import Evidence, Features
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 

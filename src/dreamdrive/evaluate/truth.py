@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.data.world import Drive
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from dreamdrive.evaluate.bootstrap import (
 from dreamdrive.evaluate.clips import open_clips, pairs_of, read_frames
 from dreamdrive.evaluate.extractors import Extractor, Frames, Stlpips, Toolbox, WeightFiles, open_toolbox
 from dreamdrive.evaluate.frechet import Covariance, frechet_distance, kernel_distance
-from dreamdrive.evaluate.networks.i3d import MIN_FRAMES
-from dreamdrive.evaluate.networks.resize import Resize
+from dreamdrive.evaluate.networks import MIN_FRAMES, Resize
 
 MIN_SIDE_PX = 32
 """Below this nothing is left of an image after the strides of the networks."""

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.decompose.flow import neighbour_flow
-from dreamdrive.geometry.classical.flow import pixel_grid
-from dreamdrive.geometry.classical.view import parallel, single_threaded_opencv
+from dreamdrive.decompose import neighbour_flow
+from dreamdrive.geometry.depth import parallel, single_threaded_opencv
+from dreamdrive.geometry.moving import pixel_grid
 from dreamdrive.scene.clip import Clip
 
 _ROUND_TRIP_PX = 0.5

@@ -2,5 +2,3 @@
 
 from dreamdrive.export.kinds import KINDS, export
 from dreamdrive.export.ply import left_out_of_ply, read_ply, write_ply
-
-__all__ = ["KINDS", "export", "left_out_of_ply", "read_ply", "write_ply"]

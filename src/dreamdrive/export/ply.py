@@ -7,8 +7,8 @@ import numpy as np
 import torch
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.atomic import new_file, new_folder
-from dreamdrive.scene.files import read_bytes
+from dreamdrive.files.atomic import new_file, new_folder
+from dreamdrive.files.paths import read_bytes
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 

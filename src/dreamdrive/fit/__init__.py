@@ -5,22 +5,4 @@ from dreamdrive.fit.hybrid import Parts, fit
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
 from dreamdrive.fit.static import StaticFit, fit_static
-from dreamdrive.fit.trainer import FitOptions, Progress
-
-__all__ = [
-    "DENSIFIERS",
-    "Densifier",
-    "DensifySettings",
-    "FitOptions",
-    "GradientDensifier",
-    "LossName",
-    "NoDensifier",
-    "Parts",
-    "Progress",
-    "SeedOptions",
-    "StaticFit",
-    "fit",
-    "fit_static",
-    "initialise",
-    "render_loss",
-]
+from dreamdrive.fit.trainer import FitOptions

@@ -9,9 +9,10 @@ from dreamdrive.fit.densify import DENSIFIERS, DensifySettings
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
-from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
+from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
 from dreamdrive.motion import MotionConfig, Start, Tracks, start_motion
+from dreamdrive.progress import Progress
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -42,7 +43,7 @@ def fit(
     parts: Parts,
     start: StaticFit,
     options: FitOptions,
-    motion: MotionConfig | None,
+    motion: MotionConfig,
     densify: DensifySettings,
     seed: int,
     progress: Progress,
@@ -58,7 +59,7 @@ def fit(
         parts: Static and dynamic Gaussians; with no dynamic ones the result is a static scene.
         start: The static fit, whose sky is kept.
         options: Length, rates and weights.
-        motion: Which representation of motion, and its size; the paper's is F_deform; None for none.
+        motion: Which representation of motion, and its size; the paper's is F_deform.
         densify: When and what to grow and prune.
         seed: Order of the frames, weights, places of split Gaussians.
         progress: Called with steps done and steps in all.
@@ -66,7 +67,7 @@ def fit(
     """
     views = training_views(clip, geometry, device)
     moving, dynamic = None, parts.dynamic
-    if len(dynamic) and motion is not None:
+    if len(dynamic):
         moving, dynamic = start_motion(motion, Start(clip, geometry, dynamic, parts.tracks, seed))
     rates = LearningRates(interval_s=clip.interval_s)
     model = Model(

@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.features import pixel_features
@@ -63,7 +64,7 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         Gaussians with features Z_ref, see ``scene.features``.
 
     Raises:
-        ValueError: If no pixel has depth.
+        InputError: No pixel of any frame has depth.
     """
     options = options or SeedOptions()
     kept: list[_Seeds] = []
@@ -78,7 +79,10 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         if chosen.any():
             kept.append(_seeds(clip, geometry, frame, chosen, moving[chosen], options))
     if not kept:
-        raise ValueError("no pixel of any frame has depth: there is nothing to make Gaussians from")
+        raise InputError(
+            "no frame shows anything solid: all of it is sky, fixed to the camera or without a picture; "
+            "choose other --frames"
+        )
     return _gaussians(kept, options)
 
 

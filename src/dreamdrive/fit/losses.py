@@ -10,8 +10,7 @@ from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
 from dreamdrive.device import in_core
-from dreamdrive.splat.arguments import check_dtype
-from dreamdrive.splat.ssim import ssim_map_reference
+from dreamdrive.splat import check_dtype, ssim_map_reference
 
 LossName = Literal["field", "paper"]
 # Weights of L1 and of 1 - SSIM. "paper" is eq. 14 as printed, unweighted; "field" is what 3DGS and its

@@ -9,8 +9,9 @@ from dreamdrive.fit.densify import NoDensifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
-from dreamdrive.fit.trainer import FitOptions, Model, Progress, optimise
+from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
+from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians

@@ -1,6 +1,6 @@
 """The optimisation loop both fits share: render a frame, compare, step, densify."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -15,13 +15,12 @@ from dreamdrive.fit.losses import LossName, geometry_loss, render_loss, shape_lo
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
 from dreamdrive.motion import Motion
+from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import one_torch_thread, rasterize
-
-Progress = Callable[[int, int], None]
 
 # Steps between two looks at the shapes, as in drivestudio: they change slowly and all of them are looked at.
 SHAPE_EVERY = 10

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.classical import CLASSICAL
-from dreamdrive.geometry.dust3r import DUST3R
-from dreamdrive.geometry.feedforward import FEED_FORWARD
-from dreamdrive.geometry.protocol import GeometryBackend, Progress, silent
-from dreamdrive.geometry.refine import refined
+from dreamdrive.geometry.backends import CLASSICAL
+from dreamdrive.geometry.backends.dust3r import DUST3R
+from dreamdrive.geometry.backends.feedforward import FEED_FORWARD
+from dreamdrive.geometry.cameras import refined
+from dreamdrive.geometry.protocol import GeometryBackend, GeometryOptions
 from dreamdrive.geometry.surround import reconstruct_cameras
+from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
@@ -36,39 +37,32 @@ def backend_of(method: str, weights: Path | None = None) -> GeometryBackend:
 
 def reconstruct(
     clip: Clip,
+    options: GeometryOptions = GeometryOptions(),
     *,
-    camera_height_m: float | None = None,
     seed: int = 0,
-    method: str = "classical",
-    weights: Path | None = None,
-    refine_poses: bool = False,
-    progress: Progress = silent,
+    work: Work = Work(),
 ) -> Geometry:
     """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
 
     Args:
         clip: Frames, with what is known of their geometry; those of several cameras see ``surround``.
-        camera_height_m: Height of the camera above the road; None assumes 1.5 m.
+        options: The method and its settings.
         seed: Seed of everything random.
-        method: Name of the method.
-        weights: The network's file or folder, for methods that have one.
-        refine_poses: Whether known poses give the length of the path only, see ``refine``.
-        progress: Told of each step, where the method can count them.
+        work: Told of each step, where the method can count them; keeps parts of the result.
 
     Raises:
         InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.
     """
-    backend = backend_of(method, weights)
-    how = partial(backend.reconstruct, camera_height_m=camera_height_m, seed=seed, weights=weights)
-    if refine_poses:
-        return refined(clip, partial(how, progress=progress))
+    backend = backend_of(options.method, options.weights)
+    how = partial(
+        backend.reconstruct,
+        camera_height_m=options.camera_height_m,
+        seed=seed,
+        weights=options.weights,
+    )
+    if options.refine_poses:
+        return refined(clip, lambda part: how(part, work=work))
     if len(clip.rig) == 1:
-        return how(clip, progress=progress)
-    cameras = len(np.unique(clip.camera))
-    turn = count()
-
-    def one(part: Clip) -> Geometry:
-        before = next(turn)
-        return how(part, progress=lambda done, total: progress(before * total + done, cameras * total))
-
-    return reconstruct_cameras(clip, one)
+        return how(clip, work=work)
+    cameras, turn = len(np.unique(clip.camera)), count()
+    return reconstruct_cameras(clip, lambda part: how(part, work=work.part(next(turn), cameras)))

@@ -5,16 +5,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.classical import assemble
-from dreamdrive.geometry.classical import scale as scales
-from dreamdrive.geometry.classical.dense import StaticDepth, densify
-from dreamdrive.geometry.classical.evidence import Evidence
-from dreamdrive.geometry.classical.known import MIN_RATIOS, depth_points, in_metres
-from dreamdrive.geometry.classical.paths import rebase
-from dreamdrive.geometry.classical.poses import as_posed
-from dreamdrive.geometry.classical.scale import Metric, Street
+from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
+from dreamdrive.geometry.dense import Dense, StaticDepth, densify
+from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.standing import stands
+from dreamdrive.geometry.moving import compared_with_traffic
+from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
+from dreamdrive.geometry.road import scale as scales
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 
@@ -57,11 +54,41 @@ def finish(
     # Of a standing clip it is not that of the poses, as which others read it.
     details = measured.details if still else {**measured.details, "metres_per_unit": metres}
     posed = as_posed(clip, evidence, poses, measured.camera, metric, measured.focal_observed, notes, details)
-    posed = replace(posed, standing=still)
+    posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
     dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
     return assemble(clip, posed, dense)
+
+
+def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
+    """What both halves found, as the next stages take it."""
+    used = ~clip.held_out
+    shares = {
+        "depth_share": float((dense.depth_m[used] > 0).mean()),
+        "confident_share": float((dense.confidence[used] > 0.25).mean()),
+        "sky_share": float(dense.sky[used].mean()),
+        "moving_share": float((dense.moving[used] >= 0.5).mean()),
+    }
+    geometry = Geometry(
+        cameras=posed.cameras,
+        depth_m=dense.depth_m,
+        confidence=dense.confidence,
+        sky=dense.sky,
+        moving=dense.moving,
+        fixed_regions=posed.fixed_regions[None],
+        region_names=posed.region_names,
+        ground=posed.ground,
+        scale=posed.scale,
+        focal=posed.focal,
+        detected=posed.detected,
+        fallback=posed.fallback,
+        details={**posed.details, **shares},
+        fallback_kind=posed.fallback_kind,
+        placed=posed.placed,
+        metres_per_unit=posed.metres_per_unit,
+    )
+    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 def _rough_factor(measured: Measured) -> float:

@@ -1,20 +1,37 @@
 """What every way of getting geometry has in common."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from dreamdrive.backend import Backend
+from dreamdrive.errors import InputError
+from dreamdrive.models import Backend
+from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-Progress = Callable[[int, int], None]
-"""Called with steps done and steps in all."""
 
+@dataclass(frozen=True)
+class GeometryOptions:
+    """How cameras and depth are found.
 
-def silent(done: int, total: int) -> None:
-    """Progress that nobody watches."""
+    Attributes:
+        method: Name of the way.
+        weights: The network's file or folder, for methods that have one.
+        camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
+            better does; None assumes 1.5 m.
+        refine_poses: Whether known poses give the length of the path only, see ``cameras.refine``.
+    """
+
+    method: str = "classical"
+    weights: Path | None = None
+    camera_height_m: float | None = None
+    refine_poses: bool = False
+
+    def __post_init__(self) -> None:
+        height_m = self.camera_height_m
+        if height_m is not None and not 0 < height_m < float("inf"):
+            raise InputError(f"--camera-height {height_m:g}: expected metres above the road, such as 1.5")
 
 
 @runtime_checkable
@@ -28,7 +45,7 @@ class Reconstruct(Protocol):
         camera_height_m: float | None = None,
         seed: int = 0,
         weights: Path | None = None,
-        progress: Progress = silent,
+        work: Work = Work(),
     ) -> Geometry:
         """Reconstruct a clip.
 
@@ -39,7 +56,7 @@ class Reconstruct(Protocol):
                 gives it; None assumes 1.5 m.
             seed: Seed of everything random; same clip and seed, same geometry.
             weights: The network's file or folder, for backends that have one.
-            progress: Told of each step, by backends that can count them.
+            work: Told of each step by backends that can count them; keeps parts of the result.
         """
         ...
 

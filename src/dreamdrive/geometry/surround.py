@@ -52,7 +52,7 @@ def _poses(clip: Clip, lead: int, first: Geometry) -> Float[np.ndarray, "f 4 4"]
     if clip.known.world_from_camera is not None:
         known = clip.known.world_from_camera.astype(np.float64)
         poses = np.linalg.inv(known[0]) @ known
-        poses[:, :3, 3] *= float(first.details.get("metres_per_unit", 1.0))
+        poses[:, :3, 3] *= 1.0 if first.metres_per_unit is None else first.metres_per_unit
         return poses
     led = np.stack([camera.world_from_camera for camera in first.cameras])
     from_lead = np.linalg.inv(clip.rig[lead].world_from_camera)
@@ -93,7 +93,7 @@ def _in_metres(
 ) -> Float[np.ndarray, "k h w"] | None:
     if clip.known.metric:
         return depth
-    factor = first.details.get("metres_per_unit")
+    factor = first.metres_per_unit
     return None if factor is None else depth * np.float32(factor)
 
 

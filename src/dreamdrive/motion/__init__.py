@@ -7,32 +7,9 @@ from dreamdrive.motion.table import (
     MOTIONS,
     REPRESENTATIONS,
     Representation,
-    choose_representation,
+    RepresentationName,
     rebuilt,
     start_motion,
 )
 from dreamdrive.motion.tracks import Tracks, multiply_quaternions
 from dreamdrive.motion.vibration import Vibration, VibrationConfig
-
-__all__ = [
-    "MOTIONS",
-    "REPRESENTATIONS",
-    "Bounds",
-    "DeformationConfig",
-    "DeformationField",
-    "Domain",
-    "HexPlaneConfig",
-    "HexPlaneField",
-    "Motion",
-    "MotionConfig",
-    "Representation",
-    "Start",
-    "Tracks",
-    "Vibration",
-    "VibrationConfig",
-    "choose_representation",
-    "encode",
-    "multiply_quaternions",
-    "rebuilt",
-    "start_motion",
-]

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
-from dreamdrive.errors import InputError
 from dreamdrive.motion.deformation import DeformationField
 from dreamdrive.motion.hexplane import HexPlaneField
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
@@ -36,7 +35,9 @@ class Representation:
     step: float
 
 
-REPRESENTATIONS: Mapping[str, Representation] = MappingProxyType(
+RepresentationName = Literal["hybrid", "static", "deformable", "hexplane", "vibration"]
+
+REPRESENTATIONS: Mapping[RepresentationName, Representation] = MappingProxyType(
     {
         "hybrid": Representation("scored", DeformationField, 1.0),
         "static": Representation("none", None, 0.9),
@@ -56,17 +57,6 @@ _LARGEST = {
     "track_times": 2000,
 }
 _LARGEST_OTHER = 1e5
-
-
-def choose_representation(name: str) -> Representation:
-    """The representation of that name.
-
-    Raises:
-        InputError: There is none.
-    """
-    if name not in REPRESENTATIONS:
-        raise InputError(f"--representation {name}: unknown; available are {', '.join(REPRESENTATIONS)}")
-    return REPRESENTATIONS[name]
 
 
 def start_motion(config: MotionConfig, given: Start) -> tuple[Motion, Gaussians]:

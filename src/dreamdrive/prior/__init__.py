@@ -11,8 +11,9 @@ from dreamdrive.prior.diffusers_i2v import DIFFUSERS
 from dreamdrive.prior.magicdrive import MAGICDRIVE, MAGICDRIVE_T
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.replay import REPLAY, replay
-from dreamdrive.prior.street_world import STREET_WORLD, street_world
+from dreamdrive.prior.street_world import FRAMES, SIZE, STREET_WORLD, street_world
 from dreamdrive.prior.vista import SVD, VISTA
+from dreamdrive.progress import Progress, silent
 
 _ALL = (REPLAY, STREET_WORLD, SVD, VISTA, MAGICDRIVE, MAGICDRIVE_T, COSMOS, DIFFUSERS)
 PRIORS: Mapping[str, Prior] = MappingProxyType({prior.name: prior for prior in _ALL})
@@ -47,6 +48,3 @@ def prior_of(path: Path | None, with_weights: bool = False) -> str:
             f"{path} is a photo: name the video model of --weights with --prior {'|'.join(OF_PHOTOS)}"
         )
     return "street-world" if path is not None and path.suffix.lower() == ".json" else "replay"
-
-
-__all__ = ["PRIORS", "Prior", "choose_prior", "prior_of", "replay", "street_world"]

@@ -15,9 +15,10 @@ from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, Wanted, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.path_to_action import from_first
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.relative_poses import relative_poses
 from dreamdrive.prior.running import INSTALL, PACKAGE
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory

@@ -15,13 +15,14 @@ import numpy as np
 
 from dreamdrive.data.select import Selection
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.json_file import read_json
 
 NEEDED = ("image", "num_frames", "num_inference_steps", "generator", "output_type", "callback_on_step_end")
 """Arguments by which a pipeline is known to make a video from a photo, as diffusers names them."""

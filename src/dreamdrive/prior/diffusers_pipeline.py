@@ -12,12 +12,12 @@ from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
+from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.json_file import read_json
 from dreamdrive.scene.trajectory import Trajectory
 
 PROMPT = "The view ahead from a car that drives along a street."

@@ -1,21 +1,14 @@
 """What every prior offers."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
 
-from dreamdrive.backend import Backend
 from dreamdrive.errors import InputError
+from dreamdrive.models import Backend
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
-
-Progress = Callable[[int, int], None]
-"""Called with steps done and steps in all."""
-
-
-def silent(done: int, total: int) -> None:
-    """Progress that nobody watches."""
 
 
 @runtime_checkable

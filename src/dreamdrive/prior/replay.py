@@ -6,7 +6,8 @@ from dreamdrive.data import read_clip
 from dreamdrive.data.rig import is_rig, read_rig_clip
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 

@@ -9,7 +9,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.protocol import Progress
+from dreamdrive.progress import Progress
 
 PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
 """What priors with a network need, and how to get it."""

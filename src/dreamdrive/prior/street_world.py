@@ -8,12 +8,13 @@ from jaxtyping import Bool
 from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import check_largest
-from dreamdrive.data.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
+from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 
 FRAMES = 24
 """Length of the drive unless ``control.frames`` says where to stop."""

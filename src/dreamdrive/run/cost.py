@@ -9,9 +9,9 @@ from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import Source, open_source
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
-from dreamdrive.motion import choose_representation
-from dreamdrive.options import QUALITIES, QualityName
-from dreamdrive.prior.street_world import FRAMES, SIZE
+from dreamdrive.motion import REPRESENTATIONS
+from dreamdrive.options import Options
+from dreamdrive.prior import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
 from dreamdrive.run.outcome import duration
 from dreamdrive.scene.control import Control
@@ -115,21 +115,20 @@ def _first_size(source: Source) -> tuple[int, int]:
     return next(iter(source.read(range(1)))).size
 
 
-def seconds_of(planned: Planned, quality: QualityName, representation: str, cores: int) -> float:
+def seconds_of(planned: Planned, options: Options, cores: int) -> float:
     """About how long a run takes, with geometry found from the frames alone.
 
     Args:
         planned: What it works on.
-        quality: How many steps its fits take.
-        representation: What is fitted.
+        options: How the scene is built.
         cores: Cores of this machine; a third of the work is done by one at a time.
     """
-    m, steps = MEASURED, QUALITIES[quality]
+    m = MEASURED
     frames, pixels = planned.frames * planned.cameras, planned.megapixels
     more = frames / m.usual_frames
     geometry = frames * (m.frame + m.frame_megapixel * pixels) * more**m.frame_growth
     step = m.step + m.step_megapixel * pixels * more**m.step_growth
-    fits = step * (steps.static.steps + steps.fit.steps * choose_representation(representation).step)
+    fits = step * (options.static.steps + options.fit.steps * REPRESENTATIONS[options.representation].step)
     videos = frames * (m.video + m.video_megapixel * pixels)
     work = m.start + geometry + fits + m.score_megapixel * frames * pixels + videos
     return work * (m.serial + (1 - m.serial) / max(1, cores))
@@ -169,11 +168,11 @@ def check_memory(planned: Planned, free: int | None) -> None:
     )
 
 
-def announcement(planned: Planned, quality: QualityName, representation: str, cores: int) -> tuple[str, ...]:
+def announcement(planned: Planned, options: Options, cores: int) -> tuple[str, ...]:
     """What a run will cost, and for a long clip that nobody shortened what would cost less."""
 
     def time_of(one: Planned) -> str:
-        return duration(_rounded(seconds_of(one, quality, representation, cores)))
+        return duration(_rounded(seconds_of(one, options, cores)))
 
     on = "1 core" if cores == 1 else f"{cores} cores"
     memory = f"{bytes_of(planned) / 1e9:.1f} GB"

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dreamdrive.held_out import Likeness
-from dreamdrive.options import QualityName
+from dreamdrive.run.held_out import Likeness
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Basis, Fallback, Geometry
 
@@ -16,10 +15,11 @@ SLOW_S = 0.35
 ASIDE_M = 2
 """As far beside the recorded path a view is drawn by every run."""
 
-_BETTER: dict[QualityName, str] = {
+_SHORTER = "a shorter stretch, chosen with --frames, is easier"
+_BETTER: dict[str, str] = {
     "draft": "--quality standard takes more steps",
     "standard": "--quality high takes more steps",
-    "high": "a shorter stretch, chosen with --frames, is easier",
+    "high": _SHORTER,
 }
 _HEIGHT, _VIEW = "--camera-height", "--hfov or --intrinsics"
 
@@ -51,7 +51,7 @@ class Facts:
     step: int
     psnr: float | None
     blended_psnr: float | None
-    quality: QualityName
+    quality: str
     focal_observed: bool
     basis: Basis
     spread: float
@@ -60,7 +60,7 @@ class Facts:
 def facts_of(
     clip: Clip,
     geometry: Geometry,
-    quality: QualityName,
+    quality: str,
     held_out: dict[int, Likeness],
     blended: dict[int, Likeness],
 ) -> Facts:
@@ -163,7 +163,7 @@ def _of_withheld(facts: Facts) -> str | None:
         return None
     return (
         "withheld frames are predicted worse than by blending the frames beside them "
-        f"({_apart(facts.psnr, facts.blended_psnr)} dB): {_BETTER[facts.quality]}"
+        f"({_apart(facts.psnr, facts.blended_psnr)} dB): {_BETTER.get(facts.quality, _SHORTER)}"
     )
 
 

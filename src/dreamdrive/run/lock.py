@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.json_file import parse_json
+from dreamdrive.files.json_file import parse_json
 
 NAME = ".dreamdrive.lock"
 """The file that is locked; it goes away with the run, and what a killed run leaves of it hinders nobody."""

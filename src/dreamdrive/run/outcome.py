@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from dreamdrive.scene.json_file import of_type, read_json
+from dreamdrive.files.json_file import of_type, read_json
 
 # A report may come from anywhere: what is printed of it is one line of plain characters.
 _Text = Annotated[str, msgspec.Meta(max_length=1000, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]

@@ -14,17 +14,17 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.atomic import new_folder
+from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.checked import build, check_finite
+from dreamdrive.files.json_file import of_type, parse_json
+from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
+from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.scene.camera import FARTHEST_M
-from dreamdrive.scene.checked import build, check_finite
 from dreamdrive.scene.exposure import Exposure
-from dreamdrive.scene.files import TEXT_BYTES, inside, read_bytes
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.json_file import of_type, parse_json
 from dreamdrive.scene.scene import Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
-from dreamdrive.scene.tensor_file import DAMAGE, briefly, read_own
 
 FORMAT = "dreamdrive scene"
 VERSION = 2

@@ -103,6 +103,7 @@ class Geometry:
         details: Figures for the report, as JSON values.
         fallback_kind: Why depth is a guess; set without that reason where given poses stand still.
         placed: Frames whose cameras were found, rather than put between their neighbours; None for all.
+        metres_per_unit: What makes metres of known poses and depth; None where their unit stays unknown.
     """
 
     cameras: tuple[Camera, ...]
@@ -120,6 +121,7 @@ class Geometry:
     details: dict[str, Any] = field(default_factory=dict)
     fallback_kind: Fallback | None = None
     placed: int | None = None
+    metres_per_unit: float | None = 1.0
 
     def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
         """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""

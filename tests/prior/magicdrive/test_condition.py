@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 from torch import Tensor
 
-from dreamdrive.data.world import draw_street
-from dreamdrive.data.world.drive import ego_poses
-from dreamdrive.data.world.world import upright
 from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.boxes import CLASSES, KINDS, as_published, box_corners, layout_boxes
 from dreamdrive.prior.magicdrive.cameras import (
@@ -34,6 +31,9 @@ from dreamdrive.scene.layout import (
     TrackPoint,
     track_function,
 )
+from dreamdrive.world import draw_street
+from dreamdrive.world.drive import ego_poses
+from dreamdrive.world.world import upright
 
 EAST = Ego([TrackPoint(0.0, 0.0, 0.0, 0.0), TrackPoint(1.0, 10.0, 0.0, 0.0)])
 NOW = np.zeros(1)

@@ -11,12 +11,12 @@ import torch
 from tests.prior.magicdrive.tiny import SIZE, Written, write_folder
 
 from dreamdrive.data.layout_file import read_layout, write_layout
-from dreamdrive.data.world import draw_street
-from dreamdrive.data.world.drive import ego_poses
 from dreamdrive.errors import InputError
 from dreamdrive.prior import choose_prior
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.world import draw_street
+from dreamdrive.world.drive import ego_poses
 
 MAGICDRIVE = choose_prior("magicdrive")
 MAGICDRIVE_T = choose_prior("magicdrive-t")

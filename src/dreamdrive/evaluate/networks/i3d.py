@@ -10,7 +10,7 @@ from torch.nn import functional
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks.padding import pad_same
 from dreamdrive.evaluate.networks.resize import resize
-from dreamdrive.weights import load_network
+from dreamdrive.models import load_network
 
 FILE = "i3d_pretrained_400.pt, the state dict (not the TorchScript archive)"
 SIZE_PX = 224

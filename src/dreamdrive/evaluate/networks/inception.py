@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from dreamdrive.evaluate.networks.resize import Resize, resize
-from dreamdrive.weights import load_network
+from dreamdrive.models import load_network
 
 FILE = "pt_inception-2015-12-05-6726825d.pth (also named weights-inception-2015-12-05-6726825d.pth)"
 SIZE_PX = 299

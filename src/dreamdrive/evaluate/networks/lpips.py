@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.weights import fill_network, read_state
+from dreamdrive.models import fill_network, read_state
 
 TRUNK_FILE = "the weights of torchvision's VGG16 (vgg16-397923af.pth) or AlexNet (alexnet-owt-7be5be79.pth)"
 HEADS_FILE = (

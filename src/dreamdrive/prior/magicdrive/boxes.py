@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.data.world.world import upright
 from dreamdrive.scene.layout import BoxKind, Layout, track_function
+from dreamdrive.world import upright
 
 CLASSES = (
     "car",

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.data.world.world import upright
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Ego, track_function
+from dreamdrive.world import upright
 
 FULL_SIZE = (1600, 900)
 """Width and height of the pictures that the intrinsics belong to."""

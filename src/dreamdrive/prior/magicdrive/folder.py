@@ -14,11 +14,11 @@ from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.models import check_sizes, fill, read_state, sha256
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings
-from dreamdrive.scene.json_file import read_json
-from dreamdrive.weights import check_sizes, fill, read_state, sha256
 
 _DIFFUSERS = tuple(f"diffusion_pytorch_model.{end}" for end in ("safetensors", "fp16.safetensors", "bin"))
 _TEXT = ("model.safetensors", "model.fp16.safetensors", "pytorch_model.bin")

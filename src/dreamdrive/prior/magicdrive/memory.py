@@ -4,7 +4,7 @@ import torch
 from torch import nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.memory import free_bytes
+from dreamdrive.machine import free_bytes
 from dreamdrive.prior.magicdrive.config import Settings
 
 _UNET_TENSORS = 33

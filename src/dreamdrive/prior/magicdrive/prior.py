@@ -15,8 +15,9 @@ from dreamdrive.prior.magicdrive.cameras import NUSCENES, car_from_camera, map_f
 from dreamdrive.prior.magicdrive.condition import prompt_of
 from dreamdrive.prior.magicdrive.config import EXPECTED
 from dreamdrive.prior.magicdrive.raster import check_map
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE, enough_memory
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.layout import Layout

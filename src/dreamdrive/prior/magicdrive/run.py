@@ -12,8 +12,8 @@ from torch import Tensor
 from dreamdrive.prior.magicdrive.condition import Seen, see
 from dreamdrive.prior.magicdrive.folder import Parts
 from dreamdrive.prior.magicdrive.sample import GUIDANCE, Conditions, decode, sample, unipc
-from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, counted
+from dreamdrive.progress import Progress
 from dreamdrive.scene.layout import Layout
 
 

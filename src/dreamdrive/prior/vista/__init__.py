@@ -1,9 +1,11 @@
 """Video models as priors: Stable Video Diffusion and Vista, one network on diffusers' classes."""
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.protocol import Prior, Progress, silent
+from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
+from dreamdrive.prior.vista.features import FeatureOptions, video_features
 from dreamdrive.prior.vista.kinds import KINDS, KindName
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 

@@ -11,12 +11,12 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.protocol import Progress, silent
+from dreamdrive.files.atomic import new_folder
 from dreamdrive.prior.vista.configs import Shapes
 from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
 from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
-from dreamdrive.scene.atomic import new_folder
+from dreamdrive.progress import Progress, silent
 
 DtypeName = Literal["float16", "float32"]
 _DTYPES: dict[str, tuple[torch.dtype, str, int]] = {

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.prior.vista.stored import NOTE, Stored, open_tensors
-from dreamdrive.scene.json_file import read_json
 
 FIRST, QUANT = "conditioner.embedders.3.encoder.encoder.", "conditioner.embedders.3.encoder.quant_conv."
 SECOND = "first_stage_model.encoder."

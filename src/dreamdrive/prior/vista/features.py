@@ -18,7 +18,6 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.pca import CHANNELS, reduce
-from dreamdrive.prior.protocol import Progress, silent
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
 from dreamdrive.prior.vista.engine import Engine
@@ -29,6 +28,7 @@ from dreamdrive.prior.vista.picture import NATIVE, SIDE, check_size, to_images
 from dreamdrive.prior.vista.rollout import SCALE, Seen
 from dreamdrive.prior.vista.sampler import time_of
 from dreamdrive.prior.vista.unet import watch
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.action import Action, check_action
 
 BLOCK = "down_blocks.1.attentions.1"

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dreamdrive.device import chosen_device
-from dreamdrive.memory import free_bytes
+from dreamdrive.machine import free_bytes
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.memory import Free, Job, check_memory
 from dreamdrive.prior.vista.networks import Networks

@@ -14,7 +14,6 @@ from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.path_to_action import STEERING_RATIO
-from dreamdrive.prior.protocol import Progress
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
@@ -27,6 +26,7 @@ from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
+from dreamdrive.progress import Progress
 from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control

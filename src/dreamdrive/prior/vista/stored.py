@@ -10,13 +10,13 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
+from dreamdrive.models import check_sizes, in_words, misfits, some
 from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
 from dreamdrive.prior.vista.networks import make_empty
-from dreamdrive.scene.json_file import read_json
-from dreamdrive.scene.tensor_file import DAMAGE, briefly, header_problem
-from dreamdrive.weights import check_sizes, in_words, misfits, some
 
 EXPECTED = (
     "vista.safetensors of OpenDriveLab/Vista, svd_xt.safetensors, a folder that dreamdrive prior convert "

@@ -1,0 +1,162 @@
+"""Which fits the street benchmark makes, in which order, and one of them."""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from common.keep import kept, save
+from dreamdrive.evaluate.extractors import Toolbox
+from dreamdrive.options import QUALITIES
+from dreamdrive.run.stages import digest
+from street.case import Case, Poses, References, case_digest, start
+from street.consistency import consistency_of
+from street.fit import PROBE_STEPS, FitTask, Fitted, equal_time, fit_case, kept_fit, options_of, with_steps
+from street.measure import keep_picture, measure, networks_key, told_apart, truth_features
+from street.recording import Recorded, recording
+from street.views import views_digest
+
+SEEDS = tuple(range(8))
+REPRESENTATIONS: tuple[str, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
+BUDGETS = ("equal_steps", "equal_time", "five_times")
+QUALITY = QUALITIES["draft"]
+TIMES = 5
+
+PLAN: tuple[tuple[str, Poses, References], ...] = (
+    ("equal_steps", "true", "corrupted"),
+    ("equal_steps", "true", "clean"),
+    ("equal_steps", "estimated", "corrupted"),
+    ("equal_steps", "estimated", "clean"),
+    ("equal_steps", "unknown_focal", "corrupted"),
+    ("equal_time", "true", "corrupted"),
+    ("equal_time", "true", "clean"),
+    ("five_times", "true", "corrupted"),
+)
+"""Budget, poses and references of each table, the most telling first."""
+
+
+@dataclass(frozen=True)
+class Job(FitTask):
+    """One fit, and the folder of all of them."""
+
+    case: Case
+    representation: str
+    budget: str
+    runs: Path
+
+    @property
+    def name(self) -> str:
+        """For files and messages."""
+        return f"{self.case.name}-{self.representation}-{self.budget}"
+
+    @property
+    def block(self) -> str:
+        """Its table."""
+        return f"{self.budget}-{self.case.geometry}-{self.case.references}"
+
+    @property
+    def owner(self) -> str:
+        """Its world: what is drawn and prepared of one is never made by two processes at once."""
+        return str(self.case.seed)
+
+    @property
+    def result(self) -> Path:
+        """Where its figures are kept."""
+        return self.runs / "fits" / f"{self.name}.json"
+
+    @property
+    def plan(self) -> Path:
+        """Where the steps at equal time are kept, so that a fit that was interrupted takes the same."""
+        return self.runs / "scenes" / f"{self.name}.plan.json"
+
+    @property
+    def has_distances(self) -> bool:
+        """Whether its views count in distances between sets: these are for the main tables, and take long."""
+        return self.budget == "equal_steps" and self.case.geometry != "unknown_focal"
+
+    @property
+    def fit_key(self) -> str:
+        """Of everything the scene follows from: world, corruption, options, and the rule for its steps."""
+        rule: list[object] = [steps_of(self.budget)]
+        if self.budget == "equal_time":
+            rule = [self.budget, PROBE_STEPS, options_of(QUALITY, "hybrid")]
+        options = options_of(QUALITY, self.representation)
+        return digest([case_digest(self.case), self.representation, rule, options])
+
+    def key(self, toolbox: Toolbox) -> str:
+        """Of everything its figures follow from."""
+        networks = networks_key(toolbox) if self.has_distances else []
+        return digest([self.fit_key, views_digest(self.case.seed), networks])
+
+
+def jobs(options: argparse.Namespace) -> Iterator[Job]:
+    """All fits in the order of the plan."""
+    for budget, geometry, references in PLAN:
+        chosen = budget in options.budgets and references in options.references
+        if not chosen or geometry not in options.geometry:
+            continue
+        for seed in options.seeds:
+            for representation in options.representations:
+                if budget == "equal_steps" or representation != "hybrid":
+                    yield Job(Case(seed, geometry, references), representation, budget, options.runs)
+
+
+def recorded(options: argparse.Namespace) -> list[Recorded]:
+    """The fits of a recording, where it is there and wanted."""
+    if options.no_recording or recording() is None:
+        return []
+    return [Recorded(representation, options.runs) for representation in options.representations]
+
+
+def in_order(street: list[Job], clips: list[Recorded]) -> list[Job | Recorded]:
+    """The recording after the fits at equal steps."""
+    first = [job for job in street if job.budget == "equal_steps"]
+    return [*first, *clips, *(job for job in street if job.budget != "equal_steps")]
+
+
+def steps_of(budget: str) -> int:
+    """Steps of the joint fit, where they do not follow from its time."""
+    base = QUALITY.fit.steps
+    return base if budget == "equal_steps" else TIMES * (QUALITY.static.steps + base) - QUALITY.static.steps
+
+
+def fitted(job: Job) -> tuple[Fitted, dict[str, Any]]:
+    """The scene, from the disk if it is there, and how its number of steps was found."""
+    case, representation = job.case, job.representation
+
+    def begin():
+        return start(case, QUALITY, job.runs / "cases")
+
+    plan: dict[str, Any] = {"steps": 0 if job.budget == "equal_time" else steps_of(job.budget)}
+    if job.budget == "equal_time":
+        plan = kept(job.plan, job.fit_key, lambda: equal_time(begin(), representation, QUALITY))
+    quality = with_steps(QUALITY, plan["steps"])
+    return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin(), representation, quality)), plan
+
+
+def run(job: Job, toolbox: Toolbox) -> None:
+    """Fit, unless the scene is there, measure and keep."""
+    case = job.case
+    found, plan = fitted(job)
+    scene = found.scene
+    extractors = toolbox.extractors if job.has_distances else []
+    views, features, middle = measure(scene, case, extractors, job.runs / "truth")
+    truth_features(case.seed, job.runs, toolbox)
+    record = {
+        "seed": case.seed,
+        "geometry": case.geometry,
+        "references": case.references,
+        "representation": job.representation,
+        "budget": job.budget,
+        "static_steps": QUALITY.static.steps,
+        **plan,
+        **asdict(found.cost),
+        "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
+        "views": views,
+        **told_apart(scene, case.seed),
+    }
+    if job.representation == "hybrid" and case.references == "corrupted":
+        record["consistency"] = consistency_of(scene, case, job.runs)
+    keep_picture(job.runs / "shown" / f"{job.name}.png", middle)
+    save(job.result, job.key(toolbox), record, features)

@@ -1,6 +1,0 @@
-"""Frames as a video model would have drawn them: what is wrong with generated video, put on a true clip."""
-
-from dreamdrive.data.corruption.apply import corrupt
-from dreamdrive.data.corruption.settings import PRESETS, Corruption, parse_corruption
-
-__all__ = ["PRESETS", "Corruption", "corrupt", "parse_corruption"]

@@ -1,0 +1,162 @@
+"""Which drives through a scene are asked for, and whether the scene has seen what lies along them."""
+
+import logging
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.data import read_trajectory
+from dreamdrive.drive.manoeuvres import LANE_M, MANOEUVRES, manoeuvre, resampled, smooth, up_of
+from dreamdrive.errors import InputError
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.splat import render_scene
+
+RATES_HZ = (0.1, 240.0)
+"""Rates that ``--fps`` takes: from a picture every ten seconds to the fastest that players show."""
+MAX_FRAMES = 100_000
+"""Most frames of a drive: an hour and a half at 20 Hz."""
+LEAST_SEEN = 0.1
+"""Share of what the recorded drive sees that another one has to see, see ``share_seen``.
+
+Moved to the right, a drawn street between houses has 0.77 at 5 m, 0.43 at 10 m, 0.13 at 20 m and 0.02 at
+30 m; a recorded highway 0.84 at 5 m, 0.65 at 10 m, 0.39 at 20 m, 0.18 at 50 m and 0.06 at 100 m.
+"""
+_ASIDE_M = 1.1 * LANE_M
+_PROBES, _PROBE_WIDTH_PX = 8, 96
+
+_log = logging.getLogger("dreamdrive")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive to render.
+
+    Attributes:
+        name: What its results are called.
+        path: Its poses and times.
+    """
+
+    name: str
+    path: Trajectory
+
+
+def check_numbers(shift_m: float, fps: float | None) -> None:
+    """Refuse what no drive can be made with, before anything is loaded.
+
+    Raises:
+        InputError: A number is out of its range.
+    """
+    if not math.isfinite(shift_m):
+        raise InputError(f"--shift-m {shift_m:g}: expected metres to the right, such as 2 or -2")
+    if fps is not None and not RATES_HZ[0] <= fps <= RATES_HZ[1]:
+        raise InputError(f"--fps {fps:g}: expected {RATES_HZ[0]:g} to {RATES_HZ[1]:g} frames a second")
+
+
+def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | None) -> list[Drive]:
+    """The drives that ``--trajectory`` names, each of which the scene has seen enough of.
+
+    Args:
+        scene: Where to drive.
+        wanted: Names of manoeuvres, which run at the smooth rate of ``generate``, or files.
+        shift_m: How far ``shift`` goes to the right.
+        fps: Rate to bring all of them to; without it a file keeps its own.
+
+    Raises:
+        InputError: There is no such drive, two have one name, or the scene shows next to nothing along it.
+    """
+    drives = [_drive(scene, each, shift_m, fps) for each in wanted]
+    twice = [name for name, count in Counter(drive.name for drive in drives).items() if count > 1]
+    if twice:
+        raise InputError(
+            f"--trajectory: two drives are called {twice[0]}; rename a file, or render them one by one"
+        )
+    for drive, each in zip(drives, wanted, strict=True):
+        away_m = distance_m(drive.path, smooth(scene.trajectory))
+        # A file may look anywhere; manoeuvres near the recorded path look along it.
+        if away_m > _ASIDE_M or each not in MANOEUVRES:
+            option = f"--shift-m {shift_m:g}" if each == "shift" else f"--trajectory {each}"
+            _check_seen(share_seen(scene, drive.path), away_m, option)
+    return drives
+
+
+def _drive(scene: Scene, wanted: str, shift_m: float, fps: float | None) -> Drive:
+    if wanted in MANOEUVRES:
+        name, path = wanted, manoeuvre(wanted, smooth(scene.trajectory), up_of(scene), shift_m)
+    else:
+        file = Path(wanted)
+        if not file.exists():
+            raise InputError(
+                f"--trajectory {wanted}: no such file; expected a file with a trajectory or one of "
+                f"{', '.join(MANOEUVRES)}"
+            )
+        name, path = file.stem, read_trajectory(file)
+    if fps is None:
+        return Drive(name, path)
+    seconds = float(path.times_s[-1] - path.times_s[0])
+    if seconds * fps > MAX_FRAMES:
+        raise InputError(
+            f"--trajectory {wanted} lasts {seconds:.6g} s, {seconds * fps:.6g} frames at --fps {fps:g}; "
+            f"expected {MAX_FRAMES} at most: check the times of the file, or choose a lower rate"
+        )
+    return Drive(name, resampled(path, fps))
+
+
+def _check_seen(seen: float, away_m: float, option: str) -> None:
+    """Refuse a drive that sees next to nothing of what was recorded; say how much where it goes far aside."""
+    where = f"{option} goes {away_m:.3g} m from the recorded path and sees {seen:.0%} of what is seen there"
+    if seen < LEAST_SEEN:
+        raise InputError(
+            f"{where}; expected a drive up to about a lane's width ({LANE_M:g} m) aside, looking the same "
+            "way; a file's poses are in the world of the first recorded camera: x right, y down, z "
+            "forward, metres"
+        )
+    if away_m > _ASIDE_M:
+        _log.warning("%s; beyond about a lane's width (%g m) expect gaps and torn shapes", where, LANE_M)
+
+
+def distance_m(path: Trajectory, recorded: Trajectory) -> float:
+    """How far a path goes at most from the nearest place of another one."""
+    return max(
+        float(np.linalg.norm(recorded.positions_m - place, axis=1).min()) for place in path.positions_m
+    )
+
+
+def share_seen(scene: Scene, path: Trajectory) -> float:
+    """How much of the scene another drive sees, over what the recorded one sees.
+
+    Small pictures are spread evenly over both drives. A pixel counts as far as Gaussians cover it, and beyond
+    the median depth of the recorded views by the square of that depth over its own: hills far away and the
+    sky's panorama look the same from anywhere.
+
+    Args:
+        scene: What to see.
+        path: The other drive.
+
+    Returns:
+        0 where nothing of the scene is near, 1 where as much is as on the recorded drive.
+    """
+    recorded, other = _probed(scene, scene.trajectory), _probed(scene, path)
+    depths_m = recorded[0][recorded[0] > 0]
+    if not depths_m.size:
+        return 1.0
+    near_m = np.median(depths_m)
+    seen = [
+        (alpha * (near_m / np.maximum(depth_m, near_m)) ** 2).mean() for depth_m, alpha in (other, recorded)
+    ]
+    return float(seen[0] / seen[1])
+
+
+def _probed(scene: Scene, path: Trajectory) -> tuple[Float[np.ndarray, "p h w"], Float[np.ndarray, "p h w"]]:
+    """Depth and alpha of small views along a drive."""
+    camera = scene.cameras[0]
+    height = max(1, round(_PROBE_WIDTH_PX * camera.height_px / camera.width_px))
+    camera = camera.resized(_PROBE_WIDTH_PX, height)
+    rows = np.linspace(0, len(path) - 1, _PROBES).round().astype(int).tolist()
+    views = [render_scene(scene, camera.at(path.world_from_camera[i]), float(path.times_s[i])) for i in rows]
+    return np.stack([v.depth_m.numpy() for v in views]), np.stack([v.alpha.numpy() for v in views])

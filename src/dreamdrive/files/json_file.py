@@ -1,0 +1,83 @@
+"""JSON from files: bounded, finite, and of the types that are expected before anything uses it."""
+
+import re
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import msgspec
+
+from dreamdrive.errors import InputError
+from dreamdrive.files.paths import TEXT_BYTES, read_bytes
+
+MAX_DEPTH = 32
+"""How deep objects and lists may lie in each other; what is read and written has ten levels at most."""
+_LARGEST = 2**63
+# What some programs write for a number that is none.
+_NO_NUMBER = re.compile(rb"[\s:,\[]-?(?:NaN|Infinity)\b")
+
+T = TypeVar("T")
+
+
+def read_json(path: Path, option: str = "", *, at_most: int = TEXT_BYTES) -> dict[str, Any]:
+    """The JSON object in a file.
+
+    Args:
+        path: The file.
+        option: How messages call it, such as ``--poses``.
+        at_most: Largest size in bytes.
+
+    Raises:
+        InputError: The file is missing, too large, or holds something else.
+    """
+    where = f"{option} {path}".strip()
+    values = parse_json(read_bytes(path, where, at_most=at_most), where)
+    if not isinstance(values, dict):
+        raise InputError(f"{where}: expected a JSON object, got a {type(values).__name__}")
+    return cast("dict[str, Any]", values)
+
+
+def parse_json(data: bytes | str, where: str) -> Any:
+    """JSON values without NaN, infinities, and numbers that no computer holds, nested ``MAX_DEPTH`` at most.
+
+    Raises:
+        InputError: The data is anything else.
+    """
+    try:
+        values = msgspec.json.decode(data)
+    except RecursionError:
+        raise InputError(f"{where} is not JSON for dreamdrive: it is nested too deep") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raw = data.encode() if isinstance(data, str) else data
+        about = "it holds NaN or Infinity, which JSON has not" if _NO_NUMBER.search(raw) else str(error)
+        raise InputError(f"{where} is not JSON: {about}") from None
+    _check(values, where)
+    return values
+
+
+def of_type(values: object, kind: type[T], where: str) -> T:
+    """JSON values as a ``msgspec.Struct`` or any type that msgspec knows; wrong ones are named by their path.
+
+    Raises:
+        InputError: They are of other types, or out of their bounds.
+    """
+    try:
+        return msgspec.convert(values, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _check(values: object, where: str) -> None:
+    level: list[object] = [values]
+    for _ in range(MAX_DEPTH):
+        below: list[object] = []
+        for value in level:
+            if isinstance(value, dict):
+                below += cast("dict[str, object]", value).values()
+            elif isinstance(value, list):
+                below += cast("list[object]", value)
+            elif isinstance(value, int) and abs(value) >= _LARGEST:
+                raise InputError(f"{where} holds the number {str(value)[:20]}..., which is too large")
+        if not below:
+            return
+        level = below
+    raise InputError(f"{where} is nested deeper than {MAX_DEPTH} levels; expected plain JSON")

@@ -1,0 +1,182 @@
+"""Global alignment: from pairwise pointmaps to one world (Wang et al. 2024, section 3.4)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned, Found, report
+from dreamdrive.geometry.backends.dust3r.align.areas import Normalisation
+from dreamdrive.geometry.backends.dust3r.align.focal import FocalRule, FocalVotes, focal_votes
+from dreamdrive.geometry.backends.dust3r.align.freedom import FocalFreedom, Freedom
+from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
+from dreamdrive.geometry.backends.dust3r.align.known import onto_known
+from dreamdrive.geometry.backends.dust3r.align.memory import check_budget, predicted_bytes
+from dreamdrive.geometry.backends.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples, solve_depth
+from dreamdrive.geometry.backends.dust3r.align.solver import solve
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.align.state import State
+from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.scene.camera import check_rigid
+from dreamdrive.splat import one_torch_thread
+
+_FLOOR = 1e-4  # of the median depth: distances below it weigh no more
+_COARSE = 1e-3  # gain of a step at which the paper's loss is left for the robust one
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """How pairs are brought together.
+
+    Attributes:
+        objective: ``distance`` is the paper's: log confidence times distance. ``robust`` goes on from there
+            with relative misses under a cost that forgives outliers, and counts those across the ray more
+            than those along it. It also brings each pair to the focal length that is known or shared, which
+            is the one that the turns of the camera show, where they do; see ``turned_focal``.
+        normalisation: How the paper's loss divides, see ``areas.half_areas``.
+        focal: One focal length for all images, which one camera took, or one for ``each``.
+        focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
+            paper's.
+        samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
+        outlier: Relative miss from which on the robust cost grows slowly.
+        sharper: How much more a miss across the ray counts than one along it, in the robust cost.
+        steps: Most steps of the solver.
+        memory_gb: What may be used, pointmaps included.
+        seed: Of the choice of pixels.
+    """
+
+    objective: Literal["distance", "robust"] = "robust"
+    normalisation: Normalisation = "pooled"
+    focal: FocalFreedom = "shared"
+    focal_rule: FocalRule = "robust"
+    samples_per_image: int = 2000
+    outlier: float = 0.05
+    sharper: float = 3.0
+    steps: int = 60
+    memory_gb: float = 8.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Known:
+    """What need not be found.
+
+    Attributes:
+        intrinsics: Pinhole of each image (N, 3, 3), pixels counted from 0; None leaves the focal lengths to
+            be found and has the principal points in the middle, (W/2, H/2).
+        world_from_camera: Poses (N, 4, 4), or None. The scene then is given in their world and unit.
+    """
+
+    intrinsics: Float[np.ndarray, "n 3 3"] | None = None
+    world_from_camera: Float[np.ndarray, "n 4 4"] | None = None
+
+
+def align(
+    maps: PairMaps,
+    options: AlignOptions | None = None,
+    known: Known | None = None,
+    still: Sequence[Bool[np.ndarray, "_ _"]] | None = None,
+) -> Aligned:
+    """Bring pairwise pointmaps into one world.
+
+    Without known poses the world is the camera of image 0, in a unit in which the scales of the pairs have a
+    geometric mean of 0.5. Confidences of exactly 1 mask pixels out.
+
+    Args:
+        maps: Pairs that link all images, directed.
+        options: None are the defaults.
+        known: Pinholes or poses to keep.
+        still: Pixels (H, W) of each image that cameras and pairs are solved with; the depth is that of all.
+            None solves with all.
+
+    Raises:
+        InputError: The pairs or what is known cannot be used, or memory would not do.
+    """
+    options, known = options or AlignOptions(), known or Known()
+    graph = graph_of(maps)
+    _check_known(known, len(graph))
+    if known.intrinsics is not None:
+        graph = graph.through(known.intrinsics)
+    storage = max(side.dtype.itemsize for pair in maps.points for side in pair)
+    predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
+    check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
+    with one_torch_thread():
+        return _solved(maps, maps if still is None else maps.masked(still), graph, options, known)
+
+
+def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
+    """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
+    votes = focal_votes(sure, options.focal_rule, graph)
+    turned = None
+    if options.objective == "robust" and options.focal == "shared" and known.intrinsics is None:
+        turned = turned_focal(sure, votes, graph)
+    focals = _first_focals(votes, turned, len(graph), options, known)
+    if options.objective == "robust" and focals is not None:
+        graph = replace(graph, lateral=votes.lateral(focals))
+        start = spanning_tree(sure, votes.all_at(focals), graph)
+    else:
+        start = spanning_tree(sure, votes, graph)
+    if focals is not None:
+        start = replace(start, focals_px=focals)
+    poses = start.world_from_camera
+    if known.world_from_camera is not None:
+        start, poses = onto_known(start, known.world_from_camera)
+    state = State.of(poses, start.focals_px, start.pairs)
+    freedom = Freedom(
+        None if known.intrinsics is not None else options.focal, poses=known.world_from_camera is None
+    )
+    samples = draw_samples(sure, graph, options.samples_per_image, options.normalisation, options.seed)
+    penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
+    if options.objective == "distance":
+        found = solve(samples, state, penalty, freedom, steps=options.steps)
+    else:
+        found = solve(samples, state, penalty, freedom, steps=options.steps, tolerance=_COARSE)
+        penalty = Cauchy(options.outlier, options.sharper)
+        found = solve(samples, found.state, penalty, freedom, steps=options.steps)
+    dense = solve_depth(maps, graph, found.state, penalty, options.normalisation)
+    return report(
+        maps,
+        graph,
+        Found(found.state, dense, samples, found.losses),
+        votes,
+        turned,
+        focal_known=known.intrinsics is not None,
+        known_poses=known.world_from_camera,
+    )
+
+
+def _first_focals(
+    votes: FocalVotes, turned: TurnedFocal | None, images: int, options: AlignOptions, known: Known
+) -> Float[np.ndarray, " n"] | None:
+    """Known ones, or the shared one; None where each image has one of its own to be found."""
+    if known.intrinsics is not None:
+        return known.intrinsics[:, 0, 0].astype(np.float64)
+    if options.focal == "each":
+        return None
+    if turned is None or not turned.observed:
+        return np.full(images, votes.shared_px)
+    return np.full(images, turned.focal_px)
+
+
+def _check_known(known: Known, images: int) -> None:
+    pinholes, poses = known.intrinsics, known.world_from_camera
+    if pinholes is not None:
+        focals = pinholes[:, [0, 1], [0, 1]]
+        if len(pinholes) != images or not (np.isfinite(pinholes).all() and (focals > 0).all()):
+            raise InputError(
+                f"{images} images take {images} pinholes with positive focal lengths in pixels; got "
+                f"{focals.tolist()}."
+            )
+    if poses is None:
+        return
+    if len(poses) != images:
+        raise InputError(f"{images} images take {images} poses; got {len(poses)}.")
+    try:
+        check_rigid(poses, "world_from_camera")
+    except ValueError as error:
+        raise InputError(f"The known poses cannot be used: {error}.") from error

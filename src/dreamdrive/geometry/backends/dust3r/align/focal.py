@@ -1,0 +1,202 @@
+"""The focal length that a pointmap in its own camera's frame speaks for.
+
+It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/z, y/z) of their points.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.geometry.backends.dust3r.align.graph import Graph
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.weighted import weighted_median
+
+FocalRule = Literal["robust", "weiszfeld", "median"]
+_STEPS, _ROBUST_STEPS = 10, 6
+_TINY_PX = 1e-8
+_TUKEY = 4.685  # of the spread: 95 % as good as least squares where there are no outliers
+_SPREAD_FLOOR_PX = 1e-3
+_ENOUGH = 3_000  # pixels; more of them do not make the robust estimate better, only slower
+
+
+@dataclass(frozen=True)
+class FocalVotes:
+    """Focal lengths from the first pointmap of each edge.
+
+    Attributes:
+        image: First image (E,) of each edge.
+        focal_px: Its focal length (E,) by that edge.
+        weight: Sum of its log confidences (E,).
+    """
+
+    image: Int[np.ndarray, " e"]
+    focal_px: Float[np.ndarray, " e"]
+    weight: Float[np.ndarray, " e"]
+
+    @property
+    def shared_px(self) -> float:
+        """Weighted median over all edges: the focal length of one camera that took all images."""
+        return weighted_median(self.focal_px, self.weight)
+
+    @property
+    def spread(self) -> float:
+        """Robust standard deviation over edges (1.4826 times the median distance), relative to the median."""
+        apart = np.abs(np.log(self.focal_px / self.shared_px))
+        return 1.4826 * weighted_median(apart, self.weight)
+
+    def all_at(self, focal_px: Float[np.ndarray, " n"]) -> "FocalVotes":
+        """The votes of pointmaps that were given the focal lengths (N,) of their images."""
+        return replace(self, focal_px=focal_px[self.image])
+
+    def lateral(self, focal_px: Float[np.ndarray, " n"]) -> Float[np.ndarray, " e"]:
+        """Factors (E,) on x and y that give pointmaps the focal lengths (N,) of their images.
+
+        A pointmap that shows none stays as it is.
+        """
+        return np.nan_to_num(self.focal_px / focal_px[self.image], nan=1.0)
+
+    def per_image_px(self, count: int) -> Float[np.ndarray, " n"]:
+        """Weighted median (N,) over the edges that start at an image; the shared one where none does."""
+        focals = np.full(count, self.shared_px)
+        for image in np.unique(self.image):
+            mine = self.image == image
+            focals[image] = weighted_median(self.focal_px[mine], self.weight[mine])
+        return focals
+
+
+def focal_votes(maps: PairMaps, rule: FocalRule = "robust", graph: Graph | None = None) -> FocalVotes:
+    """The focal length of every edge's first image by its own pointmap.
+
+    Args:
+        maps: The pairs.
+        rule: See ``focal_px``.
+        graph: Where the principal points are; None has them in the middle.
+    """
+    focals: list[float] = []
+    for image, points, confidence in zip(maps.edges[:, 0], maps.points, maps.confidence, strict=True):
+        if graph is None:
+            focals.append(focal_px(points[0], confidence[0], rule))
+        else:
+            cx, cy = graph.principal_px[image].tolist()
+            focals.append(focal_px(points[0], confidence[0], rule, (cx, cy), float(graph.stretch[image])))
+    weights = [float(np.log(confidence[0]).sum(dtype=np.float64)) for confidence in maps.confidence]
+    return FocalVotes(maps.edges[:, 0], np.array(focals), np.array(weights))
+
+
+def focal_px(
+    points: Float[np.ndarray, "h w 3"],
+    confidence: Float[np.ndarray, "h w"] | None = None,
+    rule: FocalRule = "robust",
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
+) -> float:
+    """Focal length fx in pixels by a named rule; only the robust one looks at the confidence.
+
+    Args:
+        points: Pointmap (H, W, 3) in the frame of its own camera.
+        confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
+        rule: ``weiszfeld`` is the paper's; ``median`` is its program's other choice.
+        principal_px: Column and row; None is the middle (W/2, H/2).
+        stretch: fx / fy.
+    """
+    if rule == "weiszfeld":
+        return weiszfeld_px(points, principal_px, stretch=stretch)
+    if rule == "median":
+        return median_px(points, principal_px, stretch)
+    return robust_px(points, confidence, principal_px, stretch)
+
+
+def weiszfeld_px(
+    points: Float[np.ndarray, "h w 3"],
+    principal_px: tuple[float, float] | None = None,
+    bounds: tuple[float, float] = (0.0, np.inf),
+    stretch: float = 1.0,
+) -> float:
+    """Minimise sum |p - f q| over all pixels alike: ten reweighted steps (Wang et al. 2024, section 3.3).
+
+    Args:
+        points: Pointmap (H, W, 3) in the frame of its own camera.
+        principal_px: Column and row; None is the middle (W/2, H/2).
+        bounds: Least and greatest result in units of max(H, W) / (2 tan 30 degrees).
+        stretch: fx / fy.
+    """
+    p, q = _pixels_and_slopes(points, principal_px, stretch)
+    pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
+    focal = pq.mean() / qq.mean()
+    for _ in range(_STEPS):
+        weight = 1 / np.maximum(np.linalg.norm(p - focal * q, axis=1), _TINY_PX)
+        focal = (weight * pq).mean() / (weight * qq).mean()
+    unit = max(points.shape[:2]) / (2 * np.tan(np.deg2rad(30)))
+    return float(np.clip(focal, bounds[0] * unit, bounds[1] * unit))
+
+
+def median_px(
+    points: Float[np.ndarray, "h w 3"],
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
+) -> float:
+    """Median of the votes u z/x and v z/y of all pixels; of an even number the lower middle one."""
+    grid = _grid(points.shape[0], points.shape[1], principal_px, stretch)
+    flat = points.reshape(-1, 3).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        votes = (grid * flat[:, 2:] / flat[:, :2]).ravel()
+    votes = np.sort(votes[~np.isnan(votes)])
+    return float(votes[(len(votes) - 1) // 2])
+
+
+def robust_px(
+    points: Float[np.ndarray, "h w 3"],
+    confidence: Float[np.ndarray, "h w"] | None = None,
+    principal_px: tuple[float, float] | None = None,
+    stretch: float = 1.0,
+) -> float:
+    """Log confidences weigh, masked pixels and points behind the camera do not count, outliers drop out.
+
+    A sum of norms has no protection against points of great slope: a fifth of them six times too steep takes
+    Weiszfeld's result from 36 px to 10. Here the weighted median of the radial votes p·q / q·q, each weighing
+    as much as its distance from the principal point, starts steps with Tukey's weights, which end at zero.
+
+    Args:
+        points: Pointmap (H, W, 3) in the frame of its own camera.
+        confidence: At least 1 (H, W); None weighs all alike.
+        principal_px: Column and row; None is the middle (W/2, H/2).
+        stretch: fx / fy.
+
+    Returns:
+        The focal length, or NaN where no pixel speaks for a positive one.
+    """
+    p, q = _pixels_and_slopes(points, principal_px, stretch)
+    pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
+    trust = np.ones(len(p)) if confidence is None else np.log(confidence.astype(np.float64)).ravel()
+    counts = (trust > 0) & (points[..., 2].ravel() > 0) & (pq > 0)
+    if not counts.any():
+        return float("nan")
+    some = np.flatnonzero(counts)
+    some = some[:: max(1, len(some) // _ENOUGH)]
+    p, q, pq, qq, trust = p[some], q[some], pq[some], qq[some], trust[some]
+    focal = weighted_median(pq / qq, trust * np.linalg.norm(p, axis=1))
+    for _ in range(_ROBUST_STEPS):
+        error = np.linalg.norm(p - focal * q, axis=1)
+        reach = _TUKEY * max(1.4826 * weighted_median(error, trust), _SPREAD_FLOOR_PX)
+        weight = trust * np.square(np.maximum(1 - np.square(error / reach), 0))
+        focal = (weight * pq).sum() / (weight * qq).sum()
+    return float(focal)
+
+
+def _pixels_and_slopes(
+    points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None, stretch: float
+) -> tuple[Float[np.ndarray, "p 2"], Float[np.ndarray, "p 2"]]:
+    flat = points.reshape(-1, 3).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.nan_to_num(flat[:, :2] / flat[:, 2:], nan=0.0, posinf=0.0, neginf=0.0)
+    return _grid(points.shape[0], points.shape[1], principal_px, stretch), slopes
+
+
+def _grid(
+    height: int, width: int, principal_px: tuple[float, float] | None, stretch: float
+) -> Float[np.ndarray, "p 2"]:
+    cx, cy = (width / 2, height / 2) if principal_px is None else principal_px
+    columns, rows = np.meshgrid(np.arange(width) - cx, stretch * (np.arange(height) - cy))
+    return np.stack([columns.ravel(), rows.ravel()], axis=1)

@@ -1,0 +1,223 @@
+"""A first guess of all cameras: pairs are joined along the tree of the most trusted ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import minimum_spanning_tree
+
+from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_px, focal_votes
+from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
+from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.cameras import register
+from dreamdrive.scene.similarity import Similarity
+
+BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
+PNP_CONFIDENCE = 3.0
+_PNP_STEPS = 10
+_ROBUST_STEPS = 5
+_REGISTERED = 2_000  # pixels of a pair that are registered
+_NEAREST = 0.01  # quantile of the valid depths that replaces those behind the camera
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where an alignment begins. The world is any; the scales of the pairs have a geometric mean of 0.5.
+
+    Attributes:
+        world_from_camera: Poses (N, 4, 4).
+        focals_px: Focal length (N,) of each image.
+        depth: Depth along z (H, W) of each image, positive.
+        pairs: Similarity of each edge from its first camera's frame to the world.
+        unsure: Images whose pose has only that of another image to go by.
+    """
+
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    focals_px: Float[np.ndarray, " n"]
+    depth: tuple[Float[np.ndarray, "_ _"], ...]
+    pairs: tuple[Similarity, ...]
+    unsure: tuple[int, ...] = ()
+
+
+def spanning_tree(
+    maps: PairMaps,
+    votes: FocalVotes | None = None,
+    graph: Graph | None = None,
+    *,
+    upstream: bool = False,
+    stale_focals: bool = True,
+) -> Start:
+    """Join pairs from the strongest on; then pose each image in what was joined.
+
+    Pairs weigh by mean confidence of the first times that of the second image. Each next pair of the maximum
+    spanning tree is registered to the points of the image that is already placed, and places the other one.
+
+    Where this departs from the authors' program: weights are log confidences, so masked pixels do not count;
+    registrations are robust; the focal length of an image comes from its own pointmaps, by the robust rule;
+    poses come from the registration of an own pointmap rather than from PnP; points behind a camera get a
+    small depth rather than depth 1.
+
+    Args:
+        maps: The pairs.
+        votes: Focal lengths by the robust rule where they are known already; not looked at if ``upstream``.
+        graph: Their graph, where that is known already; if ``upstream`` its points are as the network's.
+        upstream: Do all of it as the authors' program does.
+        stale_focals: As it does, take an image's focal length from the pair handled before; without effect
+            unless ``upstream``.
+
+    Raises:
+        InputError: See ``graph.graph_of``.
+    """
+    graph = graph or graph_of(maps)
+    tree = _Tree(maps, graph, votes, upstream, stale_focals)
+    tree.grow()
+    tree.find_focals()
+    tree.find_poses()
+    return tree.start()
+
+
+class _Tree:
+    """The state of the walk: points of placed images, and focal lengths and poses as far as known."""
+
+    def __init__(
+        self, maps: PairMaps, graph: Graph, votes: FocalVotes | None, upstream: bool, stale_focals: bool
+    ) -> None:
+        self.maps, self.graph, self.votes, self.upstream = maps, graph, votes, upstream
+        self.stale_focals = stale_focals
+        self.edge_of = {(int(i), int(j)): edge for edge, (i, j) in enumerate(maps.edges)}
+        self.scores = self._scores()
+        self.points: dict[int, np.ndarray] = {}
+        self.poses: dict[int, np.ndarray] = {}
+        self.focals: dict[int, float] = {}
+        self.unsure: list[int] = []
+
+    def _scores(self) -> np.ndarray:
+        if self.upstream:
+            means = [[float(side.mean()) for side in pair] for pair in self.maps.confidence]
+        else:
+            means = [[float(np.log(side).mean()) for side in pair] for pair in self.maps.confidence]
+        return np.prod(means, axis=1)
+
+    def _strongest_first(self) -> list[tuple[int, int]]:
+        """Edges of the tree, (first, second) image."""
+        count = len(self.graph)
+        weights = coo_array((-self.scores, tuple(self.maps.edges.T)), shape=(count, count)).tocsr()
+        found = minimum_spanning_tree(weights).tocoo()
+        order = sorted(zip(found.data.tolist(), found.row.tolist(), found.col.tolist(), strict=True))
+        return [(i, j) for _, i, j in order]
+
+    def grow(self) -> None:
+        """Place the points of all images."""
+        waiting = self._strongest_first()
+        first = waiting.pop(0)
+        before = edge = self.edge_of[first]
+        for image, points in zip(first, self.maps.points[edge], strict=True):
+            self.points[image] = self.graph.shaped(edge, points.astype(np.float32, copy=False))
+        self.poses[first[0]] = np.eye(4)
+        if self.upstream:
+            self.focals[first[0]] = self._focal(edge)
+        while waiting:
+            i, j = waiting.pop(0)
+            edge = self.edge_of[i, j]
+            if self.upstream and i not in self.focals:
+                self.focals[i] = self._focal(before if self.stale_focals else edge)
+            if i not in self.points and j not in self.points:
+                waiting.append((i, j))
+                continue
+            side = 0 if i in self.points else 1
+            placed, other = (i, j)[side], (i, j)[1 - side]
+            joined = self._register(edge, side, self.points[placed])
+            self.points[other] = joined(self.graph.shaped(edge, self.maps.points[edge][1 - side]))
+            self.poses.setdefault(i, _rigid(joined))
+            before = edge
+
+    def _focal(self, edge: int) -> float:
+        return focal_px(self.maps.points[edge][0], rule="weiszfeld")
+
+    def _register(self, edge: int, side: int, target: np.ndarray) -> Similarity:
+        points, trust = self.maps.points[edge][side], self.maps.confidence[edge][side]
+        if self.upstream:
+            return register(points, target, trust)
+        stride = max(1, round(np.sqrt(trust.size / _REGISTERED)))
+        some = np.s_[stride // 2 :: stride, stride // 2 :: stride]
+        weights = np.log(trust[some])
+        if np.count_nonzero(weights) < 3:
+            some, weights = np.s_[:, :], np.log(trust)
+        source = self.graph.shaped(edge, points[some])
+        return register(source, target[some], weights, robust_steps=_ROBUST_STEPS)
+
+    def _by_strength(self) -> list[int]:
+        return np.argsort(-self.scores, kind="stable").tolist()
+
+    def find_focals(self) -> None:
+        """Focal lengths of all images."""
+        count = len(self.graph)
+        if not self.upstream:
+            votes = self.votes or focal_votes(self.maps, graph=self.graph)
+            self.focals = dict(enumerate(votes.per_image_px(count).tolist()))
+            return
+        for edge in self._by_strength():
+            image = int(self.maps.edges[edge, 0])
+            if image not in self.focals:
+                self.focals[image] = self._focal(edge)
+
+    def find_poses(self) -> None:
+        """Poses of images that were the first of no edge in the tree."""
+        if not self.upstream:
+            for edge in self._by_strength():
+                image = int(self.maps.edges[edge, 0])
+                if image not in self.poses:
+                    self.poses[image] = _rigid(self._register(edge, 0, self.points[image]))
+        for image in range(len(self.graph)):
+            if image not in self.poses:
+                self.poses[image] = self._pose_by_pnp(image)
+
+    def _pose_by_pnp(self, image: int) -> np.ndarray:
+        trusts = [self.maps.confidence[half.edge][half.side] for half in self.graph.halves[image]]
+        trust = np.max(trusts, axis=0)
+        threshold = PNP_CONFIDENCE if self.upstream else 1.0
+        cx, cy = self.graph.principal_px[image].tolist()
+        stretch = float(self.graph.stretch[image])
+        focal = self.focals.get(image)
+        found = pose_by_pnp(self.points[image], trust > threshold, focal, _PNP_STEPS, (cx, cy), stretch)
+        if found is not None:
+            self.focals[image], pose = found
+            return pose
+        self.unsure.append(image)
+        if self.upstream:
+            return np.eye(4)
+        partner = next(int(i) for i, j in self.maps.edges if j == image)
+        return self.poses.get(partner, np.eye(4)).copy()
+
+    def start(self) -> Start:
+        """All of it in the scale in which the pairs' scales have a geometric mean of 0.5."""
+        pairs = [self._register(edge, 0, self.points[int(i)]) for edge, (i, _) in enumerate(self.maps.edges)]
+        scale = BASE_SCALE / np.exp(np.mean([np.log(pair.scale) for pair in pairs]))
+        poses = np.stack([self.poses[image] for image in range(len(self.graph))])
+        poses[:, :3, 3] *= scale
+        points = [np.float32(scale) * self.points[image] for image in range(len(self.graph))]
+        return Start(
+            world_from_camera=poses,
+            focals_px=np.array([self.focals[image] for image in range(len(self.graph))]),
+            depth=tuple(self._depth(xyz, pose) for xyz, pose in zip(points, poses, strict=True)),
+            pairs=tuple(Similarity(scale * p.scale, p.rotation, scale * p.translation) for p in pairs),
+            unsure=tuple(self.unsure),
+        )
+
+    def _depth(self, points: Float[np.ndarray, "h w 3"], pose: np.ndarray) -> Float[np.ndarray, "h w"]:
+        z = ((points - pose[:3, 3].astype(points.dtype)) @ pose[:3, 2].astype(points.dtype)).astype(
+            np.float32
+        )
+        if self.upstream:
+            return np.where(z > 0, z, np.float32(1))
+        valid = z[z > 0]
+        least = np.quantile(valid, _NEAREST) if len(valid) else np.float32(1)
+        return np.where(z > least, z, np.float32(least))
+
+
+def _rigid(similarity: Similarity) -> Float[np.ndarray, "4 4"]:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = similarity.rotation, similarity.translation
+    return pose

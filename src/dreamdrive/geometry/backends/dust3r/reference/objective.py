@@ -1,0 +1,143 @@
+"""The loss of global alignment as its authors' program writes it: raw parameters, all edges stacked.
+
+Kept as the reference that the solver is measured against. With the points X of image i in the world, the
+points P of an edge, its similarity T and w = ln confidence (Wang et al. 2024, eq. 5):
+    L = sum over edges and both images, sum over pixels, w |X - T P| / A
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Normalisation, Start, half_areas
+from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.scene.similarity import Similarity
+
+_FOCAL_BREAK = 20.0
+
+
+@dataclass(frozen=True)
+class Raw:
+    """Parameters as the authors' program has them; quaternions are xyzw and of any length.
+
+    Attributes:
+        pw_poses: Quaternion, signed log1p of translation / scale, log scale (E, 8) of the edges.
+        im_poses: Quaternion, signed log1p of translation (N, 7) of world_from_camera.
+        im_focals: 20 times the log focal length (N, 1).
+        im_depthmaps: Log depth (N, pixels of the largest image), row by row, padded at the end.
+    """
+
+    pw_poses: Float[Tensor, "e 8"]
+    im_poses: Float[Tensor, "n 7"]
+    im_focals: Float[Tensor, "n 1"]
+    im_depthmaps: Float[Tensor, "n a"]
+
+    @property
+    def tensors(self) -> list[Tensor]:
+        """All of them."""
+        return [self.pw_poses, self.im_poses, self.im_focals, self.im_depthmaps]
+
+
+def raw_parameters(start: Start) -> Raw:
+    """The parameters of a start, float32, ready for gradients."""
+    most = max(depth.size for depth in start.depth)
+    depth = [np.pad(np.log(depth).ravel(), (0, most - depth.size)) for depth in start.depth]
+    pairs = [
+        [*_quaternion(p.rotation), *_signed_log1p(p.translation / p.scale), np.log(p.scale)]
+        for p in start.pairs
+    ]
+    poses = [[*_quaternion(pose[:3, :3]), *_signed_log1p(pose[:3, 3])] for pose in start.world_from_camera]
+    arrays = (pairs, poses, _FOCAL_BREAK * np.log(start.focals_px)[:, None], np.stack(depth))
+    return Raw(*(torch.tensor(np.asarray(a), dtype=torch.float32, requires_grad=True) for a in arrays))
+
+
+class Objective:
+    """The loss of raw parameters, differentiable."""
+
+    def __init__(self, maps: PairMaps, graph: Graph, normalisation: Normalisation = "pooled") -> None:
+        self.sizes = graph.sizes
+        most = max(height * width for height, width in graph.sizes)
+        areas = half_areas(maps, normalisation)
+        self.images = [torch.from_numpy(maps.edges[:, side].astype(np.int64)) for side in (0, 1)]
+        self.points, self.weights = [], []
+        for side in (0, 1):
+            xyz = torch.zeros(len(maps.edges), most, 3)
+            weight = torch.zeros(len(maps.edges), most)
+            for edge in range(len(maps.edges)):
+                trust = torch.from_numpy(np.log(maps.confidence[edge][side], dtype=np.float32).ravel())
+                flat = torch.from_numpy(maps.points[edge][side].astype(np.float32).reshape(-1, 3))
+                weight[edge, : len(trust)] = trust / areas[edge, side]
+                xyz[edge, : len(trust)] = torch.where(trust[:, None] > 0, flat, 0.0)
+            self.points.append(xyz)
+            self.weights.append(weight)
+        self.grid = torch.zeros(len(graph), most, 2)
+        for image, (height, width) in enumerate(graph.sizes):
+            columns, rows = np.meshgrid(np.arange(width) - width / 2, np.arange(height) - height / 2)
+            pixels = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float32)
+            self.grid[image, : height * width] = torch.from_numpy(pixels)
+
+    def __call__(self, raw: Raw) -> Tensor:
+        """The loss, a scalar."""
+        world = self.world_points(raw)
+        scales, rotations, translations = pair_transforms(raw)
+        turns, shifts = scales[:, None, None] * rotations, scales[:, None] * translations
+        loss = world.new_zeros(())
+        for image, points, weight in zip(self.images, self.points, self.weights, strict=True):
+            placed = points @ turns.mT + shifts[:, None]
+            loss = loss + (weight * torch.linalg.vector_norm(world[image] - placed, dim=-1)).sum()
+        return loss
+
+    def world_points(self, raw: Raw) -> Float[Tensor, "n a 3"]:
+        """X = R [(u - cx) d / f, (v - cy) d / f, d] + t of all pixels, padded at the end."""
+        depth = raw.im_depthmaps.exp()[..., None]
+        focals = (raw.im_focals / _FOCAL_BREAK).exp()[:, None]
+        local = torch.cat([depth * self.grid / focals, depth], dim=-1)
+        return local @ _rotations(raw.im_poses[:, :4]).mT + _signed_expm1(raw.im_poses[:, 4:7])[:, None]
+
+    def start_of(self, raw: Raw) -> Start:
+        """The parameters as poses, focal lengths and depths."""
+        with torch.no_grad():
+            poses = np.tile(np.eye(4), (len(raw.im_poses), 1, 1))
+            poses[:, :3, :3] = _rotations(raw.im_poses[:, :4].double()).numpy()
+            poses[:, :3, 3] = _signed_expm1(raw.im_poses[:, 4:7].double()).numpy()
+            focals = (raw.im_focals[:, 0].double() / _FOCAL_BREAK).exp().numpy()
+            scales, rotations, translations = (part.double().numpy() for part in pair_transforms(raw))
+            depth = raw.im_depthmaps.exp().numpy()
+        pairs = [
+            Similarity(float(s), r, s * t) for s, r, t in zip(scales, rotations, translations, strict=True)
+        ]
+        maps = [d[: h * w].reshape(h, w) for d, (h, w) in zip(depth, self.sizes, strict=True)]
+        return Start(poses, focals, tuple(maps), tuple(pairs))
+
+
+def pair_transforms(raw: Raw) -> tuple[Float[Tensor, " e"], Float[Tensor, "e 3 3"], Float[Tensor, "e 3"]]:
+    """Scale s, rotation R and translation t of X = s (R P + t); the scales have a geometric mean of 0.5."""
+    logs = raw.pw_poses[:, 7]
+    scales = (logs - logs.mean() + float(np.log(BASE_SCALE))).exp()
+    return scales, _rotations(raw.pw_poses[:, :4]), _signed_expm1(raw.pw_poses[:, 4:7])
+
+
+def _rotations(quaternions: Float[Tensor, "n 4"]) -> Float[Tensor, "n 3 3"]:
+    x, y, z, w = torch.nn.functional.normalize(quaternions, dim=-1).unbind(-1)
+    rows = [
+        torch.stack([x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)], dim=-1),
+        torch.stack([2 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2 * (y * z - x * w)], dim=-1),
+        torch.stack([2 * (x * z - y * w), 2 * (y * z + x * w), -x * x - y * y + z * z + w * w], dim=-1),
+    ]
+    return torch.stack(rows, dim=-2)
+
+
+def _quaternion(rotation: Float[np.ndarray, "3 3"]) -> list[float]:
+    return Rotation.from_matrix(rotation).as_quat().tolist()
+
+
+def _signed_log1p(values: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    return np.sign(values) * np.log1p(np.abs(values))
+
+
+def _signed_expm1(values: Float[Tensor, "n 3"]) -> Float[Tensor, "n 3"]:
+    return values.sign() * values.abs().expm1()

@@ -1,0 +1,70 @@
+"""One pinhole for a clip: from those that a network gives each frame, or a known one in their place."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.backends.feedforward.network import Seen
+from dreamdrive.geometry.fitting import Fitting
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.similarity import nearest_rotation
+
+
+@dataclass(frozen=True)
+class SharedCamera:
+    """The camera that took all frames, as the network has it.
+
+    Attributes:
+        camera: Pinhole of the frames with square pixels.
+        spread: Robust standard deviation (1.4826 times the median distance) of the logarithm of the focal
+            lengths along both axes of all frames.
+    """
+
+    camera: Camera
+    spread: float
+
+
+def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
+    """Medians over all frames; the focal length also over both axes.
+
+    Args:
+        intrinsics: Pinholes (N, 3, 3) in pixels of the pictures.
+        how: How the pictures were made of the frames.
+
+    Raises:
+        InputError: A focal length is not positive.
+    """
+    focals_px = intrinsics[:, [0, 1], [0, 1]] * np.divide(how.frame_size, how.size)
+    if not (focals_px > 0).all() or not np.isfinite(intrinsics).all():
+        raise InputError("the network gives focal lengths that are not positive: are these its weights?")
+    focal_px = float(np.median(focals_px))
+    spread = 1.4826 * float(np.median(np.abs(np.log(focals_px / focal_px))))
+    cx_px, cy_px = how.to_frame(np.median(intrinsics[:, :2, 2], axis=0))
+    return SharedCamera(Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread)
+
+
+def seen_through(seen: Seen, camera: Camera) -> Seen:
+    """What a network saw through pinholes of its own, as it is through the known one.
+
+    Networks that cannot be told have the principal point in the middle. What they see is right for a camera
+    that looks along the middle of the picture: it is turned to look along the true axis, by the rotation that
+    brings the rays of all pixels nearest together. What a rotation does not mend, a focal length of their
+    own, stays.
+
+    Args:
+        seen: Poses, depth and the network's pinholes.
+        camera: The known pinhole of the pictures.
+    """
+    poses, depth = seen.world_from_camera.copy(), np.empty_like(seen.depth)
+    rays = camera.rays()
+    towards = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    for frame, matrix in enumerate(seen.intrinsics):
+        size = camera.width_px, camera.height_px
+        own = Camera(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *size).rays()
+        own_towards = own / np.linalg.norm(own, axis=-1, keepdims=True)
+        turn = nearest_rotation(np.einsum("hwi,hwj->ij", own_towards, towards))
+        poses[frame, :3, :3] = poses[frame, :3, :3] @ turn
+        depth[frame] = seen.depth[frame] * (own @ turn[:, 2])
+    return replace(seen, world_from_camera=poses, depth=depth)

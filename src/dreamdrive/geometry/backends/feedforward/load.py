@@ -1,0 +1,117 @@
+"""Other people's networks, built from their installed package and filled from files on this machine."""
+
+import importlib
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from torch import Tensor, nn
+
+from dreamdrive.device import chosen_device
+from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.models import as_state, check_sizes, fill, read_state, read_torch
+
+Upstream = TypeVar("Upstream", bound=nn.Module)
+_NAMES = ("model.safetensors", "model.pt", "model.pth")
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Weights as they lie on disk.
+
+    Attributes:
+        state: Tensors by key.
+        config: What ``config.json`` beside them says; empty without one.
+        source: Where they come from, for messages.
+        expected: Which weights are expected, for messages.
+    """
+
+    state: dict[str, Tensor]
+    config: dict[str, Any]
+    source: str
+    expected: str
+
+    def keep(self, prefix: str = "", without: tuple[str, ...] = ()) -> dict[str, Tensor]:
+        """The state with a prefix taken off its keys, without those that then begin otherwise."""
+        state = {key.removeprefix(prefix): value for key, value in self.state.items()}
+        return {key: value for key, value in state.items() if not key.startswith(without or ("\0",))}
+
+
+def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Stored:
+    """Read weights; nothing in them is executed, nothing is fetched.
+
+    Args:
+        path: A ``.safetensors``, ``.pt`` or ``.pth``, or a folder with ``model`` of that ending.
+        expected: Which weights are expected, for messages.
+        needs_config: Whether nothing can be built without ``config.json`` beside them.
+
+    Raises:
+        InputError: A file is missing or damaged.
+    """
+    file = path
+    if path.is_dir():
+        there = [path / name for name in _NAMES if (path / name).is_file()]
+        if not there:
+            raise InputError(f"{path} holds none of {', '.join(_NAMES)}; expected {expected}")
+        file = there[0]
+    beside = file.parent / "config.json"
+    if needs_config and not beside.is_file():
+        raise InputError(f"{beside} does not exist; expected {expected}")
+    return Stored(_read_state(file, expected), _read_config(beside), str(file), expected)
+
+
+def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
+    if file.suffix == ".safetensors":
+        return read_state(file, expected)
+    content = read_torch(file, expected)
+    wrapped = isinstance(content, dict) and isinstance(content.get("model"), dict)
+    return as_state(content["model"] if wrapped else content, str(file), expected)
+
+
+def _read_config(file: Path) -> dict[str, Any]:
+    if not file.is_file():
+        return {}
+    config = read_json(file, "--weights")
+    check_sizes(config, f"--weights {file}")
+    return config
+
+
+def upstream(module: str, install: str) -> Any:
+    """A module of an optional package.
+
+    Raises:
+        InputError: It or something that it needs is missing.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the package's own age
+            return importlib.import_module(module)
+    except ImportError as error:
+        raise InputError(f"{module} cannot be imported ({error}): {install}") from None
+
+
+def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]) -> Upstream:
+    """Build a network and fill it, on the GPU where torch has one.
+
+    Args:
+        make: Builds it with whatever weights.
+        stored: Where the weights come from.
+        state: The weights by the network's own keys.
+
+    Raises:
+        InputError: The installed package has another signature, or keys are missing, left over or of
+            another shape.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            network = make()
+    except (TypeError, KeyError, AttributeError, ValueError, RuntimeError) as error:
+        raise InputError(
+            f"{stored.source}: the installed package does not build this network "
+            f"({type(error).__name__}: {error}); expected {stored.expected}"
+        ) from error
+    return fill(network, state, stored.source, stored.expected).to(chosen_device())

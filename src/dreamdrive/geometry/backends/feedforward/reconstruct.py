@@ -1,0 +1,203 @@
+"""A clip through a network that sees many frames at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.backends.feedforward.camera import SharedCamera, seen_through, share
+from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
+from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
+from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show
+from dreamdrive.geometry.cameras import contradiction, stands, unit_in, without_poses
+from dreamdrive.geometry.evidence import free_pixels
+from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
+from dreamdrive.geometry.frames import check_frames
+from dreamdrive.geometry.measured import Measured, trusted
+from dreamdrive.progress import Progress, Work, silent
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+_FOCAL_SPREAD = 0.2  # of the logarithm; beyond it the frames speak of different cameras
+_FOCAL_APART = 0.1  # relative
+_CHUNK_MISS = 0.1  # relative to depth
+
+
+@dataclass(frozen=True)
+class FeedForward:
+    """Reconstruct by such a network; see ``geometry.protocol.Reconstruct``.
+
+    Attributes:
+        name: For messages.
+        load: From the file or folder of the weights to the network.
+        long_side_px: Of the pictures that it is shown, a multiple of 14.
+        chunk: Frames that it is shown at once.
+        overlap: Frames that two chunks share.
+    """
+
+    name: str
+    load: Callable[[Path], Network]
+    long_side_px: int
+    chunk: int = 24
+    overlap: int = 8
+
+    def __call__(
+        self,
+        clip: Clip,
+        *,
+        camera_height_m: float | None = None,
+        seed: int = 0,
+        weights: Path | None = None,
+        work: Work = Work(),
+    ) -> Geometry:
+        """Cameras and depth of the network, brought to metres.
+
+        Held-out frames are seen, which poses them; their depth is not handed on.
+
+        Args:
+            clip: Frames of one camera.
+            camera_height_m: Height of the camera above the road; None assumes 1.5 m.
+            seed: Seed of everything random.
+            weights: The network's file or folder.
+            work: Told after each chunk of frames; keeps what the network measured.
+
+        Raises:
+            InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
+                contradict them, or weights or results that cannot be used.
+        """
+        if weights is None:
+            raise InputError(f"geometry {self.name} needs the weights of its network")
+        check_frames(clip, self.name)
+        evidence = look(clip)
+        contradiction.check(clip, evidence)
+        # Of a standing camera the path is noise, in which no unit can be read.
+        shown = without_poses(clip) if stands(clip, evidence) else clip
+        free = free_pixels(clip, evidence)
+        found = work.keep("measured", lambda: self.measure(shown, free, weights, seed, work))
+        return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
+
+    def measure(
+        self,
+        clip: Clip,
+        free: Bool[np.ndarray, "f h w"],
+        weights: Path,
+        seed: int = 0,
+        progress: Progress = silent,
+    ) -> Measured:
+        """Cameras and depth of the network, in its unit or that of known poses.
+
+        Args:
+            clip: Two frames or more of one camera.
+            free: Pixels (F, H, W) that show the street.
+            weights: The network's file or folder.
+            seed: Seed of everything random.
+            progress: Told after each chunk of frames; a last step is left for what follows.
+
+        Raises:
+            InputError: The weights or results cannot be used.
+        """
+        how = fit_patches(*clip.size, self.long_side_px)
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            network = self.load(weights)
+            parts: list[tuple[range, Seen]] = []
+            cut = chunks(len(clip), self.chunk, self.overlap)
+            for frames in cut:
+                parts.append((frames, _see(network, clip, frames, how)))
+                progress(len(parts), len(cut) + 1)
+        shared = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
+        usable = np.stack([prepare_mask(one, how) for one in free])
+        joined = join(parts, how.picture_camera(_camera(clip, shared)), usable)
+        return _measured(clip, joined, shared, free, how, network)
+
+
+def _measured(
+    clip: Clip,
+    joined: Joined,
+    shared: SharedCamera,
+    free: Bool[np.ndarray, "f h w"],
+    how: Fitting,
+    network: Network,
+) -> Measured:
+    """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
+
+    Known poses are kept, and give the depth their unit.
+
+    Args:
+        clip: The frames.
+        joined: Their poses and depth on the grid of the pictures.
+        shared: Their camera as the network has it.
+        free: Pixels (F, H, W) of the frames that show the street.
+        how: How the pictures were made of the frames.
+        network: The network, for its unit.
+    """
+    poses, factor, others = joined.world_from_camera, 1.0, dict[str, float]()
+    unit, spread = network.unit, network.unit_spread
+    if clip.known.world_from_camera is not None:
+        poses = clip.known.world_from_camera.astype(np.float64)
+        there = joined.depth[joined.depth > 0]
+        middle = float(np.median(there)) if len(there) else 0.0
+        both = clip.known.metric and network.unit is not None
+        factor = unit_in(poses, joined.world_from_camera, middle, metric=both)
+        others = {} if network.unit is None else {network.unit: 1 / factor}
+        unit, spread = ("poses" if clip.known.metric else None), 0.0
+    depth, trust = (in_frames(tuple(part), how) for part in (joined.depth, joined.confidence))
+    there = np.isfinite(depth) & (depth > 0) & free & ~clip.held_out[:, None, None]
+    depth, confidence = trusted(depth * np.float32(factor), trust, there)
+    return Measured(
+        world_from_camera=poses,
+        camera=replace(_camera(clip, shared), world_from_camera=np.eye(4)),
+        focal_observed=clip.known.intrinsics or shared.spread <= _FOCAL_SPREAD,
+        depth=depth,
+        confidence=confidence,
+        unit=unit,
+        unit_spread=spread,
+        others=others,
+        notes=tuple(_notes(clip, joined, shared)),
+        details={
+            "focal_by_network_px": shared.camera.fx_px,
+            "focal_spread": shared.spread,
+            "chunk_scales": joined.scales.tolist(),
+            "chunk_miss": joined.miss.tolist(),
+        },
+    )
+
+
+def _camera(clip: Clip, shared: SharedCamera) -> Camera:
+    return clip.rig[0] if clip.known.intrinsics else shared.camera
+
+
+def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
+    """One chunk through the network."""
+    own = slice(frames.start, frames.stop)
+    poses = clip.known.world_from_camera
+    views = Views(
+        show(clip.frames[own], how),
+        how.picture_camera(clip.rig[0]) if clip.known.intrinsics else None,
+        None if poses is None else poses[own],
+        clip.known.metric,
+    )
+    with torch.inference_mode():
+        seen = network.look(views)
+    depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
+    seen = replace(seen, depth=depth)
+    return seen if views.camera is None else seen_through(seen, views.camera)
+
+
+def _notes(clip: Clip, joined: Joined, shared: SharedCamera) -> list[str]:
+    notes = []
+    if shared.spread > _FOCAL_SPREAD:
+        notes.append("the frames do not agree on a focal length")
+    focal_px = clip.rig[0].fx_px
+    if clip.known.intrinsics and abs(shared.camera.fx_px / focal_px - 1) > _FOCAL_APART:
+        notes.append(f"the network sees a focal length of {shared.camera.fx_px:.0f} px, not {focal_px:.0f}")
+    if (joined.miss > _CHUNK_MISS).any():
+        notes.append(f"chunks of frames miss each other by {joined.miss.max():.0%} of the depth")
+    return notes

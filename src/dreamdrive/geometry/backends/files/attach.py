@@ -1,0 +1,154 @@
+"""A clip with the geometry of files: checks, crops, units and the frame of the first camera."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.poses import to_first
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.backends.files.declared import NAME
+from dreamdrive.geometry.backends.files.depth import read_depth
+from dreamdrive.geometry.backends.files.formats import recognise
+from dreamdrive.geometry.backends.files.given import DepthFiles, Given
+from dreamdrive.geometry.backends.files.onto_clip import OntoClip
+from dreamdrive.geometry.backends.files.wanted import Wanted
+from dreamdrive.geometry.road import depth_ratios, factor_of
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+
+_SAME_PINHOLE = 0.05
+"""How far the focal length of files may be from that of frames that were undistorted to a known pinhole."""
+
+
+def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
+    """The clip with what the files say in its rig and ``known``, and more to say in its notes.
+
+    Args:
+        clip: The clip.
+        path: A file or a folder of any format that ``formats.recognise`` knows.
+        source: The recording of the clip, for its names and its length; without it, where the clip says that
+            it came from.
+
+    Raises:
+        InputError: A file is missing or damaged, or does not fit the clip.
+    """
+    reader, place = recognise(path)
+    wanted = Wanted.of(clip, source)
+    given = reader(place, wanted)
+    onto = OntoClip.of(clip)
+    rig, camera = _rig(clip, given, onto, str(place))
+    depth, notes = _depth(given.depth, onto, len(clip), bent=not given.cameras or _is_bent(given))
+    poses = to_first(given.world_from_camera)
+    points = None if given.sparse is None else _moved(given.sparse.points, given.world_from_camera[0])
+    known = replace(
+        clip.known,
+        world_from_camera=poses,
+        intrinsics=clip.known.intrinsics or bool(given.cameras),
+        depth_m=depth,
+        metric=given.metric,
+        points=points,
+    )
+    said = [*clip.provenance.get("notes", []), *given.notes, *notes]
+    if given.cameras and not clip.known.intrinsics:
+        said.append(f"The focal length is that of {place.name}, not the one that was taken before.")
+    attached = replace(clip, rig=rig, camera=camera, known=known)
+    if not given.metric and depth is not None and given.depth.metric:
+        known, note = _scaled_by_depth(attached, given, str(place))
+        attached = replace(attached, known=known)
+        said.append(note)
+    return replace(attached, provenance={**clip.provenance, "notes": said})
+
+
+def _is_bent(given: Given) -> bool:
+    return any(each.distortion is not None for each in given.cameras)
+
+
+def _rig(
+    clip: Clip, given: Given, onto: OntoClip, where: str
+) -> tuple[tuple[Camera, ...], Int[np.ndarray, " f"]]:
+    """The pinholes of the frames: those of the files, or the clip's own where its lens was taken out."""
+    if not given.cameras:
+        return clip.rig, clip.camera
+    bent = next((each for each in given.cameras if each.distortion is not None), None)
+    if bent is None:
+        rig = tuple(onto.camera(each.camera, where) for each in given.cameras)
+        if onto.lens is not None:
+            _check_same(rig, onto.lens.camera, where)
+        return rig, given.camera
+    if onto.lens is None:
+        raise InputError(_bent_words(bent, where))
+    if len(given.cameras) > 1:
+        count = len(given.cameras)
+        raise InputError(f"{where}: {count} cameras with distortion; expected one for all frames")
+    onto.sizing((bent.camera.width_px, bent.camera.height_px), where)
+    return clip.rig, clip.camera
+
+
+def _bent_words(bent: LensCamera, where: str) -> str:
+    assert bent.distortion is not None
+    numbers = " ".join(f"{each:.4g}" for each in bent.distortion.coefficients)
+    return (
+        f"{where}: its camera has the lens distortion {bent.distortion.model} {numbers}, but the frames were "
+        "read as a pinhole's: give it as --intrinsics, too, without --hfov, or undistort the pictures first"
+    )
+
+
+def _check_same(rig: tuple[Camera, ...], pinhole: Camera, where: str) -> None:
+    for camera in rig:
+        if abs(camera.fx_px / pinhole.fx_px - 1) > _SAME_PINHOLE:
+            raise InputError(
+                f"{where}: a pinhole with a focal length of {camera.fx_px:.1f} px at the clip's size, but "
+                f"the frames were undistorted to one of {pinhole.fx_px:.1f} px; read the pictures that the "
+                "files are for, without --intrinsics"
+            )
+
+
+def _depth(
+    files: DepthFiles, onto: OntoClip, count: int, bent: bool
+) -> tuple[Float[np.ndarray, "f h w"] | None, list[str]]:
+    if not files.of:
+        return None, []
+    width, height = onto.size
+    depth = np.zeros((count, height, width), np.float32)
+    taken: set[str] = set()
+    for row, path in files.of.items():
+        picture, unit = read_depth(path, files.unit, kitti=files.kitti)
+        depth[row] = onto.depth(picture, bent, str(path))
+        taken |= set() if unit is None else {f"{path.suffix.lower()[1:]} as {unit}"}
+    notes: list[str] = []
+    if taken:
+        how = ", ".join(sorted(taken))
+        notes.append(f"The unit of the depth files is not declared ({NAME}, depth_unit): {how} is taken.")
+    if len(files.of) < count:
+        notes.append(f"{len(files.of)} of {count} frames have a depth file; the others have no depth.")
+    return depth, notes
+
+
+def _moved(points: Float[np.ndarray, "p 3"], first: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "p 3"]:
+    """Points of the file's world in the frame of its first selected camera."""
+    return (points - first[:3, 3]) @ first[:3, :3]
+
+
+def _scaled_by_depth(clip: Clip, given: Given, where: str) -> tuple[Known, str]:
+    """Poses and points in metres, where the depth is and the poses are not: sparse points tell the factor."""
+    poses, points = clip.known.world_from_camera, clip.known.points
+    ratios = np.zeros(0)
+    if given.sparse is not None and points is not None and poses is not None and len(clip.rig) == 1:
+        ratios = depth_ratios(clip, clip.rig[0], poses, points, given.sparse.seen)
+    if poses is None or points is None or not len(ratios):
+        raise InputError(
+            f"{where}: its poses are in an unknown unit, but the depth is in metres, and no sparse points "
+            f'tell the one from the other; write {{"metric": true}} into {NAME} if the poses are in metres, '
+            'or {"depth_unit": "poses"} if the depth has their unit'
+        )
+    factor, spread = factor_of(ratios)
+    scaled = poses.copy()
+    scaled[:, :3, 3] *= factor
+    known = replace(clip.known, world_from_camera=scaled, points=points * factor, metric=True)
+    return known, (
+        f"The depth files give the scale of the poses: {factor:.4g} m a unit, from {len(ratios)} views of "
+        f"sparse points, spread {100 * spread:.0f} %."
+    )

@@ -1,0 +1,98 @@
+"""The one door: which format a path holds, by its content."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from dreamdrive.data.camera_models import find_colmap, model_cameras
+from dreamdrive.errors import InputError
+from dreamdrive.files.paths import open_file
+from dreamdrive.geometry.backends.files import nerfstudio
+from dreamdrive.geometry.backends.files.colmap import read_colmap_model
+from dreamdrive.geometry.backends.files.declared import NAME
+from dreamdrive.geometry.backends.files.given import Given
+from dreamdrive.geometry.backends.files.json_record import OPTION, read_record
+from dreamdrive.geometry.backends.files.pandaset import read_pandaset
+from dreamdrive.geometry.backends.files.plain import read_plain
+from dreamdrive.geometry.backends.files.pose_lists import CALIBRATION, read_pose_list
+from dreamdrive.geometry.backends.files.wanted import Wanted
+
+EXPECTED = (
+    "cameras.json (ours or PandaSet's), transforms.json (nerfstudio), a COLMAP model (cameras, images and "
+    "points3D as .bin or .txt) or poses.txt (KITTI or TUM)"
+)
+_FILES = ("cameras.json", "transforms.json", "poses.txt")
+
+Reader = Callable[[Path, Wanted], Given]
+
+
+def recognise(path: Path) -> tuple[Reader, Path]:
+    """The reader of the format that lies at ``path``, and what it reads: a file, or a folder for COLMAP.
+
+    Args:
+        path: A file, or a folder with one of the known files in it.
+
+    Raises:
+        InputError: Nothing or more than one thing there is known.
+    """
+    if path.is_dir():
+        found = [path / name for name in _FILES if (path / name).is_file()]
+        model = find_colmap(path)
+        if len(found) > 1 or (found and model == path):
+            names = [each.name for each in found] + (["a COLMAP model"] if model == path else [])
+            raise InputError(f"{OPTION} {path} holds {' and '.join(names)}; name the file that is meant")
+        if found:
+            return recognise(found[0])
+        if model is not None:
+            return read_colmap_model, path
+        raise InputError(f"{OPTION} {path} cannot be read: expected in it {EXPECTED}")
+    if not path.is_file():
+        raise InputError(f"{OPTION} {path} does not exist; expected {EXPECTED}")
+    if path.suffix.lower() == ".bin" or path.name in ("cameras.txt", "images.txt", "points3D.txt"):
+        raise InputError(f"{OPTION} {path} is part of a COLMAP model; give its folder, {path.parent}")
+    return (_of_json(path) if _is_json(path) else read_pose_list), path
+
+
+def _is_json(path: Path) -> bool:
+    with open_file(path, f"{OPTION} {path}") as file:
+        return path.suffix.lower() == ".json" or file.read(64).lstrip()[:1] in (b"{", b"[")
+
+
+def _of_json(path: Path) -> Reader:
+    record = read_record(path)
+    if isinstance(record.get("cameras"), dict):
+        return read_pandaset
+    if "world_from_camera" in record:
+        return read_pose_list if "times_s" in record and "intrinsics" not in record else read_plain
+    return nerfstudio.read_transforms if "frames" in record else read_plain
+
+
+def bent_model(path: Path) -> Path | None:
+    """What to give as ``--intrinsics`` so that the frames are read without the distortion of these files.
+
+    ``None`` where the cameras of ``path`` are pinholes, or where it has none.
+
+    Raises:
+        InputError: The cameras cannot be read.
+    """
+    if not path.exists():
+        return None
+    reader, place = recognise(path)
+    if reader not in (read_colmap_model, nerfstudio.read_transforms):
+        return None
+    cameras = model_cameras(place, OPTION) or []
+    return place if any(each.distortion is not None for each in cameras) else None
+
+
+def companions(path: Path) -> list[Path]:
+    """What else decides over the geometry: files beside a file, and depth that a ``transforms.json`` names.
+
+    Raises:
+        InputError: ``path`` holds nothing that is known.
+    """
+    reader, place = recognise(path)
+    named: list[Path] = []
+    if reader is nerfstudio.read_transforms:
+        named = nerfstudio.depth_files(place)
+    if path.is_file():
+        named += [path.parent / NAME, path.parent / CALIBRATION, path.parent / "depth"]
+    return sorted({each for each in named if each.exists()})

@@ -1,0 +1,134 @@
+"""Structure from motion of a clip with its gate: a believable model, or why there is none."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from dreamdrive.geometry.cameras import gate, sfm
+from dreamdrive.geometry.cameras.focal import Settled, settle
+from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.depth import Tell, unheard
+from dreamdrive.geometry.evidence import Features, features
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Fallback
+
+MIN_FRAMES = 3
+MIN_FEATURES = 60
+STEPS = 3
+"""Steps that are told of."""
+STARTS = 6
+"""Random starting positions of global mapping that are tried."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What structure from motion gave.
+
+    Attributes:
+        settled: The accepted model, or None.
+        reasons: Why there is none, in words.
+        notes: What else was noticed, a sentence each.
+        figures: Figures of the gate and the focal test, as JSON values.
+        refusal: The kind of those reasons; None with a model.
+    """
+
+    settled: Settled | None
+    reasons: tuple[str, ...]
+    notes: tuple[str, ...]
+    figures: dict[str, Any]
+    refusal: Fallback | None = None
+
+
+def reconstruct(
+    grey: UInt8[np.ndarray, "f h w"],
+    usable: Bool[np.ndarray, "f h w"],
+    camera: Camera,
+    moving: Bool[np.ndarray, " s"],
+    calibrated: bool,
+    seed: int,
+    tell: Tell = unheard,
+) -> Outcome:
+    """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
+
+    Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
+    before incremental mapping.
+
+    Args:
+        grey: Frames at the working size.
+        usable: Pixels in which features may lie.
+        camera: Pinhole of the working size.
+        moving: Steps in which the picture moves.
+        calibrated: Whether the focal length is known.
+        seed: Seed of everything random.
+        tell: Called after features, after matches, and with the model.
+    """
+    if len(grey) < MIN_FRAMES:
+        return _refused(f"{len(grey)} frames are too few for structure from motion", "few")
+    found = features.extract(grey, usable)
+    tell()
+    typical = int(np.median([len(entry.keypoints_px) for entry in found]))
+    if typical < MIN_FEATURES:
+        return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
+    square, found = _square_pixels(camera, found)
+    notes: list[str] = []
+    reasons: tuple[str, ...] = ()
+    figures: dict[str, Any] = {"features": typical}
+    with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
+        database = Path(folder) / "matches.db"
+        sfm.match(database, found, square, seed)
+        tell()
+        for name, again, start in _attempts(seed):
+            mapper = sfm.map_globally if name == "global" else sfm.map_incrementally
+            model = mapper(database, len(grey), start)
+            if model is None or model.registered.mean() < 0.5:
+                failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
+            else:
+                settled = settle(database, model, square, calibrated, seed)
+                verdict = gate.judge(settled.model, moving)
+                failed = verdict.reasons
+                figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
+                if not failed:
+                    tell()
+                    notes += [settled.note] if settled.note else []
+                    notes += ["the camera drives backwards"] if verdict.backwards else []
+                    notes += [_wobbling(settled.model)] if verdict.wobbling else []
+                    notes += [f"{reasons[0]}: mapped again, {again}"] if reasons else []
+                    return Outcome(settled, (), tuple(notes), figures)
+            reasons = reasons or failed
+    return Outcome(None, reasons, (), figures, "refused")
+
+
+def _attempts(seed: int) -> list[tuple[str, str, int]]:
+    """Mapper, how it differs from the first, in words, and its seed."""
+    others = [("global", "from another start", (seed + k) % 2**31) for k in range(STARTS)]
+    return [*others, ("incremental", "frame by frame", seed)]
+
+
+def _refused(reason: str, refusal: Fallback) -> Outcome:
+    return Outcome(None, (reason,), (), {}, refusal)
+
+
+def _wobbling(model: Model) -> str:
+    return (
+        f"points miss their pixels by {model.reprojection_px:.2f} px on average: the frames are not quite "
+        "pictures of one street, and poses and depth are as exact as they are"
+    )
+
+
+def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[Features]]:
+    """Stretch y so that both focal lengths agree: COLMAP's radial model has only one."""
+    stretch = camera.fx_px / camera.fy_px
+    square = Camera(
+        camera.fx_px,
+        camera.fx_px,
+        camera.cx_px,
+        camera.cy_px * stretch,
+        camera.width_px,
+        max(1, round(camera.height_px * stretch)),
+    )
+    factor = np.array([1.0, stretch], np.float32)
+    return square, [Features(entry.keypoints_px * factor, entry.descriptors) for entry in found]

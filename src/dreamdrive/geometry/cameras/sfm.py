@@ -1,0 +1,295 @@
+"""Structure from motion of one camera with pycolmap, one thread, seeded."""
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pycolmap
+from jaxtyping import Bool, Float
+
+from dreamdrive.geometry.evidence import Features
+from dreamdrive.scene.camera import Camera
+
+OVERLAP = 5
+MATCH_ERROR_PX_AT_640 = 1.5
+FILTER_ERROR_PX = 2.0
+FILTER_ANGLE_DEG = 0.5
+ROBUST_SCALE_PX = 1.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """A sparse reconstruction of a clip, in arbitrary units.
+
+    Attributes:
+        world_from_camera: Poses (F, 4, 4); NaN where a frame was not registered.
+        points: Points (P, 3) in the world.
+        seen: Which frame sees which point (F, P).
+        lens: Focal lengths, principal point in pixels at the working size, and the radial term k.
+        cost: Mean robust (Cauchy, 1 px) cost of an observation.
+        reprojection_px: Mean reprojection error.
+        native: pycolmap's own reconstruction.
+    """
+
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    points: Float[np.ndarray, "p 3"]
+    seen: Bool[np.ndarray, "f p"]
+    lens: Float[np.ndarray, "5"]
+    cost: float
+    reprojection_px: float
+    native: Any
+
+    @property
+    def registered(self) -> Bool[np.ndarray, " f"]:
+        """Frames with a pose (F,)."""
+        return np.isfinite(self.world_from_camera[:, 0, 0])
+
+
+def match(database: Path, features: Sequence[Features], camera: Camera, seed: int) -> None:
+    """Write features, pair matches and two-view geometries into a new COLMAP database.
+
+    Args:
+        database: File to create.
+        features: One entry a frame, in order of time.
+        camera: Pinhole of the working size that the pairs are verified with.
+        seed: Seed of RANSAC.
+    """
+    with pycolmap.Database.open(str(database)) as store:
+        native = _native_camera(camera, camera_id=1)
+        store.write_camera(native, use_camera_id=True)
+        rig = pycolmap.Rig(rig_id=1)
+        rig.add_ref_sensor(native.sensor_id)
+        store.write_rig(rig, use_rig_id=True)
+        for index, found in enumerate(features):
+            image = pycolmap.Image(name=f"{index:05d}", camera_id=1, image_id=index + 1)
+            store.write_image(image, use_image_id=True)
+            frame = pycolmap.Frame(frame_id=index + 1, rig_id=1)
+            frame.add_data_id(image.data_id)
+            store.write_frame(frame, use_frame_id=True)
+            store.write_keypoints(index + 1, found.keypoints_px)
+            store.write_descriptors(
+                index + 1, pycolmap.FeatureDescriptors(pycolmap.FeatureExtractorType.SIFT, found.descriptors)
+            )
+    _verify_pairs(database, camera, seed)
+
+
+def rematch(database: Path, camera: Camera, seed: int) -> None:
+    """Verify the stored pair matches again with another camera."""
+    with pycolmap.Database.open(str(database)) as store:
+        store.update_camera(_native_camera(camera, camera_id=1))
+        store.clear_two_view_geometries()
+    _verify_pairs(database, camera, seed)
+
+
+def map_globally(database: Path, count: int, seed: int) -> Model | None:
+    """Global mapping (GLOMAP, Pan et al. 2024) at a fixed focal length, then robust bundle adjustment.
+
+    Args:
+        database: What ``match`` wrote.
+        count: Number of frames.
+        seed: Seed of the random starting positions.
+
+    Returns:
+        The largest model, or None when no model comes out.
+    """
+    options = pycolmap.GlobalPipelineOptions()
+    options.num_threads = 1
+    options.random_seed = seed
+    mapper = options.mapper
+    mapper.num_threads = 1
+    mapper.random_seed = seed
+    mapper.bundle_adjustment.refine_focal_length = False
+    mapper.bundle_adjustment.refine_extra_params = False
+    mapper.bundle_adjustment.ceres.solver_options.num_threads = 1
+    mapper.global_positioning.use_gpu = False
+    output = database.parent / "models"
+    output.mkdir(exist_ok=True)
+    with _quiet():
+        models = pycolmap.global_mapping(database, database.parent, output, options=options)
+    return _largest(models, count)
+
+
+def map_incrementally(database: Path, count: int, seed: int) -> Model | None:
+    """Incremental mapping with the thresholds of a forward drive; the second choice."""
+    options = pycolmap.IncrementalPipelineOptions()
+    options.num_threads = 1
+    options.random_seed = seed
+    options.multiple_models = False
+    options.ba_refine_focal_length = False
+    options.ba_refine_extra_params = False
+    options.extract_colors = False
+    mapper = options.mapper
+    mapper.init_max_forward_motion = 1.0
+    mapper.init_min_tri_angle = 2.0
+    mapper.filter_min_tri_angle = 1.0
+    mapper.abs_pose_max_error = 4.0
+    mapper.filter_max_reproj_error = 2.0
+    mapper.abs_pose_refine_focal_length = False
+    mapper.abs_pose_refine_extra_params = False
+    output = database.parent / "models"
+    output.mkdir(exist_ok=True)
+    with _quiet():
+        models = pycolmap.incremental_mapping(database, database.parent, output, options=options)
+    return _largest(models, count)
+
+
+def adjust(
+    model: Model,
+    focal_px: float | None = None,
+    free_focal: bool = False,
+    free_radial: bool = False,
+    drop_outliers: bool = True,
+) -> Model:
+    """Robust bundle adjustment of a copy of the model.
+
+    Args:
+        model: Where to start from.
+        focal_px: Focal length to start from, one for both axes; None keeps the model's.
+        free_focal: Whether the focal length is adjusted.
+        free_radial: Whether a radial term k (x (1 + k r^2)) is adjusted.
+        drop_outliers: Adjust twice and drop poor observations after each; otherwise once, briefly, and keep
+            all, so that costs can be compared.
+    """
+    native = pycolmap.Reconstruction(model.native)
+    lens = model.lens.copy()
+    if focal_px is not None:
+        lens[:2] = focal_px
+    camera = native.cameras[1]
+    if free_focal or free_radial or lens[4] != 0:
+        replacement = pycolmap.Camera(
+            model="SIMPLE_RADIAL",
+            width=camera.width,
+            height=camera.height,
+            params=[float(lens[:2].mean()), lens[2], lens[3], lens[4]],
+        )
+        camera.model, camera.params = replacement.model, replacement.params.tolist()
+    else:
+        camera.params = lens[:4].tolist()
+    _adjust_in_place(native, free_focal, free_radial, drop_outliers)
+    return _read(native, len(model.world_from_camera))
+
+
+def _native_camera(camera: Camera, camera_id: int) -> Any:
+    native = pycolmap.Camera(
+        model="PINHOLE",
+        width=camera.width_px,
+        height=camera.height_px,
+        params=[camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px],
+        camera_id=camera_id,
+    )
+    native.has_prior_focal_length = True
+    return native
+
+
+def _verify_pairs(database: Path, camera: Camera, seed: int) -> None:
+    matching = pycolmap.FeatureMatchingOptions()
+    matching.num_threads = 1
+    matching.use_gpu = False
+    pairing = pycolmap.SequentialPairingOptions()
+    pairing.overlap = OVERLAP
+    pairing.quadratic_overlap = True
+    pairing.num_threads = 1
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.detect_watermark = False
+    verification.ransac.max_error = MATCH_ERROR_PX_AT_640 * camera.width_px / 640
+    verification.ransac.random_seed = seed
+    with _quiet():
+        pycolmap.match_sequential(
+            database,
+            matching_options=matching,
+            pairing_options=pairing,
+            verification_options=verification,
+            device=pycolmap.Device.cpu,
+        )
+
+
+def _largest(models: dict[int, Any], count: int) -> Model | None:
+    found = [model for model in models.values() if model.num_points3D() > 0]
+    if not found:
+        return None
+    native = max(found, key=lambda model: (model.num_reg_images(), model.num_points3D()))
+    _adjust_in_place(native, free_focal=False, free_radial=False, drop_outliers=True)
+    return _read(native, count)
+
+
+def _adjust_in_place(native: Any, free_focal: bool, free_radial: bool, drop_outliers: bool) -> None:
+    options = pycolmap.BundleAdjustmentOptions()
+    options.refine_focal_length = free_focal
+    options.refine_extra_params = free_radial
+    options.print_summary = False
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = ROBUST_SCALE_PX
+    options.ceres.solver_options.num_threads = 1
+    options.ceres.solver_options.max_num_iterations = 100 if drop_outliers else 25
+    options.ceres.solver_options.function_tolerance = 1e-7
+    with _quiet():
+        for _ in range(2 if drop_outliers else 1):
+            config = pycolmap.BundleAdjustmentConfig()
+            for image in native.reg_image_ids():
+                config.add_image(image)
+            config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+            pycolmap.create_default_bundle_adjuster(options, config, native).solve()
+            if drop_outliers:
+                pycolmap.ObservationManager(native).filter_all_points3D(FILTER_ERROR_PX, FILTER_ANGLE_DEG)
+        native.update_point_3d_errors()
+
+
+@contextmanager
+def _quiet() -> Generator[None, None, None]:
+    """Keep COLMAP's own log off the terminal; what matters is returned."""
+    level = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = 3
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = level
+
+
+def _read(native: Any, count: int) -> Model:
+    poses = np.full((count, 4, 4), np.nan)
+    pixels: dict[int, np.ndarray] = {}
+    for image in native.images.values():
+        if image.has_pose:
+            pose = np.eye(4)
+            pose[:3] = image.cam_from_world().inverse().matrix()
+            poses[int(image.name)] = pose
+            pixels[image.image_id] = np.array([point.xy for point in image.points2D])
+    identifiers = sorted(native.points3D.keys())
+    points = np.array([native.points3D[identifier].xyz for identifier in identifiers]).reshape(-1, 3)
+    frame, column, pixel = [], [], []
+    for index, identifier in enumerate(identifiers):
+        for element in native.points3D[identifier].track.elements:
+            frame.append(element.image_id - 1)
+            column.append(index)
+            pixel.append(pixels[element.image_id][element.point2D_idx])
+    seen = np.zeros((count, len(identifiers)), bool)
+    seen[frame, column] = True
+    lens = _lens(native.cameras[1])
+    error = _errors_px(poses[frame], points[column], np.array(pixel).reshape(-1, 2), lens)
+    cost = ROBUST_SCALE_PX**2 * np.log1p((error / ROBUST_SCALE_PX) ** 2)
+    mean = (float(cost.mean()), float(error.mean())) if len(error) else (0.0, 0.0)
+    return Model(poses, points, seen, lens, *mean, native)
+
+
+def _lens(camera: Any) -> np.ndarray:
+    radial = camera.params[3] if camera.model == pycolmap.CameraModelId.SIMPLE_RADIAL else 0.0
+    return np.array(
+        [
+            camera.focal_length_x,
+            camera.focal_length_y,
+            camera.principal_point_x,
+            camera.principal_point_y,
+            radial,
+        ]
+    )
+
+
+def _errors_px(poses: np.ndarray, points: np.ndarray, pixels: np.ndarray, lens: np.ndarray) -> np.ndarray:
+    """Reprojection errors (N,) of points (N, 3) seen from world_from_camera poses (N, 4, 4)."""
+    local = np.einsum("nji,nj->ni", poses[:, :3, :3], points - poses[:, :3, 3])
+    plane = local[:, :2] / local[:, 2:]
+    plane = plane * (1 + lens[4] * (plane**2).sum(1, keepdims=True))
+    return np.linalg.norm(plane * lens[:2] + lens[2:4] - pixels, axis=1)

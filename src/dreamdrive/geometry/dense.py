@@ -1,0 +1,191 @@
+"""The dense half of the classical reconstruction: depth, confidence, sky and motion of posed frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.geometry.cameras import Posed
+from dreamdrive.geometry.depth import (
+    Tell,
+    View,
+    above_horizon,
+    agreement,
+    combine,
+    fill_flanks,
+    make_view,
+    single_threaded_opencv,
+    sky_mask,
+    sweep_frames,
+    temporal_neighbours,
+    unheard,
+)
+from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.road import upright_depth
+from dreamdrive.progress import Keep, at_once
+from dreamdrive.scene.clip import Clip
+
+MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
+PASSES = 8
+"""How often the frames are gone through one by one: the sweep, and seven times for what moves."""
+_FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
+_BACKDROP_M = 40.0
+_PLANE_CONFIDENCE = 0.3
+_BACKDROP_CONFIDENCE = 0.1
+
+
+@dataclass(frozen=True)
+class Dense:
+    """Per-pixel results, as in ``Geometry``: depth_m, confidence, moving (F, H, W) and sky (F, H, W)."""
+
+    depth_m: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+    sky: Bool[np.ndarray, "f h w"]
+    moving: Float[np.ndarray, "f h w"]
+
+
+@dataclass(frozen=True)
+class StaticDepth:
+    """Depth that was measured as if nothing moved, as the plane sweep measures it.
+
+    Attributes:
+        depth_m: Depth along z (F, H, W); 0 where there is none.
+        confidence: Trust in it (F, H, W) in [0, 1].
+    """
+
+    depth_m: Float[np.ndarray, "f h w"]
+    confidence: Float[np.ndarray, "f h w"]
+
+
+def densify(
+    clip: Clip,
+    posed: Posed,
+    measured: StaticDepth | None = None,
+    tell: Tell = unheard,
+    keep: Keep = at_once,
+) -> Dense:
+    """Depth, confidence, sky and moving evidence of every frame that is not held out.
+
+    Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
+    as given in ``clip.known.depth_m``, else from the plane sweep, else (standing camera, or poses from the
+    fallback) from the road plane and a backdrop at 40 m, little trusted. What moves is found against the
+    parallax of a moving camera or against the temporal median of a standing one; from fallback poses no such
+    evidence is drawn.
+
+    Args:
+        clip: The frames.
+        posed: Their cameras.
+        measured: Depth to take in place of the plane sweep's, such as a network's.
+        tell: Called for each frame of each pass, of which there are ``PASSES`` at most.
+        keep: Keeps the depth that was swept.
+    """
+    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
+    given = clip.known.depth_m is not None
+    rough = posed.standing or posed.fallback is not None
+    with single_threaded_opencv():
+        sky = _sky(clip, view)
+        if clip.known.depth_m is not None:
+            inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
+            confidence = (inverse > 0).astype(np.float32)
+        elif measured is not None:
+            inverse = _inverse(np.where(view.used[:, None, None], measured.depth_m, 0))
+            confidence = np.where(inverse > 0, measured.confidence, 0).astype(np.float32)
+        elif rough:
+            inverse, confidence = _plane_and_backdrop(view)
+        else:
+            inverse, confidence = keep("swept", lambda: _swept(view, sky))
+        moving = _moving(view, inverse, confidence, sky, given, posed) * ~sky
+        if not given:
+            inverse, confidence = _stand_movers(inverse, confidence, moving, view)
+    return _finish(view, inverse, confidence, sky, moving)
+
+
+def _moving(
+    view: View,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    given: bool,
+    posed: Posed,
+) -> Float[np.ndarray, "f h w"]:
+    if posed.standing:
+        return standing_evidence(view)
+    if posed.fallback is not None:
+        return np.zeros(inverse.shape, np.float32)
+    return moving_evidence(view, inverse, confidence, sky, given)
+
+
+def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
+    confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
+    return inverse, confidence.astype(np.float32)
+
+
+def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:
+    sky = np.zeros(view.usable.shape, bool)
+    for frame in view.frames:
+        if clip.known.sky is not None:
+            sky[frame] = clip.known.sky[frame] & view.usable[frame]
+        else:
+            above = above_horizon(view.cameras[frame], view.ground)
+            sky[frame] = sky_mask(view.rgb[frame], above, view.usable[frame])
+    return sky
+
+
+def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
+    return np.where(depth_m > 0, 1 / np.maximum(depth_m, 1e-3), 0).astype(np.float32)
+
+
+def _swept(
+    view: View, sky: Bool[np.ndarray, "f h w"]
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    found = sweep_frames(view, sky)
+    inverse = np.zeros(view.grey.shape, np.float32)
+    confidence = np.zeros(view.grey.shape, np.float32)
+    for frame, swept in found.items():
+        inverse[frame] = swept.inverse_depth if swept is not None else view.plane_inverse[frame]
+    filled = inverse.copy()
+    for frame, swept in found.items():
+        if swept is None:
+            continue
+        neighbours = temporal_neighbours(view.used, frame)
+        agreeing = agreement(frame, neighbours, view.cameras, inverse, view.usable)
+        confidence[frame] = combine(agreeing, swept.correlation, swept.on_plane)
+        filled[frame], confidence[frame] = fill_flanks(
+            swept, confidence[frame], view.plane_inverse[frame], view.usable[frame] & ~sky[frame]
+        )
+    return filled, confidence
+
+
+def _stand_movers(
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    moving: Float[np.ndarray, "f h w"],
+    view: View,
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    """Moving pixels get the depth at which their column of the object meets the road."""
+    inverse, confidence = inverse.copy(), confidence.copy()
+    for frame in view.frames:
+        flagged = moving[frame] >= FLAGGED
+        upright = upright_depth(flagged, view.plane_inverse[frame])
+        standing = flagged & (upright > 0)
+        inverse[frame][standing] = upright[standing]
+        confidence[frame][flagged] = np.where(standing, MOVING_CONFIDENCE, 0)[flagged]
+    return inverse, confidence
+
+
+def _finish(
+    view: View,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    moving: Float[np.ndarray, "f h w"],
+) -> Dense:
+    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
+    depth = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
+    return Dense(
+        depth_m=depth,
+        confidence=np.where(shown, confidence, 0).astype(np.float32),
+        sky=sky & view.usable,
+        moving=np.where(view.usable, moving, 0).astype(np.float32),
+    )

@@ -1,0 +1,71 @@
+"""Flanks of things that stand on the road: smooth paint that the sweep mistakes for the road behind it."""
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.geometry.depth.confidence import GROUND_PRIOR_CONFIDENCE
+from dreamdrive.geometry.depth.one_frame import Swept
+
+_SUPPORTED = 0.4  # confidence from which an object's pixel speaks for the pixels below it
+_ROAD_CORRELATION = 0.6  # from which the road is seen, not assumed
+_MIN_PLANE_INVERSE = 0.004  # 1/m
+_NEARER = 1.15  # an object's inverse depth over the plane's
+_STILL_NEARER = 1.1
+_LOW = 0.3  # share of the camera's height under which a pixel shows that its object stands on the road
+_LOW_SHARE = 0.02
+_LOW_PX = 4
+_CLOSE_PX = 5
+
+
+def fill_flanks(
+    swept: Swept,
+    confidence: Float[np.ndarray, "h w"],
+    plane_inverse: Float[np.ndarray, "h w"],
+    street: Bool[np.ndarray, "h w"],
+) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
+    """Inverse depth (1/m) and confidence (H, W) with flanks filled downwards, upright, to the road.
+
+    A confirmed point hides the road behind it: below it, down to where its depth meets the plane, its column
+    shows the same thing or one nearer, unless the road itself is confirmed there. Only regions are filled of
+    which some confirmed pixels are low above the road; what hangs (branches, signs) is left alone.
+
+    Args:
+        swept: What the sweep found.
+        confidence: Its confidence.
+        plane_inverse: Inverse depth of the road plane in 1/m.
+        street: False in the sky and where no street is seen.
+    """
+    inverse = swept.inverse_depth
+    below = (plane_inverse > _MIN_PLANE_INVERSE) & street
+    solid = below & ~swept.on_plane & (confidence >= _SUPPORTED) & (inverse > _NEARER * plane_inverse)
+    road = swept.on_plane & (swept.correlation > _ROAD_CORRELATION)
+    above, above_road = _last_above(solid), _last_above(road)
+    carried = np.take_along_axis(inverse, np.maximum(above, 0), axis=0)
+    hidden = below & ~solid & (above > above_road) & (carried > _STILL_NEARER * plane_inverse)
+    hidden &= confidence <= GROUND_PRIOR_CONFIDENCE
+    fill = hidden & _stands(solid, hidden, 1 - plane_inverse / np.maximum(inverse, 1e-6))
+    return (
+        np.where(fill, carried, inverse).astype(np.float32),
+        np.where(fill, GROUND_PRIOR_CONFIDENCE, confidence).astype(np.float32),
+    )
+
+
+def _last_above(mask: Bool[np.ndarray, "h w"]) -> np.ndarray:
+    """Row of the nearest true pixel at or above each pixel (H, W), -1 where there is none."""
+    rows = np.arange(len(mask))[:, None]
+    return np.maximum.accumulate(np.where(mask, rows, -1), axis=0)
+
+
+def _stands(
+    solid: Bool[np.ndarray, "h w"], hidden: Bool[np.ndarray, "h w"], height: Float[np.ndarray, "h w"]
+) -> Bool[np.ndarray, "h w"]:
+    """Pixels of connected regions that reach down to the road; heights are in camera heights."""
+    kernel = np.ones((_CLOSE_PX, _CLOSE_PX), np.uint8)
+    closed = np.asarray(cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, kernel)) > 0
+    count, found = cv2.connectedComponents((closed | hidden).astype(np.uint8))
+    labels = np.asarray(found, np.intp)
+    low = np.bincount(labels[solid & (height < _LOW)], minlength=count)
+    stands = low >= np.maximum(_LOW_PX, _LOW_SHARE * np.bincount(labels[solid], minlength=count))
+    stands[0] = False
+    return stands[labels]

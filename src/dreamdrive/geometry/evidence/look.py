@@ -1,0 +1,88 @@
+"""A first look at a clip: its motion, its regions fixed to the camera, its light."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from dreamdrive.geometry.evidence import features, masks, motion
+from dreamdrive.geometry.evidence.masks import Fixed
+from dreamdrive.geometry.evidence.motion import Motion
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the pictures show before any geometry.
+
+    Attributes:
+        grey: Frames at 320 px width.
+        street: Pixels that belong to the street, at that size.
+        small: Pinhole of that size.
+        working: Pinhole of the size at which features are sought.
+        motion: Whether the camera moves.
+        fixed: Regions fixed to the camera, at the clip's size.
+        detected: Sentences for the report.
+    """
+
+    grey: UInt8[np.ndarray, "f h w"]
+    street: Bool[np.ndarray, "f h w"]
+    small: Camera
+    working: Camera
+    motion: Motion
+    fixed: Fixed
+    detected: tuple[str, ...]
+
+
+def look(clip: Clip) -> Evidence:
+    """Measure motion and find fixed regions at 320 px width."""
+    camera, (width, height) = clip.rig[0], clip.size
+    size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
+    working = features.working_size(width, height)
+    grey = features.to_grey(clip.frames, size)
+    valid = _resize(clip.valid, size)
+    moves = motion.measure(grey, valid, clip.times_s)
+    in_motion = np.zeros(len(clip), bool)
+    in_motion[:-1] |= moves.moving
+    in_motion[1:] |= moves.moving
+    if moves.standing:
+        in_motion[:] = False
+    fixed = masks.find_fixed(grey, np.logical_and.reduce(valid), in_motion, clip.size)
+    street = valid & ~_resize(((fixed.regions > 0) | fixed.objects)[None], size)
+    detected = masks.describe(fixed)
+    if moves.brightness < motion.DARK_LEVEL:
+        detected.append(
+            f"the clip is dark: nine tenths of the pixels lie below grey level {moves.brightness:.0f} of 255"
+        )
+    if moves.tracks < motion.FEW_TRACKS:
+        detected.append(f"little texture to follow: {moves.tracks:.0f} corners in a typical frame")
+    return Evidence(
+        grey,
+        street,
+        camera.resized(size[0], size[1]),
+        camera.resized(working[0], working[1]),
+        moves,
+        fixed,
+        tuple(detected),
+    )
+
+
+def working_frames(
+    clip: Clip, evidence: Evidence
+) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
+    """Grey frames at the working size and the pixels in which features may lie."""
+    size = (evidence.working.width_px, evidence.working.height_px)
+    return features.to_grey(clip.frames, size), _resize(free_pixels(clip, evidence), size)
+
+
+def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
+    """Pixels (F, H, W) that show the street: something that keeps its place in the image is none."""
+    return clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
+
+
+def _resize(mask: Bool[np.ndarray, "f _ _"], size: tuple[int, int]) -> Bool[np.ndarray, "f h w"]:
+    return np.stack(
+        [cv2.resize(one.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for one in mask]
+    )

@@ -1,0 +1,5 @@
+"""Evidence of motion in posed frames, outlines of moving things, oncoming traffic."""
+
+from dreamdrive.geometry.moving.evidence import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.moving.flow import pixel_grid
+from dreamdrive.geometry.moving.traffic import compared_with_traffic

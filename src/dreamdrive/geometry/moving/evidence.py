@@ -1,0 +1,201 @@
+"""Evidence that pixels belong to something that moves."""
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from dreamdrive.geometry.depth import View, by_frame, sample
+from dreamdrive.geometry.moving import contest
+from dreamdrive.geometry.moving.floating import Floating, floating
+from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.moving.oncoming import oncoming
+from dreamdrive.geometry.moving.outline import outline
+
+FLAGGED = 0.5  # evidence from which a pixel counts as moving
+_EXCESS_PX = 1.0
+_GAIN = 2.5  # grey levels
+_SURE_EXCESS_PX = 3.0
+_SURE_GAIN = 5.0
+_VOTE = 0.45
+_VOTING_REACH = 2
+_CLOSE_SHARE = 9 / 480  # of the image width
+_OPEN_SHARE = 5 / 480
+_MIN_AREA = 0.0006  # of the image
+_MIN_SURE_SHARE = 0.05  # of a component
+_MIN_SURE_PX = 12
+_ROUNDS = 2  # of outlines, carried to the neighbours in between
+_STANDING_LEVELS = 10.0  # grey levels from the temporal median
+
+
+def moving_evidence(
+    view: View,
+    inverse_depth: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+    known_depth: bool,
+) -> Float[np.ndarray, "f h w"]:
+    """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
+
+    Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
+    enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
+    static ones; they are found where they visibly do not stand on the road, by the motion of whole stretches
+    (``oncoming``) and by the surest pixels of depth that was found (``floating``).
+
+    Args:
+        view: The posed frames.
+        inverse_depth: Static depth in 1/m.
+        confidence: Trust in it.
+        sky: Sky masks; nothing grows into them.
+        known_depth: Whether that depth was given rather than found.
+    """
+    flows = neighbour_flows(view)
+
+    def judged(frame: int) -> contest.Verdict:
+        return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
+
+    verdicts = by_frame(view, judged)
+    likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
+
+    def decided(frame: int) -> np.ndarray:
+        return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
+
+    found = by_frame(view, decided)
+    coming: dict[int, np.ndarray] = {}
+    if not known_depth:
+        floats = _floating(view, flows, inverse_depth, confidence, sky)
+        coming = {frame: (mask & ~sky[frame]) | floats[frame] for frame, mask in oncoming(view).items()}
+    found |= {frame: np.where(mask, 1, found[frame]) for frame, mask in coming.items()}
+    flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
+    for around in range(_ROUNDS):
+        if around > 0:
+            flagged = {frame: _carried(flagged, frame, flows[frame]) for frame in view.frames}
+
+        def whole(frame: int, parts: Mapping[int, np.ndarray] = flagged) -> np.ndarray:
+            return outline(view, frame, flows[frame], inverse_depth[frame], parts[frame], sky[frame])
+
+        flagged = by_frame(view, whole)
+    # The flow of what is taken for standing is poor: an outline may lose it.
+    flagged |= {frame: flagged[frame] | mask for frame, mask in coming.items()}
+    evidence = np.zeros(inverse_depth.shape, np.float32)
+    for frame in view.frames:
+        inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
+        evidence[frame] = np.where(flagged[frame], inside, outside)
+    return evidence
+
+
+def _floating(
+    view: View,
+    flows: Mapping[int, list[PairFlow]],
+    inverse_depth: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+) -> dict[int, Bool[np.ndarray, "h w"]]:
+    """What seems to float, after the vote of the neighbours."""
+
+    def seen(frame: int) -> Floating:
+        return floating(view, frame, flows[frame], inverse_depth[frame], confidence[frame], sky[frame])
+
+    things = by_frame(view, seen)
+    likely = {frame: thing.likely.astype(np.float32) for frame, thing in things.items()}
+    return {
+        frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame]) >= FLAGGED
+        for frame in view.frames
+    }
+
+
+def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
+    """Evidence (F, H, W) in [0, 1] for a standing camera: pixels that differ from their temporal median."""
+    evidence = np.zeros(view.grey.shape, np.float32)
+    rgb = view.rgb[view.used].astype(np.float32)
+    median = np.median(rgb, axis=0).astype(np.float32)
+    # A pixel may look like any of its neighbours: edges must not fire when the standing car shakes.
+    kernel = np.ones((3, 3), np.uint8)
+    low, high = np.asarray(cv2.erode(median, kernel)), np.asarray(cv2.dilate(median, kernel))
+    for frame, picture in zip(view.frames, rgb, strict=True):
+        outside = np.maximum(np.maximum(picture - high, low - picture), 0).max(axis=-1)
+        difference = np.asarray(cv2.GaussianBlur(outside, (0, 0), 1.0))
+        votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
+        evidence[frame] = decide(votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame])
+    return evidence
+
+
+def _likely(verdict: contest.Verdict) -> Float[np.ndarray, "h w"]:
+    beyond = (verdict.excess_px > _EXCESS_PX) & (verdict.gain > _GAIN)
+    return (beyond | verdict.off_line).astype(np.float32)
+
+
+def _sure(verdict: contest.Verdict) -> Bool[np.ndarray, "h w"]:
+    return ((verdict.excess_px > _SURE_EXCESS_PX) & (verdict.gain > _SURE_GAIN)) | verdict.off_line
+
+
+def _vote(
+    likely: Mapping[int, Float[np.ndarray, "h w"]], frame: int, flows: list[PairFlow]
+) -> Float[np.ndarray, "h w"]:
+    """Mean of the frame's own opinion, counted twice, and of its neighbours' at the same thing."""
+    total = 2 * likely[frame]
+    count = np.full_like(total, 2)
+    for flow in flows:
+        if abs(flow.offset) <= _VOTING_REACH:
+            total = total + np.where(flow.trusted, sample(likely[flow.source], flow.x, flow.y), 0)
+            count = count + flow.trusted
+    return total / count
+
+
+def _carried(
+    flagged: Mapping[int, Bool[np.ndarray, "h w"]], frame: int, flows: list[PairFlow]
+) -> Bool[np.ndarray, "h w"]:
+    """What at least half of the frame and its neighbours hold for moving, without specks."""
+    votes = _vote({key: value.astype(np.float32) for key, value in flagged.items()}, frame, flows)
+    mask = cv2.morphologyEx((votes >= 0.5).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, found, stats, _ = cv2.connectedComponentsWithStats(mask)
+    large = stats[:, cv2.CC_STAT_AREA] >= _MIN_AREA * mask.size
+    large[0] = False
+    return large[np.asarray(found, np.intp)]
+
+
+def decide(
+    votes: Float[np.ndarray, "h w"], sure: Bool[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
+) -> Float[np.ndarray, "h w"]:
+    """Votes to evidence: at least ``FLAGGED`` inside kept and filled regions, less outside.
+
+    Args:
+        votes: In [0, 1].
+        sure: Pixels of which a region needs some to be kept.
+        usable: Evidence is 0 elsewhere.
+    """
+    mask = ((votes >= _VOTE) & usable).astype(np.uint8)
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_SHARE * mask.shape[1]))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _ellipse(_OPEN_SHARE * mask.shape[1]))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
+    sure_px = np.bincount(labels[sure], minlength=count)
+    area = stats[:, cv2.CC_STAT_AREA]
+    keep = (area >= _MIN_AREA * mask.size) & (sure_px >= np.maximum(_MIN_SURE_PX, _MIN_SURE_SHARE * area))
+    flagged = np.zeros(mask.shape, bool)
+    for label in np.flatnonzero(keep[1:]) + 1:
+        flagged |= fill(labels == label)
+    inside = np.maximum(votes, FLAGGED)
+    return np.where(usable, np.where(flagged, inside, np.minimum(votes, 0.9 * FLAGGED)), 0).astype(np.float32)
+
+
+def fill(region: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    """The region with everything that lies between parts of it, both along its row and its column.
+
+    Where it touches an edge of the image it is taken to go on beyond.
+    """
+    padded = np.pad(region, 1)
+    padded[0, 1:-1], padded[-1, 1:-1] = region[0].any(), region[-1].any()
+    padded[1:-1, 0], padded[1:-1, -1] = region[:, 0].any(), region[:, -1].any()
+
+    def between(axis: int) -> np.ndarray:
+        ahead = np.logical_or.accumulate(padded, axis=axis)
+        behind = np.flip(np.logical_or.accumulate(np.flip(padded, axis), axis=axis), axis)
+        return ahead & behind
+
+    return (between(0) & between(1))[1:-1, 1:-1]
+
+
+def _ellipse(about_px: float) -> np.ndarray:
+    size_px = max(3, 2 * round((about_px - 1) / 2) + 1)
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size_px, size_px))

@@ -1,0 +1,182 @@
+"""Whole moving things around what is known to move.
+
+Parallax shows movement only where there is texture, and above the horizon not at all. What stands in between
+(dark windows, plain doors, roofs) moves as its surroundings do: from the part that is known the motion of the
+thing follows, and every pixel near it is asked whether that motion or the static street explains it better.
+Where both do, its edges in the picture decide.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.geometry.depth import View, Warp
+from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
+from dreamdrive.geometry.moving.graph_cut import minimum_cut
+from dreamdrive.geometry.moving.misfit import misfit
+
+_REACH = 2  # offsets beyond this are not asked
+_SAME_PX = 2.0  # explanations that land this near are one
+_PLANE_SHARE = 0.8
+_MIN_FLOW_PX = 30  # pixels with trusted flow from which a motion is drawn
+_MIN_SHARE = 0.4  # of them that have to follow it
+_FOLLOWS_PX = 1.0
+_MAX_HEIGHT_M = 3.6
+_SIDE_SHARE = 0.35  # of the width is looked at on both sides
+_UP_OF_HEIGHT = 0.9  # and above, where nothing tells the size
+_UP_OF_WIDTH = 0.45
+_BELOW_SHARE = 0.1
+_WORTH = 0.5  # of a grey level by which the motion explains a pixel better
+_MAX_LEVELS = 12.0
+_KNOWN = 1.0  # worth of a pixel that is known to move
+_AWAY = 1.0  # cost of one that is not, unless it is above one that is: bare road fits both explanations
+_UNDER = 1.0  # cost of a pixel below the region
+_NEVER = 100.0
+_EDGE = 6.0  # weight of two equal neighbours
+_EDGE_FLOOR = 0.3
+_EDGE_LEVELS = 15.0  # difference in colour at which the weight is 0.6 of that
+
+
+@dataclass(frozen=True)
+class _Neighbour:
+    """What another frame says of the static street: where a point would land, and how badly that fits."""
+
+    flow: PairFlow
+    explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def outline(
+    view: View,
+    frame: int,
+    flows: Sequence[PairFlow],
+    inverse_depth: Float[np.ndarray, "h w"],
+    flagged: Bool[np.ndarray, "h w"],
+    sky: Bool[np.ndarray, "h w"],
+) -> Bool[np.ndarray, "h w"]:
+    """The moving things (H, W) of which ``flagged`` shows a part; what has no motion of its own stays so.
+
+    Args:
+        view: The posed frames.
+        frame: Index of the frame.
+        flows: Its flows.
+        inverse_depth: Static depth of the frame in 1/m.
+        flagged: Pixels known to move; some may be wrong.
+        sky: Never part of a thing.
+    """
+    if not flagged.any():
+        return flagged.copy()
+    near = [_neighbour(view, frame, flow, inverse_depth) for flow in flows if abs(flow.offset) <= _REACH]
+    count, found, stats, _ = cv2.connectedComponentsWithStats(flagged.astype(np.uint8))
+    labels = np.asarray(found, np.intp)
+    whole = np.zeros_like(flagged)
+    for label in range(1, count):
+        region = labels == label
+        window = _window(view, frame, stats[label])
+        gain = _gain(view, frame, near, region, window)
+        if gain is None:
+            whole |= region
+            continue
+        part = region[window]
+        worth = gain + _prior(part, window, stats[label])
+        worth[sky[window] | ~view.usable[frame][window]] = -_NEVER
+        cut = minimum_cut(worth, *_edges(view.rgb[frame][window]))
+        whole[window] |= _hanging_together(cut, part)
+    return whole
+
+
+def _neighbour(view: View, frame: int, flow: PairFlow, inverse_depth: Float[np.ndarray, "h w"]) -> _Neighbour:
+    warp, plane = Warp(view.cameras[frame], view.cameras[flow.source]), view.plane_inverse[frame]
+    explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for inverse in (inverse_depth, np.maximum(inverse_depth, np.float32(_PLANE_SHARE) * plane), plane):
+        x, y = warp(inverse)
+        explanations.append((x, y, misfit(view, frame, flow.source, x, y)))
+    return _Neighbour(flow, explanations)
+
+
+def _window(view: View, frame: int, box: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns that a thing may fill whose part has this bounding box (left, top, width, height)."""
+    left, top, width, height = (int(value) for value in box[:4])
+    bottom, middle = top + height - 1, left + width // 2
+    up = max(_UP_OF_HEIGHT * height, _UP_OF_WIDTH * width)
+    px_per_m = float(view.plane_inverse[frame][bottom, middle]) * view.cameras[frame].fy_px
+    if px_per_m > 0:
+        up = max(3.0, min(3 * up, _MAX_HEIGHT_M * px_per_m - height))
+    side, under = max(4, round(_SIDE_SHARE * width)), max(2, round(_BELOW_SHARE * height))
+    rows = slice(max(0, round(top - up)), bottom + 1 + under)
+    return rows, slice(max(0, left - side), left + width + side)
+
+
+def _gain(
+    view: View,
+    frame: int,
+    near: Sequence[_Neighbour],
+    region: Bool[np.ndarray, "h w"],
+    window: tuple[slice, slice],
+) -> Float[np.ndarray, "u v"] | None:
+    """What the region's own motion, if it has one, is worth in the window over that of the static street."""
+    gains: list[np.ndarray] = []
+    for neighbour in near:
+        motion = _motion(neighbour.flow, region)
+        if motion is None:
+            continue
+        x, y = motion
+        own = misfit(view, frame, neighbour.flow.source, x, y)[window]
+        static = np.full(own.shape, np.float32(np.inf))
+        for at_x, at_y, error in neighbour.explanations:
+            apart = np.hypot(at_x[window] - x[window], at_y[window] - y[window]) >= _SAME_PX
+            static = np.where(apart, np.fmin(static, error[window]), static)
+        gain = np.clip(static - own, -_MAX_LEVELS, _MAX_LEVELS)
+        gains.append(np.where(np.isfinite(static), gain, np.float32(np.nan)))
+    if not gains:
+        return None
+    known = np.isfinite(gains)
+    mean = np.where(known, gains, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return (_WORTH * mean).astype(np.float32)
+
+
+def _motion(flow: PairFlow, region: Bool[np.ndarray, "h w"]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where all pixels would go with the affine motion that most of the region follows."""
+    rows, columns = np.nonzero(region & flow.trusted)
+    if len(rows) < _MIN_FLOW_PX:
+        return None
+    here = np.stack([columns, rows], axis=1).astype(np.float32)
+    there = np.stack([flow.x[rows, columns], flow.y[rows, columns]], axis=1)
+    cv2.setRNGSeed(0)
+    affine, follows = cv2.estimateAffine2D(here, there, method=cv2.RANSAC, ransacReprojThreshold=_FOLLOWS_PX)
+    if follows.mean() < _MIN_SHARE:  # also where none was found at all
+        return None
+    x, y = pixel_grid(*region.shape)
+    a = affine.astype(np.float32)
+    return a[0, 0] * x + a[0, 1] * y + a[0, 2], a[1, 0] * x + a[1, 1] * y + a[1, 2]
+
+
+def _prior(
+    part: Bool[np.ndarray, "u v"], window: tuple[slice, slice], box: np.ndarray
+) -> Float[np.ndarray, "u v"]:
+    """What a pixel is worth by its place alone: nothing above the region, less beside and below it."""
+    top, height = int(box[1]), int(box[3])
+    rows = np.arange(window[0].start, window[0].start + len(part))[:, None]
+    above = np.atleast_2d(part.any(axis=0)) & (rows <= top + height // 2)
+    worth = np.where(part, _KNOWN, np.where(above, 0, -_AWAY))
+    return (worth - np.where(rows >= top + height, _UNDER, 0)).astype(np.float32)
+
+
+def _edges(rgb: UInt8[np.ndarray, "u v 3"]) -> tuple[Float[np.ndarray, "u _"], Float[np.ndarray, "_ v"]]:
+    """Weights of neighbours on the right and below: small across edges of the picture."""
+    colour = rgb.astype(np.float32)
+
+    def weight(difference: np.ndarray) -> np.ndarray:
+        square = np.square(difference).sum(axis=-1)
+        return _EDGE_FLOOR + _EDGE * np.exp(-square / (2 * _EDGE_LEVELS**2))
+
+    return weight(np.diff(colour, axis=1)), weight(np.diff(colour, axis=0))
+
+
+def _hanging_together(cut: Bool[np.ndarray, "u v"], part: Bool[np.ndarray, "u v"]) -> Bool[np.ndarray, "u v"]:
+    """The pieces of the cut that touch the part."""
+    _, found = cv2.connectedComponents(cut.astype(np.uint8), connectivity=4)
+    labels = np.asarray(found, np.intp)
+    return cut & np.isin(labels, np.unique(labels[part & cut]))

@@ -1,0 +1,227 @@
+"""Metric scale and the road plane of a posed clip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.geometry.road.ground_points import Plane, fit_points
+from dreamdrive.geometry.road.ground_sweep import Road, sweep
+from dreamdrive.geometry.road.known_depth import factor_of
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Basis, Ground, Scale
+
+USUAL_HEIGHT_M = 1.5
+KNOWN_HEIGHTS_M = (0.6, 5.0)
+AGREES = 0.15  # relative; a height that differs more is worth a note
+MIN_INLIERS, MIN_SHARE = 100, 0.25
+SPEEDS_M_S = (0.5, 45.0)
+ASSUMED_SPEED_M_S = 8.0
+GIVEN_SPREAD, USUAL_SPREAD, FOCAL_SPREAD, SPEED_SPREAD = 0.03, 0.15, 0.35, 0.6
+
+
+@dataclass(frozen=True)
+class Street:
+    """A clip with poses, in which the road is looked for.
+
+    Attributes:
+        grey: Frames at 320 px width.
+        usable: Pixels that belong to the street.
+        camera: Pinhole at that size.
+        world_from_camera: Poses (F, 4, 4), the first the identity.
+        points: Sparse points (P, 3) in the same units.
+        times_s: Times (F,).
+        asked_m_s: Speed of the path that the frames were asked to follow, where they were generated for one.
+    """
+
+    grey: UInt8[np.ndarray, "f h w"]
+    usable: Bool[np.ndarray, "f h w"]
+    camera: Camera
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    points: Float[np.ndarray, "p 3"]
+    times_s: Float[np.ndarray, " f"]
+    asked_m_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How to get to metres.
+
+    Attributes:
+        factor: Metres per unit of the poses.
+        ground: The road in metres, where found.
+        scale: What fixed the scale.
+        notes: What went wrong, a sentence each.
+    """
+
+    factor: float
+    ground: Ground | None
+    scale: Scale
+    notes: tuple[str, ...]
+
+
+def find_ground(
+    street: Street, seed: int, heights: tuple[float, float] | None = None
+) -> tuple[Plane | None, str]:
+    """The road plane and the name of the estimator that gave it.
+
+    Sparse points decide when at least 100 of them, a quarter of those near the path, lie in the plane; smooth
+    asphalt has too few, and there the plane that best warps the road between frames decides.
+    """
+    plane = fit_points(street.points, street.world_from_camera, seed)
+    if plane is not None and plane.support >= MIN_INLIERS and plane.share >= MIN_SHARE:
+        return plane, "points"
+    road = Road(street.grey, street.usable, street.camera, street.world_from_camera)
+    return sweep(road, heights), "road texture"
+
+
+def focal_spread_of(observed: bool) -> float:
+    """How far a focal length may be off, as a fraction: not at all where it was observed."""
+    return 0.0 if observed else FOCAL_SPREAD
+
+
+def from_ground(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric:
+    """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
+
+    Args:
+        street: Posed clip in arbitrary units.
+        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
+        focal_spread: How far the focal length may be off, as a fraction: the scale is as uncertain as that.
+            0 where it was observed, ``FOCAL_SPREAD`` where it is only a prior.
+        seed: Seed of RANSAC.
+    """
+    plane, how = find_ground(street, seed)
+    if plane is None:
+        return _from_speed(street, "no road plane was found")
+    wanted = USUAL_HEIGHT_M if height_m is None else height_m
+    factor = wanted / plane.height
+    speed = median_speed(street) * factor
+    if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
+        return _from_speed(
+            street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
+        )
+    return _by_plane(plane, how, factor, height_m, focal_spread)
+
+
+def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_spread: float) -> Metric:
+    terms = (
+        plane.spread,
+        USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
+        focal_spread,
+    )
+    source = f"ground plane ({how}), {height_words(height_m)}"
+    found = Scale(source, float(np.linalg.norm(terms)), basis=height_basis(height_m))
+    return Metric(factor, Ground(plane.normal, plane.offset * factor), found, ())
+
+
+def from_road_points(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric | None:
+    """Scale from the height of the camera above the road that measured depth shows, however slow the path.
+
+    Unlike a plane that is found by warping, it does not rest on the motion of the camera.
+
+    Args:
+        street: Posed clip in arbitrary units, its points those of dense depth.
+        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
+        focal_spread: See ``from_ground``.
+        seed: Seed of RANSAC.
+
+    Returns:
+        None where the points show no road, or one by which no car drives so fast.
+    """
+    plane = fit_points(street.points, street.world_from_camera, seed)
+    if plane is None or plane.support < MIN_INLIERS or plane.share < MIN_SHARE:
+        return None
+    factor = (USUAL_HEIGHT_M if height_m is None else height_m) / plane.height
+    if median_speed(street) * factor > SPEEDS_M_S[1]:
+        return None
+    return _by_plane(plane, "points", factor, height_m, focal_spread)
+
+
+def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:
+    """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
+    factor, spread = factor_of(ratios)
+    plane, _ = find_ground(street, seed)
+    ground = None if plane is None else Ground(plane.normal, plane.offset * factor)
+    return Metric(factor, ground, Scale("depth", spread, by_height(plane, factor, height_m)), ())
+
+
+def by_height(plane: Plane | None, factor: float, height_m: float | None) -> dict[str, float]:
+    """What the camera's height above the road says of a scale, for ``Scale.others``.
+
+    Args:
+        plane: The road in units of the poses, where found.
+        factor: Metres per unit by that scale.
+        height_m: Camera height that the user gave; None assumes 1.5 m.
+    """
+    if plane is None:
+        return {}
+    wanted = USUAL_HEIGHT_M if height_m is None else height_m
+    return {height_words(height_m): wanted / (plane.height * factor)}
+
+
+def height_words(height_m: float | None) -> str:
+    """The camera's height above the road and where it comes from."""
+    wanted, word = (USUAL_HEIGHT_M, "assumed") if height_m is None else (height_m, "given")
+    return f"camera height {wanted:.2f} m ({word})"
+
+
+def height_basis(height_m: float | None) -> Basis:
+    """What a scale rests on that comes from the camera's height."""
+    return "usual height" if height_m is None else "height"
+
+
+def as_given(
+    street: Street, source: str, spread: float, words: str, height_m: float | None, seed: int
+) -> Metric:
+    """The unit of the poses is the metre already; the road is only looked for.
+
+    Args:
+        street: Posed clip in metres.
+        source: What says so.
+        spread: How far it may be off, as a fraction.
+        words: The same for a note, where the road disagrees with it.
+        height_m: Camera height that the user gave; None assumes 1.5 m.
+        seed: Seed of RANSAC.
+    """
+    plane, _ = find_ground(street, seed, KNOWN_HEIGHTS_M)
+    ground = None if plane is None else Ground(plane.normal, plane.offset)
+    notes: tuple[str, ...] = ()
+    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > AGREES:
+        notes = (f"by {words} the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m",)
+    return Metric(1.0, ground, Scale(source, spread, by_height(plane, 1.0, height_m)), notes)
+
+
+def _from_speed(street: Street, problem: str) -> Metric:
+    speed = ASSUMED_SPEED_M_S if street.asked_m_s is None else street.asked_m_s
+    factor = speed / max(median_speed(street), 1e-9)
+    word, rest = (
+        ("assumed", "an assumed speed")
+        if street.asked_m_s is None
+        else ("taken as asked for", "the speed that was asked for")
+    )
+    words = f"none: {problem}; a speed of {speed:.3g} m/s is {word}"
+    basis: Basis = "usual speed" if street.asked_m_s is None else "asked speed"
+    found = Scale(words, SPEED_SPREAD, basis=basis)
+    return Metric(factor, None, found, (f"{problem}: distances rest on {rest}",))
+
+
+def asked_m_s(clip: Clip) -> float | None:
+    """Median speed of the path that a clip was asked to follow; None without one or where it stands still."""
+    if clip.requested is None or len(clip) < 2:
+        return None
+    speed = _median_speed(clip.requested.at(clip.times_s), clip.times_s)
+    return speed if speed >= SPEEDS_M_S[0] else None
+
+
+def median_speed(street: Street) -> float:
+    """Median speed of the steps that move, in units of the poses a second."""
+    return _median_speed(street.world_from_camera, street.times_s)
+
+
+def _median_speed(poses: Float[np.ndarray, "f 4 4"], times_s: Float[np.ndarray, " f"]) -> float:
+    """Median speed of the steps that move."""
+    step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    speed = step / np.maximum(np.diff(times_s), 1e-6)
+    moving = speed > 0.15 * speed.max()
+    return float(np.median(speed[moving])) if moving.any() else 0.0

@@ -1,0 +1,311 @@
+"""Weights from a file into a network, or a message that says what is wrong with the file."""
+
+import hashlib
+import os
+import pickle
+import re
+import struct
+import warnings
+import zipfile
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file
+from torch import Tensor, nn
+
+from dreamdrive.errors import InputError
+from dreamdrive.files.paths import open_file
+from dreamdrive.files.tensor_file import DAMAGE, HEADER_BYTES, briefly, header_problem
+from dreamdrive.files.zip_file import directory_bytes
+
+Network = TypeVar("Network", bound=nn.Module)
+_SHOWN = 4
+_PICKLE_BYTES = 4_000_000
+"""Most that ``torch.save`` may have written beside the tensors; 1000 tensors take 0.1 MB."""
+_WIDEST, _DEEPEST = 65_536, 1000
+"""Largest number that a configuration of a network may hold, and of what counts layers."""
+_LAYERS = re.compile("layers|depth|blocks_num|num_blocks")
+_STRETCHED = 1_000_000
+"""Numbers that a tensor may show although fewer are stored."""
+_REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
+
+
+def load_network(
+    make: Callable[[], Network],
+    path: Path,
+    expected: str,
+    *,
+    ignored: tuple[str, ...] = (),
+) -> Network:
+    """Build a network and fill it from a state dict on disk, for inference.
+
+    Args:
+        make: Builds the network.
+        path: A file with a state dict of the network's own keys; nothing else in it is ever executed.
+        expected: Which file is expected, for messages.
+        ignored: Beginnings of keys of parts that are not used.
+
+    Raises:
+        InputError: The file is missing, unreadable or holds something else.
+    """
+    state = {k: v for k, v in read_state(path, expected).items() if not k.startswith(ignored or ("\0",))}
+    return fill_network(make, state, str(path), expected)
+
+
+def fill_network(
+    make: Callable[[], Network], state: dict[str, Tensor], source: str, expected: str
+) -> Network:
+    """Build a network from a state dict of its keys, for inference in float32.
+
+    Args:
+        make: Builds the network.
+        state: Tensors by key; counters of batches may be missing.
+        source: Where the tensors come from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: Keys are missing or left over, or shapes differ.
+    """
+    try:
+        with torch.device("meta"):
+            network = make()
+    except (RuntimeError, OverflowError) as error:
+        raise InputError(
+            f"{source}: no network is of these sizes ({briefly(error)}); expected {expected}"
+        ) from None
+    return fill(network, state, source, expected)
+
+
+def fill(network: Network, state: dict[str, Tensor], source: str, expected: str) -> Network:
+    """Fill a network that is already built, for inference in float32.
+
+    Args:
+        network: The network; its parameters and buffers are replaced.
+        state: Tensors by key; counters of batches may be missing, and all but one name of a shared tensor.
+        source: Where the tensors come from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: Keys are missing or left over, shapes or types differ, or numbers are not finite.
+    """
+    wanted = network.state_dict()
+    counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
+    state = counters | _shared(wanted, state) | state
+    wrong = misfits(*({key: value.shape for key, value in each.items()} for each in (wanted, state)))
+    if wrong:
+        raise InputError(f"{source} does not fit ({in_words(wrong)}); expected {expected}")
+    _check_numbers(wanted, state, source, expected)
+    values = {key: value.float() if value.is_floating_point() else value for key, value in state.items()}
+    network.load_state_dict(values, assign=True)
+    return network.eval().requires_grad_(False)
+
+
+def read_state(path: Path, expected: str) -> dict[str, Tensor]:
+    """The tensors of a state dict on disk, ``.safetensors`` or what ``torch.save`` wrote.
+
+    Raises:
+        InputError: The file is missing, unreadable or holds something else.
+    """
+    if path.suffix != ".safetensors":
+        return as_state(read_torch(path, expected), str(path), expected)
+    try:
+        if problem := header_problem(path):
+            raise SafetensorError(problem)
+        return load_file(path)
+    except DAMAGE as error:
+        raise InputError(f"{path} is missing or damaged ({briefly(error)}); expected {expected}") from None
+
+
+def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
+    """What ``torch.save`` wrote, if it consists of tensors, plain values and the allowed classes.
+
+    Args:
+        path: The file; nothing in it is ever executed.
+        expected: Which file is expected, for messages.
+        allowed: Further classes that objects in the file may have.
+
+    Raises:
+        InputError: The file is missing or unreadable, or holds objects of other classes.
+    """
+    if not path.is_file():
+        raise InputError(f"{path} does not exist or is no file; expected {expected}")
+    try:
+        _check_archive(path)
+        with warnings.catch_warnings(), torch.serialization.safe_globals(list(allowed)):
+            warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
+            return torch.load(path, map_location="cpu", weights_only=True)
+    except (
+        RuntimeError,
+        pickle.UnpicklingError,
+        zipfile.BadZipFile,
+        EOFError,
+        OSError,
+        ValueError,
+        KeyError,
+        # A damaged pickle builds what its classes do not take.
+        TypeError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        MemoryError,
+        AssertionError,
+        NotImplementedError,
+        struct.error,
+    ) as error:
+        refused = _REFUSED.search(str(error))
+        about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
+        about = f"; {briefly(error)}" if isinstance(error, zipfile.BadZipFile) else about
+        raise InputError(
+            f"{path} cannot be read as plain weights (damaged, a TorchScript archive or a whole pickled "
+            f"object{about}); expected {expected}"
+        ) from None
+
+
+def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
+    """A state dict, if that is what ``content`` is.
+
+    Args:
+        content: What was read.
+        source: Where it comes from, for messages.
+        expected: Which file is expected, for messages.
+
+    Raises:
+        InputError: It is something else.
+    """
+    if not isinstance(content, dict) or not all(isinstance(value, Tensor) for value in content.values()):
+        raise InputError(f"{source} holds no table of tensors; expected {expected}")
+    for key, value in content.items():
+        if problem := _problem(value):
+            raise InputError(f"{source}: {briefly(key)} {problem}; expected {expected}")
+    return {str(key): value for key, value in content.items()}
+
+
+def check_sizes(values: object, where: str) -> None:
+    """Whether whole numbers in a configuration are sizes that networks have, before one is built of them.
+
+    Args:
+        values: JSON values.
+        where: Where they come from, for messages.
+
+    Raises:
+        InputError: One is larger; of layers and depths there may be fewer.
+    """
+    _check_sizes(values, where, "", _WIDEST)
+
+
+def sha256(path: Path) -> str:
+    """Digest of a file.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    try:
+        with open_file(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _check_sizes(values: object, where: str, name: str, limit: int) -> None:
+    if isinstance(values, dict):
+        for key, value in cast("dict[str, object]", values).items():
+            _check_sizes(value, where, key, _DEEPEST if _LAYERS.search(key) else _WIDEST)
+    elif isinstance(values, list):
+        for value in cast("list[object]", values):
+            _check_sizes(value, where, name, limit)
+    elif isinstance(values, int) and abs(values) > limit:
+        raise InputError(f"{where}: {name} is {values}; expected at most {limit}")
+
+
+def _check_archive(path: Path) -> None:
+    """Refuse an archive that unpacks to more than it holds; ``torch.save`` never compresses."""
+    with open_file(path) as file:
+        if file.read(4) != b"PK\3\4":
+            return
+        size = os.fstat(file.fileno()).st_size
+        if directory_bytes(file) > HEADER_BYTES:
+            raise zipfile.BadZipFile("it holds more parts than weights have")
+        with zipfile.ZipFile(file) as archive:
+            parts = archive.infolist()
+    # TorchScript is compressed in part, and refused without being unpacked.
+    script = any(part.filename.endswith("/constants.pkl") for part in parts)
+    packed = any(part.compress_type != zipfile.ZIP_STORED for part in parts)
+    if any(part.filename.endswith("/data.pkl") and part.file_size > _PICKLE_BYTES for part in parts):
+        raise zipfile.BadZipFile("it holds more plain values than weights have")
+    if not script and (packed or sum(part.file_size for part in parts) > size):
+        raise zipfile.BadZipFile("it is compressed, as torch.save never does")
+
+
+def _problem(value: Tensor) -> str | None:
+    """What is wrong with a tensor from a file, whatever network it is for."""
+    if value.layout is not torch.strided or value.is_quantized or value.device.type != "cpu":
+        return "is no plain tensor"
+    if value.numel() > max(_STRETCHED, value.untyped_storage().nbytes() // max(value.element_size(), 1)):
+        return f"claims the shape {tuple(value.shape)}, more than the file holds"
+    return None
+
+
+def _check_numbers(
+    wanted: Mapping[str, Tensor], state: Mapping[str, Tensor], source: str, expected: str
+) -> None:
+    """Whether tensors of the right shapes hold numbers of the right kind, all of them finite."""
+    for key, value in state.items():
+        if value.is_floating_point() != wanted[key].is_floating_point() or value.is_complex():
+            raise InputError(
+                f"{source}: {briefly(key)} holds {_name(value)}, not {_name(wanted[key])}; expected "
+                f"{expected}"
+            )
+        # The extremes tell without a copy; what is not a number is its own extreme.
+        if value.is_floating_point() and value.numel():
+            low, high = torch.aminmax(value if value.element_size() > 1 else value.float())
+            if not (torch.isfinite(low) and torch.isfinite(high)):
+                raise InputError(
+                    f"{source}: {briefly(key)} holds numbers that are not finite; copy the file again"
+                )
+
+
+def _name(value: Tensor) -> str:
+    return str(value.dtype).removeprefix("torch.")
+
+
+def _shared(wanted: dict[str, Tensor], state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """By its other names what the state holds under one of them: a .safetensors keeps one name of each."""
+    names: dict[int, list[str]] = defaultdict(list)
+    for key, value in wanted.items():
+        if value.device.type != "meta":
+            names[value.data_ptr()].append(key)
+    held = {key: group for group in names.values() for key in group if len(group) > 1 and key in state}
+    return {name: state[key] for key, group in held.items() for name in group}
+
+
+def misfits(wanted: Mapping[str, Sequence[int]], given: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
+    """What is wrong with tensors, by what it is; empty where they are those of the network.
+
+    Args:
+        wanted: Shapes of the network's tensors, by key.
+        given: Shapes of those that are there.
+    """
+    found = {
+        "missing": sorted(set(wanted) - set(given)),
+        "unknown": sorted(set(given) - set(wanted)),
+        "of a wrong shape": [
+            f"{key} is {tuple(given[key])}, not {tuple(wanted[key])}"
+            for key in sorted(set(wanted) & set(given))
+            if tuple(given[key]) != tuple(wanted[key])
+        ],
+    }
+    return {what: keys for what, keys in found.items() if keys}
+
+
+def in_words(found: Mapping[str, list[str]]) -> str:
+    """Misfits for a message, the first few of each kind."""
+    return "; ".join(f"{len(keys)} {what}: {some(keys)}" for what, keys in found.items())
+
+
+def some(keys: Sequence[str]) -> str:
+    """The first few keys, for a message."""
+    return ", ".join(map(briefly, keys[:_SHOWN])) + (", ..." if len(keys) > _SHOWN else "")

@@ -1,0 +1,132 @@
+"""How well withheld frames are predicted, beside what needs no scene at all."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+from dreamdrive.splat import render_scene, ssim_map
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How like its reference an image is.
+
+    Attributes:
+        psnr: Peak signal to noise ratio in decibels, of values in [0, 1].
+        ssim: Structural similarity, window of 11 pixels with a deviation of 1.5.
+    """
+
+    psnr: float
+    ssim: float
+
+
+Predictor = Callable[[Clip, int], Float[np.ndarray, "h w 3"]]
+"""Guesses a withheld frame of a clip, by index, from the frames that may be seen."""
+
+
+def score_scene(clip: Clip, geometry: Geometry, scene: Scene) -> dict[int, Likeness]:
+    """Likeness of the scene's view of each withheld frame, by index in the clip."""
+
+    def rendered(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
+        camera, of_rig = geometry.cameras[frame], int(clip.camera[frame])
+        return render_scene(scene, camera, float(clip.times_s[frame]), of_rig=of_rig).colour.numpy()
+
+    return _score(clip, geometry, rendered)
+
+
+def score_baselines(clip: Clip, geometry: Geometry) -> dict[str, dict[int, Likeness]]:
+    """Likeness of what ``BASELINES`` predict for each withheld frame."""
+    return {name: _score(clip, geometry, predict) for name, predict in BASELINES.items()}
+
+
+def _score(clip: Clip, geometry: Geometry, predict: Predictor) -> dict[int, Likeness]:
+    street = geometry.fixed_regions[clip.camera] == 0
+    withheld = np.flatnonzero(clip.held_out).tolist()
+    return {i: likeness(predict(clip, i), clip.frames[i], clip.valid[i] & street[i]) for i in withheld}
+
+
+def likeness(
+    image: Float[np.ndarray, "h w 3"], frame: UInt8[np.ndarray, "h w 3"], mask: Bool[np.ndarray, "h w"]
+) -> Likeness:
+    """Compare an image in [0, 1] with a recorded frame where ``mask`` is set.
+
+    The image is rounded to 8 bits first, as it would be on disk. Outside the mask it counts as met, so that
+    what lies there does not leak in through the window of the similarity.
+    """
+    if not mask.any():
+        raise ValueError("no pixel to compare")
+    reference = frame.astype(np.float32) / 255
+    image = np.rint(np.clip(image, 0, 1) * 255).astype(np.float32) / 255
+    image = np.where(mask[..., None], image, reference)
+    squared = float(np.mean((image[mask].astype(np.float64) - reference[mask]) ** 2))
+    similarity = ssim_map(torch.from_numpy(image), torch.from_numpy(reference)).numpy()
+    return Likeness(float(-10 * np.log10(max(squared, 1e-10))), float(similarity[mask].mean()))
+
+
+def repeat_previous(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
+    """The last frame before it that may be seen."""
+    return clip.frames[_neighbours(clip, frame)[0]].astype(np.float32) / 255
+
+
+def average_neighbours(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
+    """The mean of the nearest frames before and after."""
+    before, after = _neighbours(clip, frame)
+    return (clip.frames[before].astype(np.float32) + clip.frames[after].astype(np.float32)) / 510
+
+
+def interpolate_flow(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
+    """Both neighbours warped along dense optical flow (DIS) and blended by their distance in time.
+
+    The flows to the time in between are those of Jiang et al. 2018 (Super SloMo), eq. 4.
+    """
+    before, after = _neighbours(clip, frame)
+    first, second = clip.frames[before], clip.frames[after]
+    times = clip.times_s
+    t = float((times[frame] - times[before]) / (times[after] - times[before]))
+    there, back = _flow(first, second), _flow(second, first)
+    from_first = _warped(first, -(1 - t) * t * there + t * t * back)
+    from_second = _warped(second, (1 - t) * (1 - t) * there - t * (1 - t) * back)
+    return (1 - t) * from_first + t * from_second
+
+
+BASELINES: dict[str, Predictor] = {
+    "repeat_previous": repeat_previous,
+    "average_neighbours": average_neighbours,
+    "flow_interpolation": interpolate_flow,
+}
+"""Predictions that know nothing of space."""
+
+
+def _neighbours(clip: Clip, frame: int) -> tuple[int, int]:
+    seen = np.array(clip.seen_of(int(clip.camera[frame])))
+    return int(seen[seen < frame].max()), int(seen[seen > frame].min())
+
+
+def _flow(
+    first: UInt8[np.ndarray, "h w 3"], second: UInt8[np.ndarray, "h w 3"]
+) -> Float[np.ndarray, "h w 2"]:
+    method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    grey, other = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second))
+    return np.asarray(method.calc(grey, other, np.zeros((*first.shape[:2], 2), np.float32)))
+
+
+def _warped(
+    image: UInt8[np.ndarray, "h w 3"], offset_px: Float[np.ndarray, "h w 2"]
+) -> Float[np.ndarray, "h w 3"]:
+    height, width = image.shape[:2]
+    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    warped = cv2.remap(
+        image.astype(np.float32) / 255,
+        x + offset_px[..., 0].astype(np.float32),
+        y + offset_px[..., 1].astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return np.asarray(warped)

@@ -1,0 +1,140 @@
+"""``report.json``: what was made, from what, how well, and what went wrong on the way."""
+
+import math
+import platform
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any, cast
+
+import numpy as np
+
+from dreamdrive import __version__
+from dreamdrive.evaluate import compare_paths
+from dreamdrive.run.held_out import Likeness
+from dreamdrive.run.judge import facts_of, limits_of, rough_because
+from dreamdrive.run.stages import StageRecord
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+
+PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "pycolmap", "av", "safetensors")
+"""Whose versions a result may depend on."""
+_AS_ASKED = "the poses are those asked for: the frames are too different from one another to look for others"
+
+
+def describe(
+    clip: Clip,
+    geometry: Geometry,
+    scene: Scene,
+    request: dict[str, Any],
+    records: dict[str, StageRecord],
+    steps: dict[str, int],
+    held_out: dict[int, Likeness],
+    baselines: dict[str, dict[int, Likeness]],
+) -> dict[str, Any]:
+    """The report as JSON values; a number that is not finite becomes null.
+
+    Args:
+        clip: The frames.
+        geometry: Their geometry.
+        scene: The result.
+        request: Input and options.
+        records: Cost of each stage.
+        steps: Optimisation steps of those that optimise.
+        held_out: Likeness of the withheld frames, by index in the clip.
+        baselines: The same of predictions that need no scene.
+    """
+    blended = baselines.get("flow_interpolation", {})
+    facts = facts_of(clip, geometry, request["options"]["quality"], held_out, blended)
+    report = {
+        "version": __version__,
+        "versions": {"python": platform.python_version(), **package_versions()},
+        "input": request["input"],
+        "options": request["options"],
+        "seed": request["seed"],
+        "stages": {name: asdict(record) for name, record in records.items()},
+        "steps": steps,
+        "frames": {"count": len(clip), "size": list(clip.size), "source_index": clip.source_index.tolist()},
+        "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
+        "actors": [
+            {
+                "name": actor.name,
+                "kind": actor.kind,
+                "gaussians": actor.count,
+                "first_s": actor.first_s,
+                "last_s": actor.last_s,
+                "path_m": actor.path_length_m,
+            }
+            for actor in scene.actors
+        ],
+        "scale": {**asdict(geometry.scale), "disagreement": geometry.scale.disagreement},
+        "focal": asdict(geometry.focal),
+        "requested": against_request(clip, geometry),
+        "detected": list(geometry.detected),
+        "fallback": geometry.fallback,
+        "rough": list(rough_because(facts)),
+        "limits": list(limits_of(facts)),
+        "notes": list(clip.provenance.get("notes", [])),
+        "geometry": geometry.details,
+        "held_out": _by_source_index(clip, held_out),
+        "held_out_mean": _mean(held_out),
+        "baselines": {
+            name: {"frames": _by_source_index(clip, one), "mean": _mean(one)}
+            for name, one in baselines.items()
+        },
+    }
+    return cast(dict[str, Any], _finite(report))
+
+
+def against_request(clip: Clip, geometry: Geometry) -> dict[str, Any] | None:
+    """How far the path in the frames is from the one they were asked for; None where none was asked for.
+
+    Where the path was not looked for in the frames but taken as asked for, ``error`` is None and ``reason``
+    says so.
+    """
+    if clip.requested is None:
+        return None
+    if clip.known.generated and clip.known.world_from_camera is not None:
+        return {"length_m": clip.requested.length_m, "error": None, "reason": _AS_ASKED}
+    lead = clip.of_camera(int(clip.camera[0]))
+    found = np.stack([geometry.cameras[i].world_from_camera for i in lead])
+    error = compare_paths(found, clip.requested.at(clip.times_s[lead]))
+    length_m = clip.requested.length_m
+    return {"length_m": length_m, "error": None if error is None else asdict(error)}
+
+
+def package_versions() -> dict[str, str | None]:
+    """Installed versions of ``PACKAGES``; None where one is missing."""
+    versions: dict[str, str | None] = {}
+    for name in PACKAGES:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = None
+    return versions
+
+
+def _by_source_index(clip: Clip, scores: dict[int, Likeness]) -> dict[str, dict[str, float]]:
+    """Likeness by index in the source; of the cameras after the first with their number in the rig."""
+    named: dict[str, dict[str, float]] = {}
+    for i, one in scores.items():
+        camera = int(clip.camera[i])
+        named[f"{int(clip.source_index[i])}{f'_camera{camera}' if camera else ''}"] = asdict(one)
+    return named
+
+
+def _mean(scores: dict[int, Likeness]) -> dict[str, float] | None:
+    if not scores:
+        return None
+    return {name: float(np.mean([getattr(s, name) for s in scores.values()])) for name in ("psnr", "ssim")}
+
+
+def _finite(value: object) -> object:
+    """The same without numbers that JSON does not have, and without numpy's."""
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in cast(dict[object, object], value).items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in cast(list[object], value)]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,161 @@
+"""What a user asks ``generate`` for, checked and with everything that decides the result."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dreamdrive.data.rig import is_rig
+from dreamdrive.errors import InputError
+from dreamdrive.geometry import GeometryOptions, backend_of
+from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
+from dreamdrive.models import find_weights
+from dreamdrive.options import QUALITIES, Options, QualityName
+from dreamdrive.prior import choose_prior, prior_of
+from dreamdrive.progress import Work
+from dreamdrive.run.stages import digest, file_digest
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+
+_FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a result is made from.
+
+    Attributes:
+        control: The input and how to read it, with the network of the prior.
+        prior: Name of the prior.
+        geometry_files: Cameras, poses and depth that are given, see ``geometry.backends.files``.
+        options: How the scene is built; its seed is the control's.
+        quality: Name of those options in ``options.QUALITIES``, or ``"custom"``.
+        digests: What given files hold: they count by their content, not by their place.
+    """
+
+    control: Control
+    prior: str
+    geometry_files: Path | None
+    options: Options
+    quality: str
+    digests: dict[str, str]
+
+    @property
+    def reading(self) -> list[object]:
+        """All that the frames depend on."""
+        files = {name: value for name, value in self.digests.items() if name != "weights"}
+        return [self.prior, self._settings, files, self.control.seed]
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        """The options of reading that are no files."""
+        return {k: v for k, v in asdict(self.control).items() if k not in (*_FILES, "seed")}
+
+    def read(self, work: Work) -> Clip:
+        """The frames, with what the geometry files say of them."""
+        clip = choose_prior(self.prior)(self.control, work)
+        if self.geometry_files is None:
+            return clip
+        return attach(clip, self.geometry_files, self.control.path)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """All of it as JSON values, for the report and for telling one result from another."""
+        options = asdict(self.options)
+        geometry = options.pop("geometry")
+        del options["seed"], geometry["weights"]
+        chosen = {
+            "prior": self.prior,
+            "geometry": geometry.pop("method"),
+            "quality": self.quality,
+            **geometry,
+            **self._settings,
+            **options,
+        }
+        return {"digests": self.digests, "options": chosen, "seed": self.control.seed}
+
+
+def request_of(
+    control: Control,
+    *,
+    prior: str | None = None,
+    geometry_files: Path | None = None,
+    weights: str | Path | None = None,
+    geometry_weights: str | Path | None = None,
+    options: Options | QualityName = "standard",
+) -> Request:
+    """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``.
+
+    Raises:
+        InputError: The input or an option cannot be used.
+    """
+    prior = prior or prior_of(control.path, weights is not None)
+    whole = QUALITIES[options] if isinstance(options, str) else options
+    control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)
+    choose_prior(prior).check(control)
+    geometry = replace(whole.geometry, weights=network)
+    backend_of(geometry.method, network)
+    control = _with_lens(control, geometry_files)
+    quality = next((name for name, one in QUALITIES.items() if one == _plain(whole)), "custom")
+    options = replace(whole, geometry=geometry, seed=control.seed)
+    return Request(
+        control, prior, geometry_files, options, quality, _digests(control, geometry_files, network)
+    )
+
+
+def _plain(options: Options) -> Options:
+    """The options without what is chosen beside the quality."""
+    return replace(options, geometry=GeometryOptions(), representation="hybrid", device="cpu", seed=0)
+
+
+def _with_networks(
+    control: Control, prior: str, weights: str | Path | None, geometry_weights: str | Path | None
+) -> tuple[Control, Path | None]:
+    """The control with the prior's network, and the network of the geometry."""
+    if choose_prior(prior).weights is None:
+        if weights is not None and geometry_weights is not None:
+            raise InputError(
+                "--weights and --geometry-weights are given, but the prior "
+                f"{prior} has no network; leave one out"
+            )
+        weights, geometry_weights = None, geometry_weights or weights
+    made = control if weights is None else replace(control, weights=find_weights(weights))
+    return made, None if geometry_weights is None else find_weights(geometry_weights)
+
+
+def _with_lens(control: Control, geometry_files: Path | None) -> Control:
+    """A lens in the geometry files has to be taken out of the frames when they are read."""
+    if geometry_files is None or control.intrinsics is not None or control.hfov_deg is not None:
+        return control
+    return replace(control, intrinsics=bent_model(geometry_files))
+
+
+def _digests(control: Control, geometry_files: Path | None, weights: Path | None) -> dict[str, str]:
+    given = {
+        "input": (control.path, "a video or a folder of images"),
+        "intrinsics": (control.intrinsics, "a calibration file"),
+        "poses": (control.poses, "a file with poses"),
+        "trajectory": (control.trajectory, "a file with poses"),
+        "features": (control.features, "a .safetensors file, see docs/replay.md"),
+        "prior-weights": (control.weights, "a file of weights or its folder"),
+        "geometry-files": (geometry_files, EXPECTED),
+        "weights": (weights, "a file of weights or its folder"),
+    }
+    digests: dict[str, str] = {}
+    for name, (path, expected) in given.items():
+        if path is None:
+            continue
+        if not path.exists():
+            flag = "" if name == "input" else f"--{name} "
+            raise InputError(f"{flag}{path} does not exist; expected {expected}")
+        deep = name in ("geometry-files", "prior-weights") or is_rig(path)
+        digests[name] = file_digest(_pictures(path) if name == "input" else path, deep=deep)
+        beside = companions(path) if name == "geometry-files" else []
+        if beside:
+            digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
+    return digests
+
+
+def _pictures(path: Path) -> Path:
+    """What counts of an input: of a folder with ``frames`` in it, as of ``data.source``, these alone."""
+    frames = path / "frames"
+    return frames if frames.is_dir() and not is_rig(path) else path

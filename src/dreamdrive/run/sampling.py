@@ -1,0 +1,143 @@
+"""Priors on their own: frames and features on disk, with where they come from, for ``replay`` to take up."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from dreamdrive import __version__
+from dreamdrive.data import read_clip
+from dreamdrive.data.feature_file import INDEX, MAX_CHANNELS, FeatureFile, write_features
+from dreamdrive.data.recording import ABOUT, write_recording
+from dreamdrive.data.source import open_source
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import check_free
+from dreamdrive.models import find_weights
+from dreamdrive.prior import choose_prior, prior_of
+from dreamdrive.progress import Progress, silent
+from dreamdrive.run.stages import file_digest
+from dreamdrive.scene.action import Action
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.control import Control
+
+_SEEN_PX = 1024
+_FILES = ("path", "intrinsics", "poses", "trajectory", "features", "weights")
+
+
+def sample(
+    control: Control,
+    out: Path,
+    *,
+    prior: str | None = None,
+    weights: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Clip:
+    """Run a prior and write what it gives in the format of ``data.recording``, for ``replay`` to take up.
+
+    Args:
+        control: The input and how to read it.
+        out: Folder to write.
+        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
+        weights: The prior's network: a file or folder, or a name, see ``hub.find_weights``.
+        force: Replace an older folder of this kind.
+        progress: Told of every step.
+
+    Raises:
+        InputError: The input, an option, the weights or ``out`` cannot be used.
+    """
+    name = prior or prior_of(control.path, weights is not None)
+    control = control if weights is None else replace(control, weights=find_weights(weights))
+    chosen = choose_prior(name)
+    chosen.check(control)
+    for file in _FILES:
+        path: Path | None = getattr(control, file)
+        if path is not None and not path.exists():
+            raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
+    if control.path is not None and out.resolve() == control.path.resolve():
+        raise InputError(f"{out} is the input itself; choose another output folder")
+    check_free(out, force, ABOUT)
+    clip = chosen(control, progress)
+    if clip.step[-1] < 1:
+        raise InputError(f"--frames {control.frames}: a single frame is no recording; choose two or more")
+    write_recording(clip, out, _about(name, control), replace=force)
+    return clip
+
+
+def _about(prior: str, control: Control) -> dict[str, Any]:
+    """What it takes to make the same again: files by name and content, all else by value."""
+    options = {k: v for k, v in asdict(control).items() if k not in (*_FILES, "seed") and v is not None}
+    given = {name: path for name in _FILES if isinstance(path := getattr(control, name), Path)}
+    files = {
+        name: {"name": path.name, "sha256": file_digest(path, deep=True)} for name, path in given.items()
+    }
+    return {
+        "dreamdrive": __version__,
+        "prior": prior,
+        "seed": control.seed,
+        "options": options,
+        "files": files,
+    }
+
+
+def detailed_size(path: Path) -> tuple[int, int]:
+    """Width and height at which frames keep the detail that a network of ``_SEEN_PX`` columns sees."""
+    width, height = next(iter(open_source(path).read(range(1)))).size
+    shrink = min(1.0, _SEEN_PX / width)
+    return 2 * round(shrink * width / 2), 2 * round(shrink * height / 2)
+
+
+def clip_features(
+    path: Path,
+    out: Path,
+    weights: str | Path,
+    options: dict[str, Any],
+    *,
+    frames: str | None = None,
+    size: tuple[int, int] | None = None,
+    action: Action | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> FeatureFile:
+    """Features of a recorded clip by the network of Vista or Stable Video Diffusion, written to a file.
+
+    Args:
+        path: A video or a folder of images.
+        out: File to write.
+        weights: The network: a file or folder, or a name, see ``hub.find_weights``.
+        options: Fields of ``prior.vista.features.FeatureOptions``.
+        frames: ``START:STOP:STEP`` over the frames of the clip; all without it.
+        size: Width and height at which the network sees the frames.
+        action: What the car does, for Vista.
+        seed: Of the noise.
+        progress: Told of every window of frames.
+
+    Raises:
+        InputError: The clip, the weights or an option cannot be used, or the file cannot be written.
+    """
+    from dreamdrive.prior.vista import FeatureOptions, video_features
+
+    if out.suffix != ".safetensors":
+        raise InputError(f"-o {out}: expected a name that ends in .safetensors")
+    chosen, folder = FeatureOptions(**options), find_weights(weights)
+    if not (0 < chosen.sigma < float("inf") and 1 <= chosen.channels <= MAX_CHANNELS):
+        raise InputError(
+            f"--sigma {chosen.sigma:g} --channels {chosen.channels}: expected a deviation above 0 and "
+            f"1 to {MAX_CHANNELS} channels"
+        )
+    clip = read_clip(path, frames=frames, size=detailed_size(path))
+    found = video_features(
+        clip.frames, folder, chosen, size=size, action=action, seed=seed, progress=progress
+    )
+    about = {
+        "dreamdrive": __version__,
+        "features": asdict(chosen),
+        "clip": {"name": path.name, "sha256": file_digest(path)},
+        "weights": {"name": folder.name, "sha256": file_digest(folder, deep=True)},
+        INDEX: clip.source_index.tolist(),
+        "action": None if action is None else asdict(action),
+        "seed": seed,
+        "notes": list(found.notes),
+    }
+    made = FeatureFile({found.name: found.values}, about)
+    write_features(out, made)
+    return made

@@ -1,0 +1,238 @@
+"""The output folder: whose it is, what may be replaced, and how a result takes the place of an older one.
+
+What lies in the folder may be damaged or hostile: names in its files count only below it, and links do not.
+"""
+
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_file, remove
+from dreamdrive.files.json_file import parse_json
+from dreamdrive.files.paths import TEXT_BYTES, inside, is_inside, read_bytes
+from dreamdrive.run.stages import digest
+
+OURS = ("held_out", "report.json", "report.png", "scene", "stages", "video")
+"""What ``generate`` puts into an output folder."""
+
+RESULT = ("held_out", "report.png", "scene", "video")
+"""What of these is moved there from ``staging``, and removed when a later result lacks it."""
+
+REPORT = "report.json"
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """An output folder that may be written to.
+
+    Attributes:
+        out: The folder; it need not exist yet.
+        request: What the result is made from: digest of the input and the options, as JSON values.
+    """
+
+    out: Path
+    request: dict[str, Any]
+
+    @property
+    def stages(self) -> Path:
+        """Where stages keep their results."""
+        return self.out / "stages"
+
+    @property
+    def staging(self) -> Path:
+        """Where a new result is put together, laid out like ``out``."""
+        return self.stages / "result"
+
+    def claim(self) -> None:
+        """Make the folder and note what it is for; before this nothing is written."""
+        note = self.stages / "request.json"
+        if _identity(note) != digest(self.request):
+            text = json.dumps({"identity": digest(self.request), "request": self.request}, indent=1)
+            with new_file(note) as path:
+                path.write_text(text)
+
+    def fresh_staging(self) -> Path:
+        """An empty ``staging`` folder."""
+        self.claim()
+        staging = inside(self.out, "stages/result")
+        remove(staging)
+        staging.mkdir(parents=True)
+        return staging
+
+    def publish(self, report: dict[str, Any]) -> None:
+        """Move what lies in ``staging`` to its place and write the report.
+
+        Files of an earlier result that the new one does not have are removed; no other file is touched. The
+        report goes away first and comes back last, so a folder with a report holds the whole result of it.
+        """
+        _check_kinds(self.out)
+        moved = sorted(p.relative_to(self.staging) for p in self.staging.rglob("*") if p.is_file())
+        replaced = self.stages / "replaced.json"
+        if (self.out / REPORT).exists():
+            (self.out / REPORT).replace(replaced)
+        for path in moved:
+            folder = _folder_of(self.out, path)
+            folder.mkdir(parents=True, exist_ok=True)
+            if (folder / path.name).is_dir() and not (folder / path.name).is_symlink():
+                raise InputError(
+                    f"{folder / path.name} is a folder where a file of the result belongs; move it"
+                )
+            (self.staging / path).replace(folder / path.name)
+        for name in sorted(set(_files(replaced)) - {p.as_posix() for p in moved}):
+            _remove_file(self.out, Path(name))
+        names = [p.as_posix() for p in moved]
+        document = {**report, "identity": digest(self.request), "files": names}
+        text = json.dumps(document, indent=1, allow_nan=False)
+        with new_file(self.out / REPORT) as path:
+            path.write_text(text + "\n")
+        replaced.unlink(missing_ok=True)
+        shutil.rmtree(self.staging)
+
+
+def open_workspace(
+    out: Path, request: dict[str, Any], *, force: bool = False, recompute: bool = False
+) -> Workspace | None:
+    """Check that ``out`` may be written for ``request``.
+
+    Args:
+        out: The output folder.
+        request: What the result is made from.
+        force: Replace the result of another request, and tolerate files that are not ours.
+        recompute: A finished result of the same request is to be made again.
+
+    Returns:
+        None if ``out`` already holds the finished result of the request and neither flag is set.
+
+    Raises:
+        InputError: The folder cannot be written, holds something else, or the result of another request.
+    """
+    check_writable(out)
+    _check_kinds(out)
+    entries = sorted(p.name for p in out.iterdir() if not p.name.startswith(".")) if out.is_dir() else []
+    finished, begun = _identity(out / REPORT), _identity(out / "stages" / "request.json")
+    wanted = digest(request)
+    taken = [name for name in entries if name in OURS]
+    foreign = [name for name in entries if name not in OURS]
+    if taken and finished is None and begun is None:
+        raise InputError(
+            f"{out} holds {taken[0]}, which dreamdrive did not write and would have to replace; "
+            "choose another output folder or move it away"
+        )
+    if force:
+        return Workspace(out, request)
+    if finished == wanted and not recompute and all((out / name).exists() for name in _files(out / REPORT)):
+        return None
+    if foreign:
+        raise InputError(
+            f"{out} holds files that are not dreamdrive's ({', '.join(foreign[:3])}); choose another output "
+            "folder, or give --force to write beside them (they are kept)"
+        )
+    other = finished if finished is not None else begun
+    if other not in (None, wanted):
+        raise InputError(
+            f"{out} was made from another input or with other options{_difference(out, request)}; "
+            "choose another output folder, or give --force to replace the result"
+        )
+    return Workspace(out, request)
+
+
+def check_ours(out: Path) -> None:
+    """Fail where a folder is not one that ``generate`` wrote.
+
+    Raises:
+        InputError: It is not.
+    """
+    if _identity(out / REPORT) is None and _identity(out / "stages" / "request.json") is None:
+        raise InputError(f"{out} is no folder that dreamdrive generate wrote; nothing was removed")
+
+
+def check_place(out: Path, source: Path | None) -> None:
+    """Fail before the work where the output folder is the input, or cannot be written.
+
+    Raises:
+        InputError: It is or cannot.
+    """
+    if source is not None and out.resolve() == source.resolve():
+        raise InputError(f"{out} is the input itself; choose another output folder")
+    check_writable(out)
+
+
+def check_writable(out: Path) -> None:
+    """Fail before the work rather than after it.
+
+    Raises:
+        InputError: Something else is in the way, or the place may not be written to.
+    """
+    existing = out
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir():
+        raise InputError(f"cannot write to {out}: {existing} is a file, and a folder is needed there")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(f"cannot write to {out}: no permission to write in {existing}")
+
+
+def _check_kinds(out: Path) -> None:
+    """What dreamdrive writes to is a folder or file of its own, and no link, which could lead anywhere."""
+    for name in OURS:
+        path = inside(out, name)
+        if path.exists() and path.is_file() != bool(path.suffix):
+            raise InputError(
+                f"{path} is not a {'file' if path.suffix else 'folder'}, which dreamdrive would have to "
+                "replace; choose another output folder or move it away"
+            )
+
+
+def _folder_of(out: Path, name: Path) -> Path:
+    """The folder of a result's file; no link on the way."""
+    return out if len(name.parts) == 1 else inside(out, name.parent.as_posix())
+
+
+def _remove_file(out: Path, name: Path) -> None:
+    """Remove a file of an earlier result; what has become a folder or lies behind a link is left alone."""
+    path = _folder_of(out, name) / name.name
+    if path.is_symlink() or path.is_file():
+        path.unlink()
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The JSON object in one of our own files; nothing where it is damaged or something else."""
+    try:
+        document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
+    except InputError:
+        return {}
+    return cast("dict[str, Any]", document) if isinstance(document, dict) else {}
+
+
+def _identity(path: Path) -> str | None:
+    """What the result or work described by ``path`` was made from, or None where the file is not ours."""
+    identity = _read(path).get("identity")
+    return identity if isinstance(identity, str) else None
+
+
+def _files(report: Path) -> list[str]:
+    """The files of the result that ``report`` describes; names of anything else do not count."""
+    names = _read(report).get("files")
+    listed = cast("list[object]", names) if isinstance(names, list) else []
+    return [str(name) for name in listed if is_inside(name) and Path(str(name)).parts[0] in RESULT]
+
+
+def _difference(out: Path, request: dict[str, Any]) -> str:
+    """Which parts of the request differ, in words."""
+    noted = _read(out / "stages" / "request.json").get("request")
+    before = _flat(cast("dict[str, Any]", noted) if isinstance(noted, dict) else {})
+    now = _flat(json.loads(json.dumps(request)))
+    names = [name for name in now if before.get(name) != now[name]] if before else []
+    return f" ({', '.join(names)} differ{'s' if len(names) == 1 else ''})" if names else ""
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    """Values of dictionaries in a dictionary, under their own names."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        flat |= value if isinstance(value, dict) else {name: value}
+    return flat

@@ -1,0 +1,193 @@
+"""New drives through a scene as videos, pictures or arrays."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8, UInt16
+
+from dreamdrive.data.size import MIN_SIDE_PX, check_largest
+from dreamdrive.data.video_writer import write_video
+from dreamdrive.drive import RATES_HZ, Drive, frame_rate
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_folder
+from dreamdrive.machine import free_bytes
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show import panels
+from dreamdrive.show.videos import write_png
+from dreamdrive.splat import SceneView, render_scene
+
+Show = Literal["colour", "depth", "dynamic", "static"]
+Format = Literal["mp4", "png", "npz"]
+
+NOTE = "render.json"
+"""What lies beside pictures and arrays: calibration, poses and times; a folder without it is not replaced."""
+PER_METRE = 256
+"""What a depth of one metre is in a 16-bit PNG, as in KITTI: up to 256 m in steps of 4 mm."""
+_BYTES_PER_PX = 200
+"""Memory that rendering and encoding take a pixel: 190 for a video of 3840x2160, less for the others."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is shown of a drive, and how it is kept.
+
+    Attributes:
+        show: Everything, its depth, or the dynamic or the static part alone.
+        format: A video, or a folder with a picture or with arrays a frame.
+        size: Width and height in pixels; None is those of the recording.
+        fps: Rate of a video; None is that of the drive.
+    """
+
+    show: Show = "colour"
+    format: Format = "mp4"
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+
+
+def check_size(look: Look) -> None:
+    """Refuse sizes that cannot be rendered or kept, before anything is loaded.
+
+    Raises:
+        InputError: The size is too small, too large, or odd for a video.
+    """
+    if look.size is None:
+        return
+    width, height = look.size
+    check_largest(look.size, f"--size {width}x{height}")
+    if min(look.size) < MIN_SIDE_PX:
+        raise InputError(f"--size {width}x{height}: expected sides of at least {MIN_SIDE_PX} pixels")
+    if look.format == "mp4" and (width % 2 or height % 2):
+        raise InputError(
+            f"--size {width}x{height}: a video has even sides; choose "
+            f"{width - width % 2}x{height - height % 2}, or --format png"
+        )
+    needed, free = width * height * _BYTES_PER_PX, free_bytes()
+    if free is not None and needed > free:
+        raise InputError(
+            f"--size {width}x{height} takes about {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB of memory "
+            "are free; choose a smaller size"
+        )
+
+
+def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Callable[[int], None]) -> None:
+    """Render a drive and write it; the result appears when it is whole.
+
+    A video holds colours; depth has those of ``drive.panels``. A folder holds one file a frame: ``NNNN.png``,
+    8-bit RGB or depth in 16 bits (see ``depth_png``), or ``NNNN.npz``: ``colour`` float32 (H, W, 3) in
+    [0, 1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing;
+    ``alpha`` float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has
+    calibration, poses and times. One frame is held at a time.
+
+    Args:
+        path: The video or folder; a folder is replaced if this function wrote it.
+        scene: What to render.
+        drive: The drive.
+        look: What to show, and how.
+        progress: Called with the number of frames done.
+
+    Raises:
+        InputError: It cannot be written, or the rate is none of a video.
+    """
+    camera = view_camera(scene.cameras[0], look.size)
+    part = look.show if look.show in ("dynamic", "static") else "all"
+
+    def views() -> Iterator[SceneView]:
+        for i, pose in enumerate(drive.path.world_from_camera):
+            yield render_scene(scene, camera.at(pose), float(drive.path.times_s[i]), part=part)
+            progress(i + 1)
+
+    if look.format == "mp4":
+        write_video(path, (_picture(view, look.show) for view in views()), video_rate(drive, look))
+        return
+    _check_replaceable(path)
+    with new_folder(path, replace=True, mark=NOTE) as folder:
+        for i, view in enumerate(views()):
+            _write_frame(folder / f"{i:04d}.{look.format}", view, look.show)
+        (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, look), allow_nan=False) + "\n")
+
+
+def video_rate(drive: Drive, look: Look) -> float:
+    """Frames a second of a video of a drive.
+
+    Raises:
+        InputError: No video has that rate.
+    """
+    rate = frame_rate(drive.path) if look.fps is None else look.fps
+    if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
+        raise InputError(
+            f"--trajectory {drive.name} has {rate:.3g} poses a second, and a video {RATES_HZ[0]:g} to "
+            f"{RATES_HZ[1]:g} frames: give --fps"
+        )
+    return rate
+
+
+def view_camera(camera: Camera, size: tuple[int, int] | None) -> Camera:
+    """A camera at another size: the same horizontal field of view and shape of pixels.
+
+    The principal point keeps its share of the width and of the height: a higher picture of the same width
+    shows more above and below.
+    """
+    if size is None:
+        return camera
+    (width, height), scale = size, size[0] / camera.width_px
+    return replace(camera.resized(width, height), fx_px=camera.fx_px * scale, fy_px=camera.fy_px * scale)
+
+
+def depth_png(view: SceneView) -> UInt16[np.ndarray, "h w"]:
+    """Depth along z in 16 bits, in units of ``1 / PER_METRE`` metres.
+
+    0 is where there is nothing, 65535 is 256 m and all that is farther.
+    """
+    depth = np.rint(np.minimum(view.depth_m.numpy() * PER_METRE, np.iinfo(np.uint16).max))
+    return depth.astype(np.uint16)
+
+
+def _picture(view: SceneView, show: Show) -> UInt8[np.ndarray, "h w 3"]:
+    if show == "depth":
+        return panels.depth_colours(view.depth_m.numpy())
+    return panels.to_bytes(view.colour.numpy())
+
+
+def _write_frame(path: Path, view: SceneView, show: Show) -> None:
+    if path.suffix == ".npz":
+        # Compressing would save a quarter of the space and take ten times as long.
+        colour, depth_m, alpha = view.colour.numpy(), view.depth_m.numpy(), view.alpha.numpy()
+        if show == "depth":
+            np.savez(path, depth_m=depth_m, alpha=alpha)
+        else:
+            np.savez(path, colour=colour, depth_m=depth_m, alpha=alpha)
+    elif show == "depth":
+        path.write_bytes(cv2.imencode(".png", depth_png(view))[1].tobytes())
+    else:
+        write_png(path, _picture(view, show))
+
+
+def _note(camera: Camera, drive: Trajectory, look: Look) -> dict[str, Any]:
+    """Calibration as ``--intrinsics`` reads it (pixels by integer index), path as ``--trajectory`` does."""
+    intrinsics = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
+    unit = {"depth_unit": f"1/{PER_METRE} m"} if (look.show, look.format) == ("depth", "png") else {}
+    return {
+        "show": look.show,
+        **unit,
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "intrinsics": intrinsics,
+        "world_from_camera": drive.world_from_camera.tolist(),
+        "times_s": drive.times_s.tolist(),
+    }
+
+
+def _check_replaceable(path: Path) -> None:
+    """A folder that was written here may be replaced unless something was put into it since."""
+    names = [p.name for p in path.iterdir()] if path.is_dir() else []
+    foreign = [name for name in names if name != NOTE and not re.fullmatch(r"\d{4,}\.(png|npz)", name)]
+    if foreign:
+        raise InputError(f"{path} holds other files ({', '.join(sorted(foreign)[:3])}); choose another place")

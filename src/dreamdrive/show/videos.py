@@ -1,0 +1,196 @@
+"""What ``generate`` shows of a scene: videos, withheld frames, a picture of the geometry."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, Int, UInt8
+from torch import Tensor
+
+from dreamdrive.data import Lens
+from dreamdrive.data.video_writer import write_video
+from dreamdrive.drive import frame_rate, manoeuvre, smooth, up_of
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_file
+from dreamdrive.progress import Progress
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show import panels
+from dreamdrive.splat import render, render_scene
+
+SHIFT_M = 2.0
+"""How far to the right the shifted drive goes."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Gaussians of the static fit with their dynamic scores, for the panel that shows them.
+
+    Attributes:
+        gaussians: N Gaussians.
+        scores: Scores (N,) in [0, 1].
+        threshold: Score above which a Gaussian votes for moving (eq. 9).
+    """
+
+    gaussians: Gaussians
+    scores: Float[Tensor, " n"]
+    threshold: float
+
+
+def write_videos(
+    folder: Path,
+    scene: Scene,
+    recorded: UInt8[np.ndarray, "f h w 3"],
+    scored: Scored | None,
+    progress: Progress,
+) -> None:
+    """Write ``drive.mp4``, ``shift.mp4``, ``recorded_beside_rendered.mp4`` and ``panels.mp4``.
+
+    All show the rig's first camera; of several, ``surround.mp4`` shows what each of them sees.
+
+    Args:
+        folder: Where to.
+        scene: What to show.
+        recorded: The frames of that camera as recorded (F, H, W, 3), in the source's distortion.
+        scored: Dynamic scores; without them their panel is black.
+        progress: Called with frames done and frames in all.
+    """
+    rate = frame_rate(scene.trajectory)
+    drive = smooth(scene.trajectory)
+    smooth_hz = frame_rate(drive)
+    shifted = manoeuvre("shift", drive, up_of(scene), SHIFT_M)
+    lens = lens_of(scene)
+    drives: list[tuple[str, Iterator[UInt8[np.ndarray, "h w 3"]], float]] = [
+        ("drive", drive_frames(scene, drive, lens), smooth_hz),
+        ("shift", drive_frames(scene, shifted), smooth_hz),
+        ("recorded_beside_rendered", _beside(scene, recorded, lens), rate),
+        ("panels", _panels(scene, scored), rate),
+    ]
+    total = len(drive) + len(shifted) + 2 * len(scene.front)
+    if scene.camera is not None:
+        drives.append(("surround", _surround(scene, scene.camera), rate))
+        total += len(scene.front)
+    done = 0
+
+    def counted(frames: Iterator[UInt8[np.ndarray, "h w 3"]]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        nonlocal done
+        for frame in frames:
+            yield frame
+            done += 1
+            progress(done, total)
+
+    for name, frames, fps in drives:
+        write_video(folder / f"{name}.mp4", counted(frames), fps)
+
+
+def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
+    """Write the view of each withheld frame as ``NNNN.png``, in the source's distortion.
+
+    Args:
+        folder: Where to.
+        scene: What to render.
+        source_index: Index of each frame of the scene in the source: the number in the name. Of several
+            cameras, those after the first add ``_cameraK``.
+    """
+    lens = lens_of(scene)
+    for i in np.flatnonzero(scene.held_out).tolist():
+        camera = 0 if scene.camera is None else int(scene.camera[i])
+        image = as_recorded(scene, scene.cameras[i], float(scene.times_s[i]), lens, camera)
+        write_png(folder / f"{source_index[i]:04d}{f'_camera{camera}' if camera else ''}.png", image)
+
+
+def write_png(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
+    """Write an RGB picture; the file appears when it is whole.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    encoded = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))[1]
+    with new_file(path) as partial:
+        partial.write_bytes(encoded.tobytes())
+
+
+def drive_frames(
+    scene: Scene, drive: Trajectory, lens: Lens | None = None
+) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    """The frames of a drive, with the camera of the recording, one at a time."""
+    for pose, t_s in zip(drive.world_from_camera, drive.times_s.tolist(), strict=True):
+        yield as_recorded(scene, scene.cameras[0].at(pose), t_s, lens)
+
+
+def as_recorded(
+    scene: Scene, camera: Camera, t_s: float, lens: Lens | None, of_rig: int = 0
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A view as a camera of the rig would have shown it, with the distortion of its lens if it has one."""
+    if lens is None:
+        return panels.to_bytes(render_scene(scene, camera, t_s, of_rig=of_rig).colour.numpy())
+    wide = lens.covering().at(camera.world_from_camera)
+    return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s, of_rig=of_rig).colour.numpy(), wide))
+
+
+def lens_of(scene: Scene) -> Lens | None:
+    """The lens of the recording, where its distortion is known."""
+    values: Any = scene.provenance.get("lens")
+    try:
+        return None if values is None else Lens.from_json(values)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"the scene's lens cannot be used ({error}); generate it again") from error
+
+
+def _beside(
+    scene: Scene, recorded: UInt8[np.ndarray, "f h w 3"], lens: Lens | None
+) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    for frame, rendered in zip(recorded, drive_frames(scene, scene.trajectory, lens), strict=True):
+        yield panels.beside(frame, rendered)
+
+
+def _surround(scene: Scene, camera: Int[np.ndarray, " f"]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    """All cameras of the rig at each time: above what looks ahead, below what looks back, mirrored."""
+    front = scene.cameras[0].camera_from_world
+    rig = np.unique(camera).tolist()
+    views = {index: np.flatnonzero(camera == index).tolist() for index in rig}
+    ahead = {index: front[:3, :3] @ scene.cameras[views[index][0]].world_from_camera[:3, 2] for index in rig}
+    above = sorted((i for i in rig if ahead[i][2] > 0), key=lambda i: ahead[i][0])
+    below = sorted((i for i in rig if ahead[i][2] <= 0), key=lambda i: ahead[i][0])
+    for step in range(min(len(each) for each in views.values())):
+        rows: list[UInt8[np.ndarray, "h w 3"]] = []
+        for row in (above, below):
+            frames = [(i, views[i][step]) for i in row]
+            seen = [as_recorded(scene, scene.cameras[f], float(scene.times_s[f]), None, i) for i, f in frames]
+            rows += [np.concatenate(seen, axis=1)] if seen else []
+        width = max(row.shape[1] for row in rows)
+        yield np.concatenate([np.pad(r, ((0, 0), (0, width - r.shape[1]), (0, 0))) for r in rows])
+
+
+def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    front = scene.front.tolist()
+    near = {frame: front[max(k - 1, 0) : k + 2] for k, frame in enumerate(front)}
+    for frame in front:
+        camera, t_s = scene.cameras[frame], float(scene.times_s[frame])
+        whole = render_scene(scene, camera, t_s)
+        still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
+        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near[frame])
+        yield panels.parts(
+            panels.to_bytes(still.numpy()),
+            panels.to_bytes(moving.numpy()),
+            panels.score_colours(score.numpy()),
+            panels.depth_colours(whole.depth_m.numpy()),
+        )
+
+
+@torch.no_grad()
+def _score_image(scored: Scored, camera: Camera, frames: list[int]) -> Float[Tensor, "h w"]:
+    """Scores composited like colour (eq. 8).
+
+    The seeds hold a moving thing once a frame; of those only the ones from ``frames`` are shown.
+    """
+    near = torch.isin(scored.gaussians.source_frame, torch.tensor(frames))
+    rows = torch.nonzero(near | (scored.scores <= scored.threshold)).squeeze(1)
+    shown = scored.gaussians.select(rows)
+    return render(shown, camera, channels=scored.scores[rows][:, None], sh_degree=0).channels[..., 0]

@@ -1,0 +1,261 @@
+"""A drive through a world: its frames and the truth behind them, as the nouns that stages exchange."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Ground
+from dreamdrive.scene.layout import Ego, Layout, track_function
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.render import WorldView, look
+from dreamdrive.world.streets import StreetOptions, draw_street
+from dreamdrive.world.world import World, upright
+
+Mount = Literal["front", "front_left", "front_right", "back", "back_left", "back_right"]
+_MOUNT_YAW_RAD: dict[Mount, float] = {
+    "front": 0.0,
+    "front_left": np.deg2rad(55),
+    "front_right": -np.deg2rad(55),
+    "back": np.pi,
+    "back_left": np.deg2rad(110),
+    "back_right": -np.deg2rad(110),
+}
+# Axes of a camera that looks ahead: x right, y down, z ahead.
+_LEVEL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+MOUNTS: tuple[Mount, ...] = tuple(_MOUNT_YAW_RAD)
+"""The cameras of the car, the front one first."""
+_MOUNT_OUT_M = 0.5
+_FOCAL = 0.8  # of the width: 64 degrees across
+
+
+@dataclass(frozen=True)
+class WorldBox:
+    """The hull of a road user.
+
+    Attributes:
+        instance: Label of its pixels, from 1.
+        id: Its name in the layout.
+        kind: What it is.
+        moving: Whether it ever moves.
+        size_m: Length, width and height (3,), along its x (ahead), y (left) and z (up).
+        world_from_box: Pose of its centre (F, 4, 4) at each frame.
+    """
+
+    instance: int
+    id: str
+    kind: str
+    moving: bool
+    size_m: Float[np.ndarray, "3"]
+    world_from_box: Float[np.ndarray, "f 4 4"]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One camera's drive; world = the camera of the first frame, metres. Truth is that of pixel centres.
+
+    Attributes:
+        frames: RGB (F, H, W, 3).
+        times_s: Times (F,), from 0.
+        cameras: Posed pinholes (F,).
+        depth_m: Depth along z (F, H, W); 0 in the sky.
+        instance: Labels (F, H, W): 0 for none, otherwise :attr:`WorldBox.instance`.
+        semantic: Classes (F, H, W), see ``materials.Semantic``.
+        moving: Pixels of moving road users (F, H, W).
+        flow_px: Way of each point to its place in the next frame (F, H, W, 2), the last to one not drawn.
+        boxes: Hulls of all road users.
+        ground: The road plane.
+        layout: What the street is made from.
+        world_from_map: Pose (4, 4) of the layout's frame.
+    """
+
+    frames: UInt8[np.ndarray, "f h w 3"]
+    times_s: Float[np.ndarray, " f"]
+    cameras: tuple[Camera, ...]
+    depth_m: Float[np.ndarray, "f h w"]
+    instance: Int[np.ndarray, "f h w"]
+    semantic: UInt8[np.ndarray, "f h w"]
+    moving: Bool[np.ndarray, "f h w"]
+    flow_px: Float[np.ndarray, "f h w 2"]
+    boxes: tuple[WorldBox, ...]
+    ground: Ground
+    layout: Layout
+    world_from_map: Float[np.ndarray, "4 4"]
+
+    @property
+    def sky(self) -> Bool[np.ndarray, "f h w"]:
+        """Sky masks (F, H, W)."""
+        return self.depth_m == 0
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The path of the camera."""
+        return Trajectory(np.stack([c.world_from_camera for c in self.cameras]), self.times_s)
+
+    @cached_property
+    def world(self) -> World:
+        """The street, for views from elsewhere; one that was read is built when it is first looked at."""
+        return World(self.layout)
+
+    @cached_property
+    def map_from_world(self) -> Float[np.ndarray, "4 4"]:
+        """Inverse of ``world_from_map``."""
+        return np.linalg.inv(self.world_from_map)
+
+    def views(self, cameras: Sequence[Camera], times_s: Sequence[float]) -> list[WorldView]:
+        """What cameras elsewhere in the world see, each at its time; flow leads 0.1 s ahead."""
+        placed = [self._placed(c) for c in cameras]
+        later = [t + 0.1 for t in times_s]
+        return list(_looks(self.world, placed, list(times_s), placed, later, antialiased=True))
+
+    def _placed(self, camera: Camera) -> Camera:
+        return camera.at(self.map_from_world @ camera.world_from_camera)
+
+
+def ego_poses(
+    ego: Ego, times_s: Float[np.ndarray, " f"], mount: Mount = "front"
+) -> Float[np.ndarray, "f 4 4"]:
+    """``map_from_camera`` (F, 4, 4) of a camera of the recording car, which nods and rolls a little."""
+    pitch = ego.shake_rad * np.sin(4.1 * times_s + 0.7)
+    roll = 0.7 * ego.shake_rad * np.sin(2.3 * times_s + 1.9)
+    mounted = _mounted(mount)
+    poses: list[np.ndarray] = []
+    for place, p, r in zip(track_function(ego.track)(times_s), pitch, roll, strict=True):
+        pose = upright(place)
+        about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
+        about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
+        nodding = pose[:3, :3] @ about_y @ about_x
+        pose[:3, :3] = nodding @ mounted[:3, :3] @ _LEVEL
+        pose[:3, 3] += nodding @ mounted[:3, 3] + [0, 0, ego.camera_height_m]
+        poses.append(pose)
+    return np.stack(poses)
+
+
+def front_from_mount(mount: Mount) -> Float[np.ndarray, "4 4"]:
+    """Pose (4, 4) of a camera of the car in the frame of its front camera."""
+    mounted = _mounted(mount)
+    pose = np.eye(4)
+    pose[:3, :3] = _LEVEL.T @ mounted[:3, :3] @ _LEVEL
+    pose[:3, 3] = _LEVEL.T @ mounted[:3, 3]
+    return pose
+
+
+def _mounted(mount: Mount) -> Float[np.ndarray, "4 4"]:
+    """Pose of a camera on the car: x ahead, y left, z up from the front camera."""
+    turn = _MOUNT_YAW_RAD[mount]
+    out = 0.0 if mount == "front" else _MOUNT_OUT_M
+    return upright(np.array([out * np.cos(turn), out * np.sin(turn), turn]))
+
+
+def drive(
+    layout: Layout,
+    frames: int,
+    fps: float = 10.0,
+    size: tuple[int, int] = (320, 192),
+    *,
+    world: World | None = None,
+    mount: Mount = "front",
+    antialiased: bool = True,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Drive:
+    """Drive through the street of a layout.
+
+    Args:
+        layout: The street.
+        frames: Number of frames.
+        fps: Frames a second.
+        size: Width and height in pixels; the horizontal field of view is 64 degrees.
+        world: The same street, if it is made already.
+        mount: Which camera of the car.
+        antialiased: Whether edges take more than one ray a pixel.
+        progress: Called with frames done and frames in all.
+    """
+    if frames < 1 or fps <= 0 or min(size) < 2:
+        raise ValueError(f"world: cannot drive {frames} frames of {size} at {fps}/s")
+    world = World(layout) if world is None else world
+    times = np.arange(frames + 1) / fps
+    poses = ego_poses(layout.ego, times, mount)
+    focal_px = _FOCAL * size[0]
+    pinhole = Camera(focal_px, focal_px, size[0] / 2, size[1] / 2, *size)
+    placed = [pinhole.at(pose) for pose in poses]
+    seen: list[WorldView] = []
+    for view in _looks(world, placed[:-1], times[:-1], placed[1:], times[1:], antialiased=antialiased):
+        seen.append(view)
+        progress(len(seen), frames)
+    world_from_map = np.linalg.inv(poses[0])
+    # The product of the first pose with its inverse is the identity only up to rounding; say it exactly.
+    cameras = [pinhole, *(pinhole.at(world_from_map @ pose) for pose in poses[1:-1])]
+    made = Drive(
+        frames=np.stack([v.frame for v in seen]),
+        times_s=times[:-1],
+        cameras=tuple(cameras),
+        depth_m=np.stack([v.depth_m for v in seen]),
+        instance=np.stack([v.instance for v in seen]),
+        semantic=np.stack([v.semantic for v in seen]),
+        moving=np.stack([v.moving for v in seen]),
+        flow_px=np.stack([v.flow_px for v in seen]),
+        boxes=_boxes(world, times[:-1], world_from_map),
+        ground=road_plane(world_from_map),
+        layout=layout,
+        world_from_map=world_from_map,
+    )
+    vars(made)["world"] = world  # it is there already
+    return made
+
+
+def make_street(
+    seed: int = 0,
+    frames: int = 24,
+    fps: float = 10.0,
+    size: tuple[int, int] = (320, 192),
+    *,
+    movers: int | None = None,
+    parked: int | None = None,
+    speed_m_s: float | None = None,
+    camera_height_m: float = 1.5,
+) -> Drive:
+    """Draw a street and drive through it; None leaves a choice to the seed."""
+    options = StreetOptions(frames / fps, speed_m_s, movers, parked, camera_height_m)
+    return drive(draw_street(seed, options), frames, fps, size)
+
+
+def road_plane(world_from_map: Float[np.ndarray, "4 4"]) -> Ground:
+    """The plane z = 0 of the map in the world."""
+    up = world_from_map[:3, 2]
+    return Ground(up, float(-up @ world_from_map[:3, 3]))
+
+
+def _looks(
+    world: World,
+    cameras: Sequence[Camera],
+    times_s: Sequence[float] | np.ndarray,
+    next_cameras: Sequence[Camera],
+    next_times_s: Sequence[float] | np.ndarray,
+    *,
+    antialiased: bool,
+) -> Iterator[WorldView]:
+    """Pictures of cameras in the map frame, two at a time: NumPy and Embree leave Python's lock alone."""
+
+    def one(k: int) -> WorldView:
+        following = float(next_times_s[k]), next_cameras[k]
+        return look(world, world.at(float(times_s[k])), cameras[k], following, antialiased=antialiased)
+
+    yield one(0)  # what is made on first use is made once
+    with ThreadPoolExecutor(2) as pool:
+        yield from pool.map(one, range(1, len(cameras)))
+
+
+def _boxes(world: World, times_s: np.ndarray, world_from_map: np.ndarray) -> tuple[WorldBox, ...]:
+    found: list[WorldBox] = []
+    for mover in world.movers:
+        size = np.array(mover.box.size_m)
+        lifted = np.eye(4)
+        lifted[2, 3] = size[2] / 2
+        poses = np.stack([world_from_map @ mover.pose(float(t)) @ lifted for t in times_s])
+        found.append(WorldBox(mover.instance, mover.box.id, mover.box.kind, mover.moving, size, poses))
+    return tuple(found)

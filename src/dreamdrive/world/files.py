@@ -1,0 +1,254 @@
+"""Worlds on disk: what each camera records, and all truth beside it."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import cv2
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from dreamdrive.data.array_file import read_npz
+from dreamdrive.data.camera_models import IndexedPinhole
+from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
+from dreamdrive.data.picture_file import read_picture
+from dreamdrive.data.rig import write_rig
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.json_file import of_type, read_json
+from dreamdrive.scene.camera import check_rigid
+from dreamdrive.scene.layout import Layout, Size
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.corruption import Corruption
+from dreamdrive.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
+from dreamdrive.world.layout_picture import draw_layout
+from dreamdrive.world.materials import Semantic
+
+_MOST_PIXELS = 500_000_000
+"""More pixels of all frames would take more than 20 GB with their depth, flow and labels."""
+_Row = tuple[float, float, float, float]
+_Pose = tuple[_Row, _Row, _Row, _Row]
+
+
+class _Hull(msgspec.Struct):
+    """A road user of boxes.json."""
+
+    instance: Annotated[int, Meta(ge=1, le=MOST_BOXES)]
+    id: str
+    kind: str
+    moving: bool
+    size_m: tuple[Size, Size, Size]
+    world_from_box: list[_Pose]
+
+
+class _Path(msgspec.Struct):
+    """What poses.json holds."""
+
+    world_from_camera: Annotated[list[_Pose], Meta(min_length=1)]
+    times_s: Annotated[list[float], Meta(min_length=1)]
+
+
+class _Hulls(msgspec.Struct):
+    """What boxes.json holds."""
+
+    boxes: list[_Hull]
+    world_from_map: _Pose
+
+
+MARK = "layout.json"
+"""By this file a world folder is known."""
+
+
+def write_world(
+    drives: Mapping[Mount, Drive], path: Path, *, corruption: Corruption | None = None, replace: bool = False
+) -> None:
+    """Write a world folder; it appears whole or not at all.
+
+    ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
+    itself. Of every camera there are: ``frames/NNNN.png``; ``cameras.json`` (calibration and poses, principal
+    point by integer pixel index) and ``depth/NNNN.npz`` (``depth_m``, 0 in the sky), which together are what
+    ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``); ``flow.npz`` (``flow_px``, to
+    the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
+    ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
+    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``.
+
+    Args:
+        drives: One for each camera, by its mount.
+        path: The folder.
+        corruption: What was done to the frames, noted in ``cameras.json``.
+        replace: Whether an existing world folder may be replaced.
+
+    Raises:
+        InputError: Something else is at ``path``, or it cannot be written; what was there stays.
+    """
+    first = next(iter(drives.values()))
+    if len(first.boxes) > MOST_BOXES:
+        raise ValueError(f"world: {len(first.boxes)} boxes do not fit 8-bit labels")
+    with new_folder(path, replace=replace, mark=MARK) as folder:
+        write_layout(first.layout, folder / "layout.json")
+        seconds = float(first.times_s[-1])
+        _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
+        _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
+        if len(drives) > 1:
+            write_rig({name: front_from_mount(name) for name in drives}, folder, "cameras.json")
+        for name, drive in drives.items():
+            place = folder if len(drives) == 1 else folder / name
+            place.mkdir(exist_ok=True)
+            _write_camera(drive, place, corruption)
+
+
+def read_world(path: Path, camera: str = "front") -> Drive:
+    """Read one camera's drive from a world folder.
+
+    Args:
+        path: The folder that :func:`write_world` wrote.
+        camera: Which of several cameras; a folder of one camera holds that one alone.
+
+    Raises:
+        InputError: It is no world folder, or a part of it is missing, damaged or of another size.
+    """
+    if not (path / "layout.json").is_file():
+        raise InputError(
+            f"{path} is no world: layout.json is missing; expected a folder of dreamdrive world make"
+        )
+    layout = read_layout(path / "layout.json")
+    folder = path if (path / "frames").is_dir() else path / camera
+    if not folder.is_dir():
+        raise InputError(f"{path} holds neither frames nor a camera {camera!r}; make the world again")
+    try:
+        return _read_camera(folder, layout)
+    except (OSError, ValueError, MemoryError) as error:
+        raise InputError(f"{folder} is not a complete world ({error}); make it again") from error
+
+
+def _read_camera(folder: Path, layout: Layout) -> Drive:
+    calibration = folder / "cameras.json"
+    pinhole = of_type(read_json(calibration), IndexedPinhole, str(calibration)).camera()
+    stored = of_type(read_json(folder / "poses.json"), _Path, str(folder / "poses.json"))
+    path = Trajectory(np.array(stored.world_from_camera), np.array(stored.times_s))
+    hulls = of_type(read_json(folder / "boxes.json"), _Hulls, str(folder / "boxes.json"))
+    if len(stored.world_from_camera) != len(path.times_s):
+        raise ValueError(
+            f"poses.json has {len(stored.world_from_camera)} poses for {len(path.times_s)} times"
+        )
+    times_s = path.times_s
+    shape = len(times_s), pinhole.height_px, pinhole.width_px
+    world_from_map = np.array(hulls.world_from_map)
+    check_rigid(world_from_map, "world_from_map of boxes.json")
+    _check_size(shape)
+    return Drive(
+        frames=_images(folder / "frames", (*shape, 3))[..., ::-1].copy(),
+        times_s=times_s,
+        cameras=tuple(pinhole.at(pose) for pose in path.world_from_camera),
+        depth_m=np.stack([_array(path, "depth_m", shape[1:]) for path in _depth_files(folder, len(times_s))]),
+        instance=_images(folder / "instances", shape).astype(np.int32),
+        semantic=_images(folder / "semantics", shape),
+        moving=_images(folder / "moving", shape) > 0,
+        flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
+        boxes=tuple(_box(values, len(times_s)) for values in hulls.boxes),
+        ground=road_plane(world_from_map),
+        layout=layout,
+        world_from_map=world_from_map,
+    )
+
+
+def _check_size(shape: tuple[int, int, int]) -> None:
+    """Whether the frames fit into memory with all that is known of each pixel, before any of it is taken."""
+    count, height, width = shape
+    if count * height * width > _MOST_PIXELS:
+        raise ValueError(f"{count} frames of {width}x{height} are more than {_MOST_PIXELS:g} pixels")
+
+
+def _depth_files(folder: Path, count: int) -> list[Path]:
+    return [folder / "depth" / f"{i:04d}.npz" for i in range(count)]
+
+
+def _images(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
+    images = np.zeros(shape, dtype=np.uint8)
+    for i in range(len(images)):
+        path = folder / f"{i:04d}.png"
+        images[i] = _of_shape(path, read_picture(path, f"{path.parent.name}/{path.name}"), shape[1:])
+    return images
+
+
+def _array(path: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    # At most of doubles.
+    stored = read_npz(path, [name], at_most=8 * math.prod(shape))
+    return _of_shape(path, stored.get(name), shape)
+
+
+def _of_shape(path: Path, values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+    if values is None or values.shape != shape:
+        got = "no such array" if values is None else f"shape {values.shape}"
+        raise ValueError(f"{path.name} of {path.parent.name} holds {got}, expected {shape}")
+    return values
+
+
+def _box(values: "_Hull", frames: int) -> WorldBox:
+    poses = np.array(values.world_from_box)
+    if len(poses) != frames:
+        raise ValueError(f"box {values.id} of boxes.json has {len(poses)} poses for {frames} frames")
+    check_rigid(poses, f"world_from_box of {values.id} in boxes.json")
+    return WorldBox(values.instance, values.id, values.kind, values.moving, np.array(values.size_m), poses)
+
+
+def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> None:
+    for name, images in (
+        ("frames", drive.frames[..., ::-1]),
+        ("instances", drive.instance.astype(np.uint8)),
+        ("semantics", drive.semantic),
+        ("moving", drive.moving.astype(np.uint8) * 255),
+        ("sky", drive.sky.astype(np.uint8) * 255),
+    ):
+        (folder / name).mkdir()
+        for i, image in enumerate(images):
+            _write_png(folder / name / f"{i:04d}.png", image)
+    (folder / "depth").mkdir()
+    for place, depth_m in zip(_depth_files(folder, len(drive.depth_m)), drive.depth_m, strict=True):
+        np.savez_compressed(place, depth_m=depth_m)
+    np.savez_compressed(folder / "flow.npz", flow_px=drive.flow_px)
+    made = {} if corruption is None else {"corruption": asdict(corruption)}
+    poses = {"world_from_camera": drive.trajectory.world_from_camera.tolist()}
+    _write_json(folder / "cameras.json", {**_calibration(drive), **poses, **made})
+    _write_json(folder / "poses.json", {**poses, "times_s": drive.times_s.tolist()})
+    _write_json(
+        folder / "boxes.json", {"boxes": _boxes(drive), "world_from_map": drive.world_from_map.tolist()}
+    )
+
+
+def _write_png(path: Path, image: np.ndarray) -> None:
+    path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
+
+
+def _write_json(path: Path, values: dict[str, Any]) -> None:
+    """Values as readable JSON without NaN."""
+    path.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _calibration(drive: Drive) -> dict[str, Any]:
+    camera = drive.cameras[0]
+    intrinsics = {
+        "fx": camera.fx_px,
+        "fy": camera.fy_px,
+        "cx": camera.cx_px - 0.5,
+        "cy": camera.cy_px - 0.5,
+    }
+    return {"width": camera.width_px, "height": camera.height_px, "intrinsics": intrinsics}
+
+
+def _boxes(drive: Drive) -> list[dict[str, Any]]:
+    return [
+        {
+            "instance": box.instance,
+            "id": box.id,
+            "kind": box.kind,
+            "moving": box.moving,
+            "size_m": box.size_m.tolist(),
+            "world_from_box": box.world_from_box.tolist(),
+        }
+        for box in drive.boxes
+    ]

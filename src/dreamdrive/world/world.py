@@ -1,0 +1,160 @@
+"""A street made from a layout: to be looked at from any camera at any time, with everything known exactly."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from embreex.rtcore import EmbreeDevice
+from jaxtyping import Float
+
+from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_function
+from dreamdrive.world.bodies import Part, body
+from dreamdrive.world.ground import GroundMap, paint_ground
+from dreamdrive.world.materials import Materials, Semantic
+from dreamdrive.world.mesh import Mesh
+from dreamdrive.world.scenery import scenery
+from dreamdrive.world.sky import Sky, make_sky
+from dreamdrive.world.solid import Solid
+
+_AHEAD_M, _BESIDE_M = 80.0, 32.0
+_WAY_STEP_S = 0.05
+
+
+@dataclass(frozen=True)
+class Mover:
+    """A box of the layout with its body.
+
+    Attributes:
+        box: The box.
+        instance: Label of its pixels, from 1.
+        moving: Whether it ever moves.
+        parts: Its rigid pieces.
+        places: From times (T,) to x, y and yaw (T, 3).
+        way_m: From times (T,) to the way travelled since time 0.
+    """
+
+    box: Box
+    instance: int
+    moving: bool
+    parts: list[Part]
+    places: Callable[[np.ndarray], np.ndarray]
+    way_m: Callable[[np.ndarray], np.ndarray]
+
+    def pose(self, t_s: float) -> Float[np.ndarray, "4 4"]:
+        """``map_from_body`` (4, 4)."""
+        return upright(self.places(np.array([t_s]))[0])
+
+    def part_poses(self, t_s: float) -> list[Float[np.ndarray, "4 4"]]:
+        """``map_from_part`` of each part."""
+        pose, way = self.pose(t_s), float(self.way_m(np.array([t_s]))[0])
+        return [pose if part.turn is None else pose @ part.turn(way) for part in self.parts]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A world at a time.
+
+    Attributes:
+        time_s: The time.
+        moving: The movers' triangles.
+        poses: ``map_from_part`` (P, 4, 4) of each part; triangles say which is theirs.
+    """
+
+    time_s: float
+    moving: Solid
+    poses: Float[np.ndarray, "p 4 4"]
+
+
+class World:
+    """The street of a layout, in the map frame.
+
+    Attributes:
+        layout: What it is made from.
+        materials: Of all its surfaces.
+        ground: The map as it is painted.
+        sky: Its light.
+        movers: All boxes.
+        standing: All triangles that never move.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.materials = Materials()
+        self.ground: GroundMap = paint_ground(layout, _bounds(layout))
+        self.sky: Sky = make_sky(layout.light, layout.seed)
+        self.ground_material = self.materials.add(self.ground.image, Semantic.ROAD)
+        self.movers = [self._mover(i + 1, box) for i, box in enumerate(layout.boxes)]
+        still = scenery(layout, self.ground, self.ground_material, self.materials)
+        parked = [m for m in self.movers if not m.moving]
+        meshes = [_posed(m, 0.0) for m in parked]
+        owners = [np.full(len(mesh), m.instance) for m, mesh in zip(parked, meshes, strict=True)]
+        self._device = EmbreeDevice()
+        self.standing = Solid(
+            Mesh.joined([still, *meshes]),
+            np.concatenate([np.zeros(len(still), dtype=np.int64), *owners]),
+            self._device,
+        )
+
+    def poses(self, t_s: float) -> Float[np.ndarray, "p 4 4"]:
+        """``map_from_part`` of all parts of moving boxes at a time."""
+        poses = [pose for mover in self.movers if mover.moving for pose in mover.part_poses(t_s)]
+        return np.stack(poses) if poses else np.zeros((0, 4, 4))
+
+    def at(self, t_s: float) -> Moment:
+        """The world at a time."""
+        parts = [part.mesh for mover in self.movers if mover.moving for part in mover.parts]
+        poses = self.poses(t_s)
+        owner = np.repeat(np.arange(len(parts)), [len(mesh) for mesh in parts])
+        mesh = Mesh.joined([mesh.moved(pose) for mesh, pose in zip(parts, poses, strict=True)])
+        return Moment(t_s, Solid(mesh, owner, self._device), poses)
+
+    @cached_property
+    def part_instance(self) -> np.ndarray:
+        """Instance of each moving part, in the order of ``Moment.poses``."""
+        return np.array([m.instance for m in self.movers if m.moving for _ in m.parts], dtype=np.int64)
+
+    def exposure(self, t_s: float) -> float:
+        """Brightness of the recording camera at a time."""
+        phase = np.random.default_rng([self.layout.seed, 10]).uniform(0, 2 * np.pi)
+        return 1 + self.layout.light.exposure_drift * float(np.sin(1.1 * t_s + phase))
+
+    def _mover(self, instance: int, box: Box) -> Mover:
+        parts = body(box.kind, box.size_m, box.look, self.materials)
+        places = track_function(box.track)
+        return Mover(box, instance, is_moving(box.track), parts, places, _way(box.track, places))
+
+
+def upright(place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:
+    """Pose on the ground from x, y and yaw."""
+    cos, sin = np.cos(place[2]), np.sin(place[2])
+    pose = np.eye(4)
+    pose[:2, :2] = [[cos, -sin], [sin, cos]]
+    pose[:2, 3] = place[:2]
+    return pose
+
+
+def _posed(mover: Mover, t_s: float) -> Mesh:
+    poses = mover.part_poses(t_s)
+    return Mesh.joined([part.mesh.moved(pose) for part, pose in zip(mover.parts, poses, strict=True)])
+
+
+def _way(
+    track: list[TrackPoint], places: Callable[[np.ndarray], np.ndarray]
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Way travelled at times (T,) since time 0, on the track and on its straight continuation."""
+    start, end = min(0.0, track[0].t_s) - 5.0, track[-1].t_s + 5.0
+    times = np.arange(start, end, _WAY_STEP_S)
+    steps = np.linalg.norm(np.diff(places(times)[:, :2], axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    way -= np.interp(0.0, times, way)
+    return lambda wanted: np.interp(wanted, times, way)
+
+
+def _bounds(layout: Layout) -> tuple[float, float, float, float]:
+    """What of the map is painted: the way of the car and what it sees from there."""
+    ego = np.array([[p.x_m, p.y_m, p.yaw_rad] for p in layout.ego.track])
+    ahead = np.stack([np.cos(ego[:, 2]), np.sin(ego[:, 2])], axis=-1)
+    points = np.concatenate([ego[:, :2] + reach * ahead for reach in (-15.0, 0.0, _AHEAD_M)])
+    low, high = points.min(0) - _BESIDE_M, points.max(0) + _BESIDE_M
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -1,0 +1,87 @@
+"""Focal lengths from pointmaps."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+from tests.geometry.backends.dust3r.align.pairs import street, window
+
+from dreamdrive.geometry.backends.dust3r.align.focal import (
+    FocalRule,
+    focal_px,
+    focal_votes,
+    median_px,
+    robust_px,
+    weiszfeld_px,
+)
+from dreamdrive.geometry.weighted import weighted_median
+from geometry.simulated_pairs import Noise, pair_maps
+
+CASES = ["exact", "noise", "noise_outliers", "portrait", "zeros", "negative", "pp", "wide", "tele"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_papers_rules_are_golden(golden_dir: Path, case: str) -> None:
+    wanted = json.loads((golden_dir / "dust3r/weiszfeld.json").read_text())[case]
+    points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")[case]
+    principal = tuple(wanted["pp"])
+    assert weiszfeld_px(points, principal) == pytest.approx(wanted["weiszfeld"], rel=1e-6)
+    assert median_px(points, principal) == pytest.approx(wanted["median"], rel=1e-6)
+    clipped = weiszfeld_px(points, principal, (0.5, 3.5))
+    assert clipped == pytest.approx(wanted["weiszfeld_clipped"], rel=1e-6)
+
+
+def test_a_fifth_of_gross_golden_outliers_moves_the_robust_rule_by_little(golden_dir: Path) -> None:
+    points = load_file(golden_dir / "dust3r/weiszfeld_inputs.safetensors")["noise_outliers"]
+    assert abs(weiszfeld_px(points) / 36 - 1) > 0.5
+    assert abs(robust_px(points) / 36 - 1) < 0.015
+
+
+def test_masked_pixels_do_not_count() -> None:
+    points = _plane(40, 24, 36.0)
+    points[:8, :, :2] *= 6
+    confidence = np.full((24, 40), 3.0, np.float32)
+    confidence[:8] = 1
+    assert focal_px(points, confidence) == pytest.approx(36, rel=1e-5)
+    assert abs(focal_px(points, confidence, "weiszfeld") / 36 - 1) > 0.02
+
+
+@pytest.mark.parametrize("rule", ["robust", "weiszfeld", "median"])
+def test_a_pinhole_beside_the_middle_with_oblong_pixels(rule: FocalRule) -> None:
+    columns, rows = np.meshgrid((np.arange(40) - 17) / 36, (np.arange(24) - 14) / 18)
+    depth = 4 + 0.05 * np.arange(24)[:, None] + 0 * columns
+    points = np.stack([columns * depth, rows * depth, depth], axis=-1).astype(np.float32)
+    assert focal_px(points, None, rule, (17, 14), 2.0) == pytest.approx(36, rel=1e-5)
+    assert abs(focal_px(points, None, rule) / 36 - 1) > 0.05
+
+
+def test_nothing_to_go_by_is_not_a_focal_length() -> None:
+    assert np.isnan(robust_px(_plane(8, 6, 9.0), np.ones((6, 8))))
+
+
+def test_votes_share_a_focal_length_and_tell_their_spread() -> None:
+    truth = street(12, 64, 36)
+    exact = focal_votes(pair_maps(truth, window(12), Noise(0, 1 / 8, 0, 0, 0)))
+    assert exact.shared_px == pytest.approx(truth.focal_px, rel=1e-5)
+    assert exact.spread < 1e-5
+    noisy = focal_votes(pair_maps(truth, window(12), Noise(focal=0.05)))
+    assert noisy.shared_px == pytest.approx(truth.focal_px, rel=0.03)
+    assert 0.03 < noisy.spread < 0.08
+    assert noisy.per_image_px(12).shape == (12,)
+    assert np.abs(noisy.per_image_px(12) / truth.focal_px - 1).max() < 0.12
+
+
+def test_weighted_median() -> None:
+    assert weighted_median(np.array([3.0, 1.0, 2.0]), np.array([1.0, 1.0, 1.0])) == 2
+    assert weighted_median(np.array([3.0, 1.0, np.nan]), np.array([5.0, 1.0, 9.0])) == 3
+    assert np.isnan(weighted_median(np.array([1.0]), np.array([0.0])))
+
+
+def _plane(width: int, height: int, focal: float) -> np.ndarray:
+    columns, rows = np.meshgrid(
+        (np.arange(width) - width / 2) / focal, (np.arange(height) - height / 2) / focal
+    )
+    depth = 4 + 0.05 * np.arange(height)[:, None] + 0 * columns
+    return np.stack([columns * depth, rows * depth, depth], axis=-1).astype(np.float32)

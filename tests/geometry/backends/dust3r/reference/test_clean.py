@@ -1,0 +1,37 @@
+"""Points that contradict other images lose their confidence."""
+
+from pathlib import Path
+
+import numpy as np
+from tests.geometry.backends.dust3r.align.goldens import scene
+
+from dreamdrive.geometry.backends.dust3r.reference.clean import clean, world_points
+
+
+def test_it_is_golden(golden_dir: Path) -> None:
+    _, _, wanted = scene(golden_dir, "A")
+    images = range(5)
+    final = {key[13:]: value for key, value in wanted.items() if key.startswith("cosine.final.")}
+    found = clean(
+        [wanted[f"im_conf.{i}"] for i in images],
+        [final[f"depth.{i}"] for i in images],
+        [final[f"pts3d.{i}"] for i in images],
+        final["poses"],
+        final["focals"],
+    )
+    for image in images:
+        np.testing.assert_array_equal(found[image], wanted[f"clean_conf.{image}"])
+
+
+def test_a_floater_goes_and_what_it_hid_stays() -> None:
+    depth = [np.full((10, 12), 4.0), np.full((10, 12), 4.0)]
+    depth[0][4:6, 5:7] = 1.0
+    trust = [np.full((10, 12), 2.0), np.full((10, 12), 5.0)]
+    poses = np.stack([np.eye(4), np.eye(4)])
+    points = [world_points(each, np.eye(4), 10.0) for each in depth]
+    found = clean(trust, depth, points, poses, np.array([10.0, 10.0]))
+    assert (found[0][4:6, 5:7] == 0).all()
+    assert (found[0] == 0).sum() == 4
+    np.testing.assert_array_equal(found[1], trust[1])
+    trusted = clean([trust[1], trust[0]], depth, points, poses, np.array([10.0, 10.0]))
+    assert (trusted[0] > 0).all()

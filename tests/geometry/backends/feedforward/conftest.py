@@ -1,0 +1,51 @@
+"""A street, its clip, and packages that know the truth of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from tests.geometry.backends.feedforward.fakes import KINDS, Truth, install, save_weights
+from tests.streets import street_clip
+from torch import Tensor
+
+from dreamdrive.geometry.fitting import Fitting
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.world import Drive, make_street
+
+FRAMES, SIZE = 8, (160, 96)
+
+
+@pytest.fixture(scope="session")
+def drive() -> Drive:
+    return make_street(5, FRAMES, 5.0, SIZE, movers=0)
+
+
+@pytest.fixture(scope="session")
+def clip(drive: Drive) -> Clip:
+    return replace(street_clip(drive, 4), known=Known(), features={})
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture
+def truth(drive: Drive, shown: dict[Fitting, Tensor]) -> Truth:
+    return Truth(drive, shown=shown)
+
+
+@pytest.fixture
+def weights(kind: str, truth: Truth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The weights of a kind whose package can be imported; torch hub has the encoder of MapAnything."""
+    install(monkeypatch, truth, kind)
+    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
+    (tmp_path / "hub" / "facebookresearch_dinov2_main").mkdir(parents=True)
+    return save_weights(tmp_path / "weights", kind)
+
+
+@pytest.fixture(scope="session")
+def shown() -> dict[Fitting, Tensor]:
+    """Pictures of the street, made once."""
+    return {}

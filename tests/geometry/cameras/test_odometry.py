@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
+
+from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive
+from dreamdrive.geometry.evidence import look as evidence
+
+
+def run(path: np.ndarray, blank_road: bool = False) -> Odometry:
+    clip = make_clip(path)
+    seen = evidence.look(clip)
+    grey = seen.grey.copy()
+    if blank_road:
+        grey[:, 92:] = 100
+    return drive(grey, seen.street, seen.small, clip.times_s, HEIGHT_M)
+
+
+def test_a_turn_is_followed() -> None:
+    path = turning(8, 0.6, 4.0)
+    found = run(path)
+    assert found.measured
+    assert path_error(found.world_from_camera, path) < 0.01
+
+
+def test_a_fast_turn_counts_as_motion() -> None:
+    assert evidence.look(make_clip(turning(6))).motion.moving.all()
+
+
+def test_a_stop_and_go_drive_stops_and_goes_again() -> None:
+    steps = [0.5, 0.5, 0.5, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5]
+    found = run(straight(steps))
+    assert (found.step_m[3:6] == 0).all()
+    np.testing.assert_allclose(found.step_m[[0, 1, 2, 6, 7, 8]], 0.5, rtol=0.15)
+
+
+def test_a_road_without_texture_gives_a_constant_speed_and_says_so() -> None:
+    found = run(straight([0.5] * 5), blank_road=True)
+    assert not found.measured
+    np.testing.assert_allclose(found.step_m, DEFAULT_SPEED_M_S * 0.1)
+
+
+def test_a_standing_camera_stays_where_it_is() -> None:
+    found = run(straight([0.0] * 4))
+    np.testing.assert_array_equal(found.world_from_camera, np.tile(np.eye(4), (5, 1, 1)))
+    assert found.step_m == pytest.approx(0.0)

@@ -1,0 +1,107 @@
+"""Warps, correlation and the plane sweep against exact geometry."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.geometry import toy
+
+from dreamdrive.geometry.depth import smoothing, sweep
+from dreamdrive.geometry.depth.one_frame import sweep_frames
+from dreamdrive.geometry.depth.view import make_view, single_threaded_opencv
+from dreamdrive.scene.camera import Camera
+
+
+def turned(angle: float, shift: tuple[float, float, float]) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3] = cv2.Rodrigues(np.array([0.1 * angle, angle, -0.05 * angle]))[0]
+    pose[:3, 3] = shift
+    return pose
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    angle=st.floats(-0.2, 0.2),
+    shift=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    inverse=st.floats(0.0, 0.3),
+)
+def test_warp_and_homography_agree_with_projection(angle, shift, inverse):
+    reference = Camera(90.0, 100.0, 33.0, 22.0, 64, 48)
+    source = reference.at(turned(angle, shift))
+    x, y = sweep.Warp(reference, source)(inverse)
+    point = reference.rays()[10, 20]
+    seen = source.matrix @ (source.world_from_camera[:3, :3].T @ (point - inverse * np.array(shift)))
+    if seen[2] > 0.1:
+        expected = seen[:2] / seen[2] - 0.5
+        np.testing.assert_allclose([x[10, 20], y[10, 20]], expected, atol=1e-2)
+        mapped = sweep.Warp(reference, source).homography(inverse) @ [20, 10, 1]
+        np.testing.assert_allclose(mapped[:2] / mapped[2], expected, atol=1e-6)
+
+
+def test_correlation_ignores_gain_and_noise_on_flat_pictures():
+    texture = toy.TEXTURES[0][:40, :50].astype(np.float32)
+    correlation = sweep.Correlation(texture)
+    assert np.median(correlation(texture)) > 0.95
+    assert np.median(correlation(0.5 * texture + 60)) > 0.9
+    noise = np.random.default_rng(1).normal(0, 1, (2, 40, 50)).astype(np.float32)
+    flat = sweep.Correlation(100 + noise[0])(100 + noise[1])
+    assert np.abs(flat).max() < 0.15
+
+
+def test_sources_are_used_frames_on_both_sides_at_the_wanted_baselines():
+    positions = np.zeros((12, 3))
+    positions[:, 2] = 0.5 * np.arange(12)
+    usable = np.ones(12, bool)
+    assert sweep.choose_sources(positions, usable, 6) == (2, 4, 8, 10)
+    usable[[4, 8]] = False
+    chosen = sweep.choose_sources(positions, usable, 6)
+    assert usable[list(chosen)].all()
+    assert min(chosen) < 6 < max(chosen)
+
+
+def test_smoothing_carries_depth_into_a_blank_and_refines_between_labels():
+    work = smoothing.Workspace(9, 16, 20)
+    labels = np.arange(16)[None, :, None]
+    work.cost[:] = 0.02 * (labels - 7.3) ** 2
+    work.cost[3:6, :, 8:12] = 0.5
+    found = smoothing.best_label(smoothing.semi_global(work, np.full((9, 20), 100, np.float32)))
+    np.testing.assert_allclose(found, 7.3, atol=0.35)
+
+
+@pytest.fixture(scope="module")
+def street():
+    return toy.drive([])
+
+
+def test_depth_of_road_and_walls_is_right(street):
+    view = make_view(street.clip, street.posed.cameras, street.posed.fixed_regions, street.posed.ground)
+    with single_threaded_opencv():
+        swept = sweep_frames(view, street.depth_m == 0)[3]
+    assert swept is not None
+    true = street.depth_m[3]
+    inverse = np.where(true > 0, 1 / np.maximum(true, 0.1), 0)
+    near = (true > 4) & (true < 25)
+    error = np.abs(swept.inverse_depth / np.maximum(inverse, 1e-6) - 1)
+    rows, columns = np.indices(true.shape)
+    road = (
+        near
+        & (np.abs(true * (columns + 0.5 - toy.WIDTH / 2) / toy.FOCAL_PX) < toy.WALL_M - 0.5)
+        & (rows > 72)
+    )
+    wall = near & (np.abs(true * (columns + 0.5 - toy.WIDTH / 2) / toy.FOCAL_PX) > toy.WALL_M - 0.01)
+    assert np.median(error[road]) < 0.02
+    assert np.median(error[wall]) < 0.03
+    assert (error[wall] < 0.1).mean() > 0.8
+    assert (swept.inverse_depth[true == 0] < 0.01).mean() > 0.9
+
+
+def test_without_a_ground_the_road_is_found_from_its_texture(street):
+    view = make_view(street.clip, street.posed.cameras, street.posed.fixed_regions, None)
+    with single_threaded_opencv():
+        swept = sweep_frames(view, street.depth_m == 0)[3]
+    assert swept is not None
+    assert not swept.on_plane.any()
+    true = street.depth_m[3]
+    near = (true > 4) & (true < 12)
+    assert np.median(np.abs(swept.inverse_depth[near] * true[near] - 1)) < 0.05

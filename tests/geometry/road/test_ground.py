@@ -1,0 +1,91 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.geometry.toy_drive import HEIGHT_M, make_clip, straight, turning
+
+from dreamdrive.geometry.cameras.posing import pose_clip
+from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.road.ground_points import fit_points
+from dreamdrive.geometry.road.ground_sweep import Road, sweep
+from dreamdrive.geometry.road.scale import Street, asked_m_s, from_ground, from_road_points
+from dreamdrive.scene.trajectory import Trajectory
+
+
+@pytest.mark.parametrize("path", [straight([0.6] * 7), turning(8, 0.6, 3.0)], ids=["straight", "turning"])
+def test_the_sweep_finds_the_height_of_a_rendered_road(path: np.ndarray) -> None:
+    clip = make_clip(path)
+    seen = evidence.look(clip)
+    plane = sweep(Road(seen.grey, seen.street, seen.small, path))
+    assert plane is not None
+    assert plane.height == pytest.approx(HEIGHT_M, rel=0.02)
+    assert plane.normal @ [0, -1, 0] > np.cos(np.radians(1.0))
+
+
+def test_points_give_the_height_although_most_lie_elsewhere() -> None:
+    rng = np.random.default_rng(0)
+    path = straight([0.6] * 10)
+    road = np.stack([rng.uniform(-4, 4, 200), rng.normal(1.5, 0.01, 200), rng.uniform(3, 15, 200)], axis=1)
+    walls = np.stack([rng.choice([-6, 6], 400), rng.uniform(-4, 1.4, 400), rng.uniform(3, 25, 400)], axis=1)
+    plane = fit_points(np.concatenate([road, walls.astype(float)]), path, 0)
+    assert plane is not None
+    assert plane.height == pytest.approx(1.5, rel=0.01)
+    assert plane.support > 150
+
+
+def test_a_shelf_above_the_road_is_not_the_road() -> None:
+    rng = np.random.default_rng(0)
+    path = straight([0.6] * 10)
+    shelf = np.stack([rng.uniform(2, 4, 300), rng.normal(0.7, 0.01, 300), rng.uniform(3, 15, 300)], axis=1)
+    road = np.stack([rng.uniform(-4, 4, 200), rng.normal(1.5, 0.01, 200), rng.uniform(3, 15, 200)], axis=1)
+    plane = fit_points(np.concatenate([shelf, road]), path, 0)
+    assert plane is not None
+    assert plane.height == pytest.approx(1.5, rel=0.02)
+
+
+def test_a_blank_road_gives_an_assumed_speed_and_says_so() -> None:
+    clip = make_clip(straight([0.6] * 5))
+    seen = evidence.look(clip)
+    grey = seen.grey.copy()
+    grey[:, 90:] = 100
+    street = Street(grey, seen.street, seen.small, straight([0.3] * 5), np.zeros((0, 3)), clip.times_s)
+    metric = from_ground(street, None, 0.0, 0)
+    assert metric.ground is None
+    assert metric.scale.source.startswith("none:")
+    assert metric.scale.spread >= 0.5
+    assert metric.factor * 0.3 / 0.1 == pytest.approx(8.0)
+    assert metric.notes
+    asked = from_ground(replace(street, asked_m_s=5.0), None, 0.0, 0)
+    assert asked.factor * 0.3 / 0.1 == pytest.approx(5.0)
+    assert "a speed of 5 m/s is taken as asked for" in asked.scale.source
+    assert asked.scale.spread == metric.scale.spread
+
+
+def test_a_scale_by_the_road_is_as_uncertain_as_the_focal_length() -> None:
+    clip, rng = make_clip(straight([0.6] * 5)), np.random.default_rng(0)
+    road = np.stack([rng.uniform(-4, 4, 300), rng.normal(1.5, 0.01, 300), rng.uniform(3, 15, 300)], axis=1)
+    grey, camera = np.zeros((6, 40, 64), np.uint8), clip.rig[0]
+    street = Street(grey, grey == 0, camera, straight([0.6] * 5), road, clip.times_s)
+    found = [from_road_points(street, 1.5, spread, 0) for spread in (0.0, 0.05, 0.35)]
+    exact, network, assumed = (each.scale.spread for each in found if each is not None)
+    assert exact < 0.1
+    assert network == pytest.approx(np.hypot(exact, 0.05))
+    assert assumed == pytest.approx(np.hypot(exact, 0.35))
+
+
+def test_the_speed_that_was_asked_for_is_that_of_the_moving_part() -> None:
+    clip = make_clip(straight([0.6] * 5))
+    assert asked_m_s(clip) is None
+    path = Trajectory(straight([0.0, 0.5, 0.5, 0.5, 0.5]), clip.times_s)
+    assert asked_m_s(replace(clip, requested=path)) == pytest.approx(5.0)
+    stands = Trajectory(straight([0.0] * 5), clip.times_s)
+    assert asked_m_s(replace(clip, requested=stands)) is None
+
+
+def test_the_camera_height_gives_metres() -> None:
+    posed = pose_clip(make_clip(straight([0.5] * 7)), camera_height_m=HEIGHT_M)
+    assert posed.cameras[-1].world_from_camera[2, 3] == pytest.approx(3.5, rel=0.03)
+    assert posed.ground is not None
+    assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)
+    assert "1.50 m (given)" in posed.scale.source
+    assert posed.scale.spread < 0.1

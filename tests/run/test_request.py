@@ -1,0 +1,58 @@
+"""What decides over a result counts by its content."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dreamdrive.geometry import GeometryOptions
+from dreamdrive.options import QUALITIES
+from dreamdrive.run import request
+from dreamdrive.run.request import request_of
+from dreamdrive.scene.control import Control
+
+
+def test_the_lens_of_a_model_is_taken_out_of_the_frames(tmp_path: Path) -> None:
+    frames = [{"file_path": f"{i}.png", "transform_matrix": np.eye(4).tolist()} for i in range(2)]
+    shared = {"w": 64, "h": 40, "fl_x": 60.0, "k1": -0.1}
+    path = tmp_path / "transforms.json"
+    path.write_text(json.dumps({**shared, "frames": frames}))
+    assert request._with_lens(Control(), path).intrinsics == path
+    assert request._with_lens(Control(), tmp_path).intrinsics == path
+    own = Control(intrinsics=tmp_path / "own.json")
+    assert request._with_lens(own, path) == own
+    path.write_text(json.dumps({**shared, "k1": 0.0, "frames": frames}))
+    assert request._with_lens(Control(), path) == Control()
+
+
+def test_all_that_decides_over_the_geometry_decides_over_the_result(tmp_path: Path) -> None:
+    path = tmp_path / "poses.txt"
+    path.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    before = request._digests(Control(), path, None)
+    (tmp_path / "geometry.json").write_text("{}")
+    assert request._digests(Control(), path, None) != before
+
+
+@pytest.mark.parametrize("folder", ["frames", "rig"])
+def test_pictures_in_folders_below_the_input_count(tmp_path: Path, folder: str) -> None:
+    picture = tmp_path / ("frames" if folder == "frames" else "left") / "0000.png"
+    picture.parent.mkdir()
+    if folder == "rig":
+        (tmp_path / "rig.json").write_text("{}")
+    picture.write_bytes(b"one")
+    before = request._digests(Control(tmp_path), None, None)
+    picture.write_bytes(b"two")
+    assert request._digests(Control(tmp_path), None, None) != before
+
+
+def test_changed_options_have_no_name_and_what_is_chosen_beside_the_quality_does_not_matter() -> None:
+    draft = QUALITIES["draft"]
+    street = replace(draft, representation="static", geometry=GeometryOptions(camera_height_m=2.0))
+    own = replace(draft, fit=replace(draft.fit, steps=7))
+    made = [request_of(Control(seed=3), prior="street-world", options=one) for one in ("draft", street, own)]
+    assert [one.quality for one in made] == ["draft", "draft", "custom"]
+    assert [one.options.seed for one in made] == [3, 3, 3]
+    assert made[1].document["options"]["camera_height_m"] == 2.0
+    assert made[2].document["options"]["fit"]["steps"] == 7

@@ -1,0 +1,88 @@
+"""Videos and withheld frames: the right number, size, rate and distortion."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tests.scene.scenes import make_scene
+
+from dreamdrive.data import Lens
+from dreamdrive.data.distortion import Distortion
+from dreamdrive.drive.manoeuvres import frame_rate, smooth, up_of
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.show.videos import _surround, as_recorded, lens_of, write_held_out
+
+
+def distorted(scene: Scene) -> Scene:
+    lens = Lens(Distortion("opencv", (-0.3, 0.05, 0.0, 0.0)), scene.cameras[0])
+    return replace(scene, provenance={"lens": lens.to_json(), "up": [0.0, -0.8, 0.6]})
+
+
+def test_withheld_frames_carry_their_source_index_and_size(tmp_path: Path) -> None:
+    write_held_out(tmp_path, make_scene(), [20, 22, 24])
+    assert [p.name for p in tmp_path.iterdir()] == ["0022.png"]
+    image = cv2.imread(str(tmp_path / "0022.png"))
+    assert image is not None
+    assert image.shape == (24, 33, 3)
+
+
+def test_views_carry_the_distortion_of_the_source(tmp_path: Path) -> None:
+    scene = distorted(make_scene())
+    lens = lens_of(scene)
+    assert lens is not None
+    camera = scene.cameras[0].at(np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -6], [0, 0, 0, 1.0]]))
+    plain, bent = as_recorded(scene, camera, 0.4, None), as_recorded(scene, camera, 0.4, lens)
+    assert plain.shape == bent.shape
+    assert (plain != bent).any()
+    # A barrel lens leaves the middle where it is and shows more at the rim, with no empty corners.
+    assert np.abs(plain[10:14, 14:19].astype(int) - bent[10:14, 14:19]).mean() < 8
+    assert lens.covered(lens.covering()).all()
+
+
+def test_what_a_scene_remembers_of_its_making() -> None:
+    scene = make_scene()
+    assert lens_of(replace(scene, provenance={})) is None
+    assert up_of(replace(scene, provenance={})).tolist() == [0, -1, 0]
+    assert up_of(distorted(scene)).tolist() == [0, -0.8, 0.6]
+
+
+def test_drives_are_made_smooth_without_moving_recorded_frames() -> None:
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    poses[:, 2, 3] = [0, 1, 3, 6, 10]
+    path = Trajectory(poses, np.arange(5) / 5)
+    fine = smooth(path)
+    assert frame_rate(path) == 5
+    assert round(frame_rate(fine), 6) == 20
+    assert len(fine) == 17
+    np.testing.assert_allclose(fine.world_from_camera[::4], poses, atol=1e-9)
+    assert frame_rate(Trajectory(poses[:1], np.zeros(1))) == 10
+
+
+def test_of_a_rig_the_other_cameras_carry_their_number(tmp_path: Path) -> None:
+    scene = replace(make_scene(), camera=np.array([0, 1, 0]), exposure=None)
+    write_held_out(tmp_path, scene, [4, 4, 5])
+    assert [path.name for path in tmp_path.iterdir()] == ["0004_camera1.png"]
+
+
+def test_all_cameras_of_a_rig_are_shown_in_one_picture() -> None:
+    """What looks ahead is above, from left to right; what looks back below."""
+    scene, turned = make_scene(), [0.0, 1.0, -1.0, np.pi]
+    cameras = []
+    for yaw in turned:
+        pose = np.eye(4)
+        pose[:3, :3] = cv2.Rodrigues(np.array([0.0, yaw, 0.0]))[0]
+        cameras.append(scene.cameras[0].at(pose))
+    rig = np.arange(4)
+    scene = replace(
+        scene, cameras=tuple(cameras), times_s=np.zeros(4), held_out=rig < 0, camera=rig, exposure=None
+    )
+    picture = next(_surround(scene, rig))
+    height, width = scene.cameras[0].height_px, scene.cameras[0].width_px
+    assert picture.shape == (2 * height, 3 * width, 3)
+    order = [2, 0, 1]
+    for column, camera in enumerate(order):
+        shown = picture[:height, column * width : (column + 1) * width]
+        np.testing.assert_array_equal(shown, as_recorded(scene, scene.cameras[camera], 0.0, None, camera))
+    assert (picture[height:, width:] == 0).all()
