@@ -58,7 +58,7 @@ def test_importing_the_package_and_the_commands_loads_nothing_heavy() -> None:
 def test_the_command_offers_what_there_is() -> None:
     hints = get_type_hints(generate_command)
     assert set(get_args(get_args(hints["prior"])[0])) == set(PRIORS)
-    assert set(get_args(hints["geometry"])) == set(BACKENDS)
-    assert set(get_args(hints["representation"])) == set(REPRESENTATIONS)
+    assert set(get_args(get_args(hints["geometry"])[0])) == set(BACKENDS)
+    assert set(get_args(get_args(hints["representation"])[0])) == set(REPRESENTATIONS)
     assert set(get_args(hints["quality"])) == set(QUALITIES) == set(get_args(QualityName))
     assert set(get_args(get_args(hints["recompute_from"])[0])) == set(STAGES)

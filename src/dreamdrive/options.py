@@ -58,11 +58,8 @@ class Options:
         ``score`` trains the classifier of the decomposition and changes no Gaussian.
         """
         fits = {"static": self.static.steps, "fit": self.fit.steps}
-        return (
-            {**fits, "score": self.score.steps}
-            if REPRESENTATIONS[self.representation].moves == "scored"
-            else fits
-        )
+        scored = REPRESENTATIONS[self.representation].moves == "scored"
+        return {**fits, "score": self.score.steps} if scored else fits
 
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.

@@ -61,7 +61,7 @@ def generate(
         Literal["static", "deformable", "hexplane", "vibration", "hybrid"] | None,
         arg(help_behavior_hint="(default: hybrid)"),
     ] = None,
-    device: Literal["cpu", "cuda"] = "cpu",
+    device: Annotated[Literal["cpu", "cuda"] | None, arg(help_behavior_hint="(default: cpu)")] = None,
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
@@ -140,8 +140,9 @@ def generate(
     chosen = QUALITIES[quality] if options is None else read_options(options, QUALITIES[quality])
     how = {"method": geometry, "camera_height_m": camera_height, "refine_poses": refine_poses or None}
     how = replace(chosen.geometry, **{name: value for name, value in how.items() if value is not None})
-    representation = representation or chosen.representation
-    chosen = replace(chosen, geometry=how, representation=representation, device=device)
+    given = {"representation": representation, "device": device}
+    given = {name: value for name, value in given.items() if value is not None}
+    chosen = replace(chosen, geometry=how, **given)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(
