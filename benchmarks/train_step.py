@@ -47,7 +47,6 @@ STAGES = [
     (trainer_module, "recorded_picture", "sky and exposure"),
     (trainer_module, "render_loss", "L1 + SSIM"),
     (trainer_module, "geometry_loss", "depth and coverage losses"),
-    (trainer_module, "shape_loss", "shape loss"),
     (trainer_module, "_step", "Adam of the networks"),
     (Parameters, "step", "Adam of the Gaussians"),
     (Trainer, "_observe", "densification statistics"),

@@ -22,12 +22,6 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
-def golden_dir() -> Path:
-    """Numbers from upstream programs; the test is skipped where they are absent."""
-    return _shared("DREAMDRIVE_GOLDEN", "../shared/golden")
-
-
-@pytest.fixture(scope="session")
 def bench_dir() -> Path:
     """The scenes in ``DREAMDRIVE_BENCH``; the test is skipped where they are absent."""
     return _shared("DREAMDRIVE_BENCH", "../shared/bench")

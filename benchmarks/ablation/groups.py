@@ -1,4 +1,4 @@
-"""Other ways to decompose that hybrid is compared with: clusters of HDBSCAN and of voxels, scaled errors."""
+"""Other ways to decompose that hybrid is compared with: clusters of HDBSCAN and of voxels."""
 
 import math
 from collections.abc import Callable
@@ -25,8 +25,6 @@ METRES_PER_FEATURE = 0.5
 VOXEL_M = 1.0
 REACH_M = 1.5
 """Clusters of HDBSCAN that are no farther apart are one: else each frame of a near car is one of its own."""
-FULL_PERCENTILE = 98.0
-"""Of a frame's errors, which counts as 1 where they are scaled frame by frame."""
 Labels = Callable[[Float[np.ndarray, "m d"]], Int[np.ndarray, " m"]]
 """From what ``space_time`` gives to one label each, -1 for noise."""
 
@@ -88,12 +86,6 @@ def majority(
     known = labels >= 0
     wins = elected(labels[known], scores[known], options)
     return np.where(np.isin(labels, wins), np.searchsorted(wins, labels), -1)
-
-
-def scaled_by_frame(errors: Float[np.ndarray, "f h w"], full: float) -> Float[np.ndarray, "f h w"]:
-    """Each frame's errors over their own 98th percentile, which counts as ``full``."""
-    top = np.percentile(errors, FULL_PERCENTILE, axis=(1, 2), keepdims=True)
-    return (full * errors / np.maximum(top, 1e-6)).astype(errors.dtype)
 
 
 def space_time(

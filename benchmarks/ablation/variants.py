@@ -4,12 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import numpy as np
-
-from ablation.groups import by_density, by_density_and_features, by_voxels, scaled_by_frame
+from ablation.errors import by_frame, dssim_errors, feature_errors
+from ablation.groups import by_density, by_density_and_features, by_voxels
 from dreamdrive.motion import RepresentationName
 from dreamdrive.options import Quality
-from street.fit import Scale, Vote, own_scale, own_vote, with_steps
+from street.fit import Errors, Vote, own_errors, own_vote, with_steps
 from street.jobs import QUALITY
 
 
@@ -24,7 +23,7 @@ class Variant:
             neither, or evidence and a network's features.
         representation: What is fitted.
         vote: How scores become things.
-        scale: What the error maps are brought to before the scores are trained on them.
+        errors: What the scores are trained on.
     """
 
     about: str
@@ -32,7 +31,7 @@ class Variant:
     features: Literal["all", "evidence", "appearance", "none", "efficientnet"] = "all"
     representation: RepresentationName = "hybrid"
     vote: Vote = own_vote
-    scale: Scale = own_scale
+    errors: Errors = own_errors
 
 
 def scored(**changes: Any) -> Callable[[Quality], Quality]:
@@ -83,11 +82,6 @@ def ungrouped(quality: Quality) -> Quality:
     return grouped(clustering=False)(untracked(quality.cast.lifespan_frames)(quality))
 
 
-def by_frame(errors: np.ndarray, quality: Quality) -> np.ndarray:
-    """Error maps, each relative to its own frame."""
-    return scaled_by_frame(errors, quality.score.error_scale)
-
-
 VARIANTS = {
     "hybrid": Variant("all parts"),
     "static": Variant("no hybrid: nothing moves", representation="static"),
@@ -106,15 +100,13 @@ VARIANTS = {
         "appearance",
     ),
     "all-frames": Variant("scores splatted into all frames", scored(window=None)),
-    "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
-    "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
+    "dssim": Variant("(1 - SSIM) / 2 as error", errors=dssim_errors),
+    "feature-error": Variant("distance of splatted features (appearance) as error", errors=feature_errors),
     "error-scale-0.1": Variant("an error of 0.1 counts as 1, not of 0.2", scored(error_scale=0.1)),
     "error-scale-0.4": Variant("an error of 0.4 counts as 1", scored(error_scale=0.4)),
-    "error-by-frame": Variant("errors over the 98th percentile of their frame", scale=by_frame),
-    "dssim-by-frame": Variant("(1 - SSIM) / 2, scaled so", scored(error="dssim"), scale=by_frame),
-    "feature-error-by-frame": Variant(
-        "distance of features, scaled so", scored(error="features"), scale=by_frame
-    ),
+    "error-by-frame": Variant("errors over the 98th percentile of their frame", errors=by_frame(own_errors)),
+    "dssim-by-frame": Variant("(1 - SSIM) / 2, scaled so", errors=by_frame(dssim_errors)),
+    "feature-error-by-frame": Variant("distance of features, scaled so", errors=by_frame(feature_errors)),
     "hdbscan": Variant("clusters of HDBSCAN over space, time and score", vote=by_density),
     "hdbscan-features": Variant("the same, over Z_ref as well", vote=by_density_and_features),
     "voxels": Variant("clusters of touching voxels of 1 m and a frame", vote=by_voxels),
@@ -128,14 +120,12 @@ VARIANTS = {
     ),
     "no-lives": Variant("no tracks, and copies live for ever (eq. 11)", untracked(1e3)),
     "no-residual": Variant("tracks alone, F_deform stays 0", fitted_with(deformation_rate=0.0)),
-    "canonical-first": Variant("an actor's first frame is its canonical time", played(canonical="first")),
     "short-lives": Variant("what no other frame sees lives no longer", played(lasting=False)),
     "long-lives": Variant(
         "copies that others replace live three times as long", played(lifespan_frames=3.75)
     ),
     "paper-loss": Variant("joint fit with L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
     "no-depth": Variant("joint fit without the term on depth", fitted_with(depth_weight=0.0)),
-    "no-shape": Variant("joint fit without the term on elongation", fitted_with(shape_weight=0.0)),
     "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),
     "prefit-50": Variant("static fit of 50 steps, not 150", prefit(50)),
     "prefit-400": Variant("static fit of 400 steps", prefit(400)),

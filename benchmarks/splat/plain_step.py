@@ -7,9 +7,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from dreamdrive.fit.losses import WEIGHTS, LossName, shape_loss
+from dreamdrive.fit.losses import WEIGHTS, LossName
 from dreamdrive.fit.parameters import LearningRates, Parameters
-from dreamdrive.fit.trainer import SHAPE_EVERY, FitOptions, Model
+from dreamdrive.fit.trainer import FitOptions, Model
 from dreamdrive.fit.views import View
 from dreamdrive.motion import DeformationField
 from dreamdrive.scene.exposure import transform_colour
@@ -140,8 +140,6 @@ class PlainTrainer:
         loss = loss + geometry_loss(
             rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight, view.sky, *weights
         )
-        if step % SHAPE_EVERY == 0:
-            loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
         loss.backward()
         moving = 0.1**done if done >= options.warm_up else 0.0
         self.shared.param_groups[0]["lr"] = options.exposure_rate * 0.1**done

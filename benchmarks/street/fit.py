@@ -25,8 +25,8 @@ from street.case import Start
 PROBE_STEPS = 30
 Vote = Callable[[Start, torch.Tensor, Quality], Grouping]
 """From the scores of the seeds to what of them is dynamic, and in which thing."""
-Scale = Callable[[np.ndarray, Quality], np.ndarray]
-"""From error maps (F, H, W) to those that the scores are trained on."""
+Errors = Callable[[Start, Quality], np.ndarray]
+"""From a static fit to the error maps (F, H, W) that the scores are trained on."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,10 @@ def own_vote(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
     return group(begin.clip, begin.geometry, begin.seeds, scores, quality.group)
 
 
-def own_scale(errors: np.ndarray, quality: Quality) -> np.ndarray:
-    """Hybrid's errors: absolute."""
-    return errors
+def own_errors(begin: Start, quality: Quality) -> np.ndarray:
+    """Hybrid's errors: of colour, absolute."""
+    fitted = begin.static
+    return error_maps(begin.clip, begin.geometry, fitted.gaussians, fitted.sky, fitted.exposure)
 
 
 def fit_case(
@@ -80,11 +81,11 @@ def fit_case(
     representation: Representation,
     quality: Quality,
     vote: Vote = own_vote,
-    scale: Scale = own_scale,
+    errors: Errors = own_errors,
 ) -> Fitted:
     """Decompose, if the representation does, and fit."""
     at = time.process_time()
-    parts = _parts(begin, representation, quality, vote, scale)
+    parts = _parts(begin, representation, quality, vote, errors)
     steps_at: list[float] = []
     scene = fit(
         begin.clip,
@@ -102,16 +103,17 @@ def fit_case(
     return Fitted(scene, Cost(quality.fit.steps, end - at, step_s, threads()))
 
 
-def _parts(begin: Start, representation: Representation, quality: Quality, vote: Vote, scale: Scale) -> Parts:
+def _parts(
+    begin: Start, representation: Representation, quality: Quality, vote: Vote, errors: Errors
+) -> Parts:
     fitted, nothing = begin.static.gaussians, torch.zeros(0, dtype=torch.int64)
     if representation == "static":
         return Parts(fitted, fitted.select(nothing), None, ())
     if representation != "hybrid":
         return Parts(begin.seeds.select(nothing), fitted, None, ())
     clip, geometry, seeds = begin.clip, begin.geometry, begin.seeds
-    sky, exposure = begin.static.sky, begin.static.exposure
-    errors = scale(error_maps(clip, geometry, fitted, sky, exposure, quality.score.error), quality)
-    scores = score(clip, geometry, seeds, errors, quality.score, stage_seed(0, "score"), lambda *_: None)
+    maps = errors(begin, quality)
+    scores = score(clip, geometry, seeds, maps, quality.score, stage_seed(0, "score"), lambda *_: None)
     grouping = vote(begin, scores, quality)
     moving = cast(clip, geometry, seeds, grouping, quality.cast)
     return Parts(fitted.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)

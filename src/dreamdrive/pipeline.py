@@ -183,7 +183,7 @@ def decompose(
                 clip,
                 geometry,
                 seeds,
-                error_maps(clip, geometry, fitted, static.sky, static.exposure, o.score.error),
+                error_maps(clip, geometry, fitted, static.sky, static.exposure),
                 o.score,
                 stage_seed(o.seed, "score"),
                 work,

@@ -64,19 +64,6 @@ def test_copies_of_one_car_lie_on_top_of_each_other():
     assert spread < 0.2 * trail.std(dim=0).max()
 
 
-def test_another_canonical_time_puts_all_copies_at_the_same_places_in_the_world():
-    _, clip, geometry, seeds = scene()
-    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
-    middle, first = (
-        cast(clip, geometry, seeds, grouping, ActorOptions(canonical=time)) for time in ("middle", "first")
-    )
-    apart = first.gaussians.means - middle.gaussians.means
-    assert apart.norm(dim=1).min() > 0.5
-    for key in range(len(middle.tracks.times_s)):
-        track = middle.tracks.translation_m[0, key] - first.tracks.translation_m[0, key]
-        np.testing.assert_allclose(apart.numpy(), np.broadcast_to(track, apart.shape), atol=1e-4)
-
-
 def test_what_has_no_track_lives_as_long_as_is_asked():
     _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())

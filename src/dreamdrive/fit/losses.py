@@ -1,6 +1,5 @@
 """L_render: how far a rendered frame is from its reference (eq. 14), and what keeps geometry sane."""
 
-import math
 from typing import Any, Literal
 
 import torch
@@ -126,9 +125,3 @@ class _GeometryLoss(torch.autograd.Function):
     def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         d_depth_sum, d_alpha = ctx.saved_tensors
         return upstream[0] * d_depth_sum, upstream[0] * d_alpha, None, None, None, None, None
-
-
-def shape_loss(log_scales: Float[Tensor, "n 3"], ratio: float) -> Float[Tensor, ""]:
-    """Mean excess of the logarithm of largest over smallest scale beyond that of ``ratio`` (PhysGaussian)."""
-    spread = log_scales.amax(1) - log_scales.amin(1)
-    return torch.relu(spread - math.log(ratio)).mean()

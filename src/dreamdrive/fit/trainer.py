@@ -11,7 +11,7 @@ from dreamdrive import _native
 from dreamdrive.fit.activation import Activated, activate
 from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
-from dreamdrive.fit.losses import LossName, geometry_loss, render_loss, shape_loss
+from dreamdrive.fit.losses import LossName, geometry_loss, render_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
 from dreamdrive.motion import Motion
@@ -22,8 +22,6 @@ from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import one_torch_thread, rasterize
 
-# Steps between two looks at the shapes, as in drivestudio: they change slowly and all of them are looked at.
-SHAPE_EVERY = 10
 # Field of ``FitOptions`` that holds the step size of each of ``Motion.groups``.
 RATES = {"network": "deformation_rate", "planes": "plane_rate", "tracks": "track_rate"}
 
@@ -41,8 +39,6 @@ class FitOptions:
         depth_weight: Weight of the inverse-depth term (1/m), decayed to a tenth over the fit. Without it
             novel views lose 0.02 dB there.
         sky_weight: Weight of coverage in sky pixels.
-        shape_weight: Weight of ``shape_loss``, every ``SHAPE_EVERY`` steps.
-        shape_ratio: Elongation that is free.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
         plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times the
@@ -58,8 +54,6 @@ class FitOptions:
     sh_after: float = 0.4
     depth_weight: float = 0.5
     sky_weight: float = 0.05
-    shape_weight: float = 0.2
-    shape_ratio: float = 10.0
     warm_up: float = 0.1
     deformation_rate: float = 2e-3
     plane_rate: float = 2e-2
@@ -164,10 +158,6 @@ class Trainer:
         offsets_px = torch.zeros(len(activated.means), 2, device=model.device, requires_grad=True)
         rendered = _splat(activated, view.camera, offsets_px, None if done >= options.sh_after else 0)
         loss = _loss(model, rendered, view, sky, options, done)
-        if step % SHAPE_EVERY == 0:
-            shown = (model.static, None if moved is None else moved.gaussians)
-            log_scales = [part.log_scales for part in shown if part is not None]
-            loss = loss + options.shape_weight * shape_loss(torch.cat(log_scales), options.shape_ratio)
         if moved is not None and moved.penalty is not None:
             loss = loss + moved.penalty
         loss.backward()

@@ -6,13 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from tests.streets import small_street, street_clip, true_geometry
 
+from ablation import errors as errors_module
 from ablation import groups, variants
 from ablation import main as ablation
 from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
+from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
 
-PARTS = ("features", "representation", "vote", "scale")
+PARTS = ("features", "representation", "vote", "errors")
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class SimpleStart:
 def test_each_variant_changes_something_of_its_own_and_hybrid_nothing() -> None:
     def same(variant) -> bool:
         options = asdict(variant.change(ablation.QUALITY)) == asdict(ablation.QUALITY)
-        options &= variant.vote is variants.own_vote and variant.scale is variants.own_scale
+        options &= variant.vote is variants.own_vote and variant.errors is variants.own_errors
         return options and variant.features == "all" and variant.representation == "hybrid"
 
     assert [name for name, variant in ablation.VARIANTS.items() if same(variant)] == ["hybrid"]
@@ -141,9 +144,23 @@ def test_the_vote_is_that_of_eq_10() -> None:
     assert groups.majority(labels, scores, options).tolist() == [0] * 5 + [-1] * 10
 
 
+@pytest.mark.parametrize("name", ["dssim_errors", "feature_errors"])
+def test_every_error_is_largest_where_things_move(name: str) -> None:
+    street = small_street(size=(160, 96), frames=9)
+    clip, geometry = street_clip(street, hold_out=8), true_geometry(street)
+    seeds = initialise(clip, geometry, SeedOptions())
+    fitted = fit_static(clip, geometry, seeds, FitOptions(steps=40), 0, lambda *_: None)
+    begin = SimpleNamespace(clip=clip, geometry=geometry, seeds=seeds, static=fitted)
+    errors = getattr(errors_module, name)(begin, None)
+    seen = ~clip.held_out
+    assert (errors >= 0).all()
+    assert (errors <= 1).all()
+    assert errors[seen][street.moving[seen]].mean() > 1.3 * errors[seen][~street.moving[seen]].mean()
+
+
 def test_errors_over_those_of_their_frame_do_not_depend_on_its_light() -> None:
     errors = np.random.default_rng(0).uniform(size=(1, 50, 50)).astype(np.float32)
-    both = groups.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
+    both = errors_module.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
     np.testing.assert_allclose(both[0], both[1], rtol=1e-5)
     assert np.percentile(both[0], 98) == pytest.approx(0.2)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig

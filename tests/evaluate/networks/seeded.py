@@ -1,23 +1,8 @@
-"""Golden numbers of evaluation, and the seeded weights they were made with."""
-
-import json
-from pathlib import Path
-from typing import Any
+"""The seeded weights that golden numbers of evaluation were made with."""
 
 import numpy as np
 import torch
 from torch import Tensor
-
-
-class Golden:
-    """A JSON file and the arrays beside it."""
-
-    def __init__(self, folder: Path, name: str) -> None:
-        self.values: dict[str, Any] = json.loads((folder / "eval" / f"{name}.json").read_text())
-        self.arrays = np.load(folder / "eval" / f"{name}.npz")
-
-    def tensor(self, name: str) -> Tensor:
-        return torch.from_numpy(self.arrays[name])
 
 
 def seeded_state(shapes: dict[str, list[int]], seed: int) -> dict[str, Tensor]:
@@ -40,8 +25,3 @@ def seeded_state(shapes: dict[str, list[int]], seed: int) -> dict[str, Tensor]:
             x = x * np.sqrt(2 / np.prod(shape[1:]))
         state[key] = torch.from_numpy(x.astype(np.float32))
     return state
-
-
-def relative(value: Tensor, expected: Tensor) -> float:
-    """Largest difference as a share of the largest expected value."""
-    return float((value - expected).abs().max() / expected.abs().max())

@@ -1,15 +1,13 @@
-"""Golden numbers of DUSt3R, and networks with the weights they were made with."""
+"""Networks with seeded weights: a tiny one, and those of the golden numbers."""
 
-import json
 import math
 import zlib
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
+from tests.golden import reading
 from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import normalise
@@ -29,33 +27,24 @@ TINY = NetworkConfig(
 """A network for tests that need no golden numbers."""
 
 
-class Golden:
-    """The folder of golden numbers."""
+def config_of(settings: dict[str, Any]) -> NetworkConfig:
+    """A model of ``net_config.json``."""
+    bounded = {key: _bounds(settings["config"][key]) for key in ("depth_mode", "conf_mode")}
+    config = config_from_keywords(settings["config"] | bounded, "golden")
+    if "dpt" not in settings:
+        return config
+    sizes = settings["dpt"]
+    dpt = DptSizes(tuple(sizes["layer_dims"]), sizes["feature_dim"], sizes["last_dim"])
+    return NetworkConfig(**(config.__dict__ | {"dpt": dpt}))
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder / "dust3r"
 
-    def json(self, name: str) -> dict[str, Any]:
-        return json.loads((self.folder / f"{name}.json").read_text())
-
-    def tensors(self, name: str) -> dict[str, Tensor]:
-        return load_file(self.folder / f"{name}.safetensors")
-
-    def config(self, model: str) -> NetworkConfig:
-        settings = self.json("net_config")[model]
-        bounded = {key: _bounds(settings["config"][key]) for key in ("depth_mode", "conf_mode")}
-        config = config_from_keywords(settings["config"] | bounded, model)
-        if "dpt" not in settings:
-            return config
-        sizes = settings["dpt"]
-        dpt = DptSizes(tuple(sizes["layer_dims"]), sizes["feature_dim"], sizes["last_dim"])
-        return NetworkConfig(**(config.__dict__ | {"dpt": dpt}))
-
-    def network(self, model: str) -> Dust3r:
-        config = self.config(model)
-        recipe = self.json("net_config")[model]["weights"] == "recipe"
-        state = seeded_state(config) if recipe else self.tensors(f"net_{model}_weights")
-        return fill_network(lambda: Dust3r(config), normalise(state, model), model, model)
+def golden_network(model: str) -> Dust3r:
+    """A model of ``net_config.json`` with its weights."""
+    settings = reading.values("dust3r/net_config.json")[model]
+    config = config_of(settings)
+    recipe = settings["weights"] == "recipe"
+    state = seeded_state(config) if recipe else reading.tensors(f"dust3r/net_{model}_weights.safetensors")
+    return fill_network(lambda: Dust3r(config), normalise(state, model), model, model)
 
 
 def _bounds(mode: list[Any]) -> tuple[Any, ...]:
@@ -97,9 +86,3 @@ def tiny(**changes: Any) -> Dust3r:
 
 
 _tiny_state = cache(seeded_state)
-
-
-def relative(value: Tensor, expected: Tensor) -> float:
-    """Largest difference as a share of the largest expected value."""
-    assert value.shape == expected.shape
-    return float((value - expected).abs().max() / expected.abs().max())
