@@ -67,7 +67,7 @@ def fitted(street: Any, name: str, device: torch.device) -> Any:
     clip, geometry, seeds = street
     start = fit_static(clip, geometry, seeds, FitOptions(steps=2), 0, lambda done, total: None)
     options = FitOptions(steps=STEPS, warm_up=0.1, sh_after=0.4)
-    motion = QUALITIES["draft"].motion(name)
+    motion = replace(QUALITIES["draft"], representation=name).motion
     return fit(
         clip, geometry, parts_of(name, start), start, options, motion, GROWING, 0, lambda d, t: None, device
     )
