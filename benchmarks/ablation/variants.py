@@ -79,7 +79,7 @@ def untracked(lifespan_frames: float) -> Callable[[Quality], Quality]:
 
 def ungrouped(quality: Quality) -> Quality:
     """No clusters, hence no things that could have tracks; copies live as long as those of things do."""
-    return grouped(clustering=False)(untracked(quality.cast.lifespan_frames)(quality))
+    return grouped(clusters="none")(untracked(quality.cast.lifespan_frames)(quality))
 
 
 VARIANTS = {

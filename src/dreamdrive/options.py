@@ -1,6 +1,6 @@
 """What ``--quality`` means: one row of numbers a name."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
@@ -9,6 +9,7 @@ from dreamdrive.geometry import GeometryOptions
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig, RepresentationName
 
 QualityName = Literal["draft", "standard", "high"]
+MethodName = Literal["dreamdrive", "paper"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Options:
         representation: ``"hybrid"``, or one of its baselines.
         device: Where networks and both fits are computed.
         geometry: How cameras and depth are found.
+        method: Whose equations the others are set to, see ``with_method``.
         seed: Seed of everything random.
     """
 
@@ -41,6 +43,7 @@ class Options:
     representation: RepresentationName = "hybrid"
     device: Literal["cpu", "cuda"] = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    method: MethodName = "dreamdrive"
     seed: int = 0
 
     @property
@@ -60,6 +63,28 @@ class Options:
         fits = {"static": self.static.steps, "fit": self.fit.steps}
         scored = REPRESENTATIONS[self.representation].moves == "scored"
         return {**fits, "score": self.score.steps} if scored else fits
+
+
+def with_method(options: Options, method: MethodName) -> Options:
+    """The options of ``--method``: ``"paper"`` takes eq. 5-14 as printed, ``"dreamdrive"`` is ours.
+
+    The paper's error map is the only target of the scores, unscaled, in all frames; every Gaussian is
+    clustered and votes; F_deform alone, of the size of Deformable-3DGS that the paper follows, moves things;
+    the loss is L1 + SSIM. Its tau has no number there: ours, in units of the unscaled error.
+    """
+    if method == "dreamdrive":
+        return options
+    s, g = options.score, options.group
+    return replace(
+        options,
+        method="paper",
+        score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None),
+        group=replace(g, clusters="density", threshold=g.threshold * s.error_scale, majority=0.5),
+        cast=replace(options.cast, tracks=False),
+        static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
+        fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0),
+        network=replace(options.network, depth=8, width=256),
+    )
 
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.

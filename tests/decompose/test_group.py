@@ -25,7 +25,7 @@ def test_the_majority_of_a_cluster_decides_for_all_of_it():
     scores = torch.where(truth, torch.where(doubt < 0.25, 0.3, 0.9), torch.tensor(0.05))
     grouping = group(clip, geometry, seeds, scores, GroupOptions())
     assert (grouping.dynamic == truth).float().mean() > 0.995
-    alone = group(clip, geometry, seeds, scores, GroupOptions(clustering=False))
+    alone = group(clip, geometry, seeds, scores, GroupOptions(clusters="none"))
     assert (alone.dynamic[truth]).float().mean() < 0.8
 
 
