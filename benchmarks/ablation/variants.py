@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from ablation.errors import by_frame, dssim_errors, feature_errors
 from ablation.groups import by_density, by_density_and_features, by_voxels
-from dreamdrive.fit import Representation
+from dreamdrive.motion import RepresentationName
 from dreamdrive.options import Quality
 from street.fit import Errors, Vote, own_errors, own_vote, with_steps
 from street.jobs import QUALITY
@@ -29,7 +29,7 @@ class Variant:
     about: str
     change: Callable[[Quality], Quality] = lambda quality: quality
     features: Literal["all", "evidence", "appearance", "none", "efficientnet"] = "all"
-    representation: Representation = "hybrid"
+    representation: RepresentationName = "hybrid"
     vote: Vote = own_vote
     errors: Errors = own_errors
 

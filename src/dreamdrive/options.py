@@ -4,11 +4,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
-from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
+from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.scene.deformation import DeformationConfig
-from dreamdrive.scene.hexplane import HexPlaneConfig
-from dreamdrive.scene.vibration import VibrationConfig
+from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig, RepresentationName
 
 QualityName = Literal["draft", "standard", "high"]
 MethodName = Literal["dreamdrive", "paper"]
@@ -28,6 +26,7 @@ class Options:
         densify: Growing and pruning in the joint fit.
         network: Size of the deformation field; its width is that of every representation.
         representation: ``"hybrid"``, or one of its baselines.
+        device: Where networks and both fits are computed.
         geometry: How cameras and depth are found.
         method: Whose equations the others are set to, see ``with_method``.
         seed: Seed of everything random.
@@ -41,7 +40,8 @@ class Options:
     cast: ActorOptions = field(default_factory=ActorOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
-    representation: Representation = "hybrid"
+    representation: RepresentationName = "hybrid"
+    device: Literal["cpu", "cuda"] = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
     method: MethodName = "dreamdrive"
     seed: int = 0
@@ -49,20 +49,20 @@ class Options:
     @property
     def motion(self) -> MotionConfig:
         """What the joint fit learns motion by; all networks have the same width."""
-        if self.representation == "hexplane":
-            return HexPlaneConfig(width=self.network.width)
-        if self.representation == "vibration":
-            return VibrationConfig()
-        return self.network
+        motion = REPRESENTATIONS[self.representation].motion
+        if motion is None or motion.config_type is type(self.network):
+            return self.network
+        return motion.config_type.sized(self.network.width)
 
     @property
     def steps(self) -> dict[str, int]:
         """Optimisation steps of each stage: those on Gaussians are the same for all representations.
 
-        ``score`` trains the classifier of the decomposition, which hybrid alone has, and changes no Gaussian.
+        ``score`` trains the classifier of the decomposition and changes no Gaussian.
         """
         fits = {"static": self.static.steps, "fit": self.fit.steps}
-        return {**fits, "score": self.score.steps} if self.representation == "hybrid" else fits
+        scored = REPRESENTATIONS[self.representation].moves == "scored"
+        return {**fits, "score": self.score.steps} if scored else fits
 
 
 def with_method(options: Options, method: MethodName) -> Options:

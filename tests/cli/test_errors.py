@@ -56,6 +56,14 @@ def test_representations_are_known_by_name(run: Run, tmp_path: Path, name: str) 
     expect(run, tmp_path / "out", missing, "--representation", name, message=f"{missing} does not exist")
 
 
+def test_a_gpu_that_is_not_there_is_said_before_any_work(
+    run: Run, tmp_path: Path, clip: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "why_unusable", lambda: "gsplat is not installed: pip install it")
+    said = "error: --device cuda: gsplat is not installed: pip install it, or leave --device out for the CPU"
+    expect(run, tmp_path / "out", clip, "--device", "cuda", message=said)
+
+
 def test_a_representation_of_another_name_is_refused(run: Run, tmp_path: Path) -> None:
     result = run("generate", tmp_path / "none.mp4", "-o", tmp_path / "out", "--representation", "mesh")
     assert result.code == 2

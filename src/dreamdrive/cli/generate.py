@@ -62,6 +62,7 @@ def generate(
         Literal["static", "deformable", "hexplane", "vibration", "hybrid"] | None,
         arg(help_behavior_hint="(default: hybrid)"),
     ] = None,
+    device: Annotated[Literal["cpu", "cuda"] | None, arg(help_behavior_hint="(default: cpu)")] = None,
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
@@ -109,6 +110,7 @@ def generate(
         options: Options of any stage as TOML, in place of those of the quality: docs/options.md.
         representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
             deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
+        device: Where networks and the fits are computed; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md).
         seed: Seed of everything random.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
@@ -143,7 +145,9 @@ def generate(
         chosen = read_options(options, chosen)
     how = {"method": geometry, "camera_height_m": camera_height, "refine_poses": refine_poses or None}
     how = replace(chosen.geometry, **{name: value for name, value in how.items() if value is not None})
-    chosen = replace(chosen, geometry=how, representation=representation or chosen.representation)
+    given = {"representation": representation, "device": device}
+    given = {name: value for name, value in given.items() if value is not None}
+    chosen = replace(chosen, geometry=how, **given)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(

@@ -1,6 +1,5 @@
 """F_group: spatio-temporal clusters vote on what is dynamic (eq. 10)."""
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from dreamdrive.decompose.covered import covered
 from dreamdrive.decompose.density import density_labels, voted
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.on_road import on_road
@@ -75,17 +73,15 @@ class Grouping:
     Attributes:
         dynamic: The final label (N,).
         cluster: Index of each Gaussian's space-time cluster (N,), -1 outside all dynamic clusters.
-        covered: Static ones that no frame has seen, see ``covered`` (N,).
     """
 
     dynamic: Bool[Tensor, " n"]
     cluster: Int[Tensor, " n"]
-    covered: Bool[Tensor, " n"]
 
     @property
     def static(self) -> Bool[Tensor, " n"]:
         """What the scene's static part is made of (N,)."""
-        return ~self.dynamic & ~self.covered
+        return ~self.dynamic
 
 
 def group(
@@ -106,13 +102,11 @@ def group(
     value = scores.detach().numpy()
     votes = value > options.threshold
     if options.clusters == "none":
-        return _grouping(clip, geometry, gaussians, np.where(votes, 0, -1), options)
+        return _grouping(np.where(votes, 0, -1))
     if options.clusters == "density":
         number = (np.cumsum(~clip.held_out) - 1)[gaussians.source_frame.numpy()]
         labels = density_labels(gaussians.means.detach().numpy(), number, value, options.smallest)
-        cluster = voted(labels, votes.astype(np.float64), options.majority)
-        dynamic = torch.from_numpy(cluster >= 0)
-        return Grouping(dynamic, torch.from_numpy(cluster), torch.zeros_like(dynamic))
+        return _grouping(voted(labels, votes.astype(np.float64), options.majority))
     index = np.flatnonzero(value > options.candidate)
     points = source_pixels(geometry, gaussians, index)
     frames = gaussians.source_frame.numpy()[index]
@@ -122,7 +116,7 @@ def group(
     members = upright & np.isin(labels, wins)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     cluster[index[members]] = np.searchsorted(wins, labels[members])
-    return _grouping(clip, geometry, gaussians, cluster, options)
+    return _grouping(cluster)
 
 
 def _low(
@@ -147,17 +141,8 @@ def elected(
     return np.flatnonzero(wins)
 
 
-def _grouping(
-    clip: Clip,
-    geometry: Geometry,
-    gaussians: Gaussians,
-    cluster: Int[np.ndarray, " n"],
-    options: GroupOptions,
-) -> Grouping:
-    dynamic = torch.from_numpy(cluster >= 0)
-    pixels = source_pixels(geometry, gaussians, np.arange(len(gaussians)))
-    hidden = covered(clip, geometry, gaussians, dynamic, pixels, math.ceil(options.reach_px / 1.5))
-    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
+def _grouping(cluster: Int[np.ndarray, " n"]) -> Grouping:
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))
 
 
 def source_pixels(
