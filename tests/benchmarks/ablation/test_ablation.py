@@ -1,47 +1,34 @@
 """The ablation: what its variants change, and means against all parts."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
+from tests.scene.scenes import make_scene
 
-from ablation import groups, variants
+from ablation import features, groups, scores
 from ablation import main as ablation
 from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
-
-PARTS = ("features", "representation", "vote", "scale")
-
-
-@dataclass(frozen=True)
-class SimpleSeeds:
-    features: torch.Tensor
-
-
-@dataclass(frozen=True)
-class SimpleStart:
-    seeds: SimpleSeeds
+from dreamdrive.scene.features import OF_GEOMETRY
+from street import methods
 
 
 def test_each_variant_changes_something_of_its_own_and_hybrid_nothing() -> None:
-    def same(variant) -> bool:
-        options = asdict(variant.change(ablation.QUALITY)) == asdict(ablation.QUALITY)
-        options &= variant.vote is variants.own_vote and variant.scale is variants.own_scale
-        return options and variant.features == "all" and variant.representation == "hybrid"
-
-    assert [name for name, variant in ablation.VARIANTS.items() if same(variant)] == ["hybrid"]
-    everything = [
-        (asdict(variant.change(ablation.QUALITY)), *(getattr(variant, name) for name in PARTS))
-        for variant in ablation.VARIANTS.values()
-    ]
-    assert all(everything.count(one) == 1 for one in everything)
+    everything = {
+        name: (asdict(variant.change(methods.QUALITY)), dict(variant.around))
+        for name, variant in ablation.VARIANTS.items()
+    }
+    untouched = (asdict(methods.QUALITY), {})
+    assert [name for name, what in everything.items() if what == untouched] == ["hybrid"]
+    assert all(list(everything.values()).count(what) == 1 for what in everything.values())
 
 
 def test_all_steps_are_equal() -> None:
-    steps = {variant.change(ablation.QUALITY).fit.steps for variant in ablation.VARIANTS.values()}
-    assert steps == {ablation.QUALITY.fit.steps}
+    steps = {variant.change(methods.QUALITY).fit.steps for variant in ablation.VARIANTS.values()}
+    assert steps == {methods.QUALITY.fit.steps}
 
 
 def test_every_fit_has_a_file_of_its_own() -> None:
@@ -68,17 +55,17 @@ def test_changes_are_world_by_world() -> None:
 
 
 def test_features_are_cut_as_each_variant_says() -> None:
-    features = torch.arange(1.0, 13).reshape(2, 6)
-    begin = SimpleStart(SimpleSeeds(features))
-    seen = {
-        name: ablation.begun(begin, variants.Variant("", features=name), None).seeds.features
-        for name in ("all", "evidence", "appearance", "none")
-    }
-    assert (seen["all"] == features).all()
-    assert (seen["evidence"] + seen["appearance"] == features).all()
-    assert (seen["evidence"][:, 2:] == 0).all()
-    assert (seen["evidence"][:, :2] != 0).all()
-    assert (seen["none"] == 0).all()
+    channels = torch.arange(1.0, 2 * (OF_GEOMETRY + 4) + 1).reshape(2, -1)
+    seeds = make_scene().static.select(torch.arange(2))
+    seeds = replace(seeds, features=channels)
+    evidence, appearance, nothing = (
+        cut({}, methods.QUALITY, lambda: seeds).features
+        for cut in (features.with_evidence, features.with_appearance, features.without_features)
+    )
+    assert (evidence + appearance == channels).all()
+    assert (evidence[:, OF_GEOMETRY:] == 0).all()
+    assert (evidence[:, :OF_GEOMETRY] != 0).all()
+    assert (nothing == 0).all()
 
 
 def two_cars(rng: np.random.Generator, per_frame: int) -> tuple[np.ndarray, np.ndarray]:
@@ -127,8 +114,8 @@ def test_space_time_does_not_count_withheld_frames() -> None:
     seeds = SimpleNamespace(
         means=torch.zeros(3, 3), source_frame=torch.tensor([0, 2, 3]), features=torch.ones(3, 2)
     )
-    begin = SimpleNamespace(seeds=seeds, clip=SimpleNamespace(held_out=np.array([False, True, False, False])))
-    found = groups.space_time(begin, np.array([0.1, 0.5, 0.9]), np.array([0, 1, 2]))
+    clip = SimpleNamespace(held_out=np.array([False, True, False, False]))
+    found = groups.space_time(clip, seeds, np.array([0.1, 0.5, 0.9]), np.array([0, 1, 2]))
     np.testing.assert_allclose(found[:, 3], [0, 1, 2])
     np.testing.assert_allclose(found[:, 4], [0.2, 1.0, 1.8])
 
@@ -143,7 +130,7 @@ def test_the_vote_is_that_of_eq_10() -> None:
 
 def test_errors_over_those_of_their_frame_do_not_depend_on_its_light() -> None:
     errors = np.random.default_rng(0).uniform(size=(1, 50, 50)).astype(np.float32)
-    both = groups.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
+    both = scores.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
     np.testing.assert_allclose(both[0], both[1], rtol=1e-5)
     assert np.percentile(both[0], 98) == pytest.approx(0.2)
 
