@@ -130,8 +130,8 @@ def fitted(job: Job) -> tuple[Fitted, dict[str, Any]]:
     return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin, options)), plan
 
 
-def run(job: Job, toolbox: Toolbox) -> None:
-    """Fit, unless the scene is there, measure and keep."""
+def run(job: Job, toolbox: Toolbox, *, consistency: bool = True) -> None:
+    """Fit, unless the scene is there, measure and keep; consistency takes as long as all else."""
     case = job.case
     found, plan = fitted(job)
     scene = found.scene
@@ -151,7 +151,7 @@ def run(job: Job, toolbox: Toolbox) -> None:
         "views": views,
         **told_apart(scene, case.seed),
     }
-    if job.method == OURS and case.references == "corrupted":
+    if consistency and job.method == OURS and case.references == "corrupted":
         record["consistency"] = consistency_of(scene, case, job.runs)
     keep_picture(job.runs / "shown" / f"{job.name}.png", middle)
     save(job.result, job.key(toolbox), record, features)
