@@ -4,7 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
+# What else runs on the machine is no failure of a test.
+settings.register_profile("any machine", deadline=None)
+settings.load_profile("any machine")
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -19,12 +23,6 @@ def _shared(variable: str, default: str) -> Path:
 def data_dir() -> Path:
     """Real recordings; the test is skipped where they are absent."""
     return _shared("DREAMDRIVE_DATA", "../shared/data")
-
-
-@pytest.fixture(scope="session")
-def golden_dir() -> Path:
-    """Numbers from upstream programs; the test is skipped where they are absent."""
-    return _shared("DREAMDRIVE_GOLDEN", "../shared/golden")
 
 
 @pytest.fixture(scope="session")

@@ -13,8 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from dreamdrive.decompose import GroupOptions
-from dreamdrive.decompose.covered import covered
-from dreamdrive.decompose.group import Grouping, elected, source_pixels
+from dreamdrive.decompose.group import Grouping, elected
 from dreamdrive.options import Options
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -112,19 +111,11 @@ def space_time(
     return np.column_stack(columns).astype(np.float64)[index]
 
 
-def _grouped(before: Before, all_options: Options, labels: Labels) -> Grouping:
-    clip, geometry, seeds, options = (
-        before["prior"],
-        before["geometry"],
-        before["initialise"],
-        all_options.group,
-    )
+def _grouped(before: Before, options: GroupOptions, labels: Labels) -> Grouping:
+    clip, seeds = before["prior"], before["initialise"]
     value = before["score"].detach().numpy()
     index = np.flatnonzero(value > options.candidate)
     found = labels(space_time(clip, seeds, value, index))
     cluster = np.full(len(seeds), -1, dtype=np.int64)
     cluster[index] = majority(found, value[index], options)
-    dynamic = torch.from_numpy(cluster >= 0)
-    pixels = source_pixels(geometry, seeds, np.arange(len(seeds)))
-    hidden = covered(clip, geometry, seeds, dynamic, pixels, math.ceil(options.reach_px / 1.5))
-    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))

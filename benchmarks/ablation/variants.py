@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ablation.errors import by_frame, dssim_errors, feature_errors, own_errors, scored_on
 from ablation.features import with_appearance, with_efficientnet, with_evidence, without_features
 from ablation.groups import by_density, by_density_and_features, by_voxels
-from ablation.scores import by_frame
 from dreamdrive.options import Options
 from street.fit import Around, with_steps
 from street.methods import QUALITY, options_of
@@ -77,7 +77,7 @@ def untracked(lifespan_frames: float) -> Callable[[Options], Options]:
 
 def ungrouped(options: Options) -> Options:
     """No clusters, hence no things that could have tracks; copies live as long as those of things do."""
-    return grouped(clustering=False)(untracked(options.cast.lifespan_frames)(options))
+    return grouped(clusters="none")(untracked(options.cast.lifespan_frames)(options))
 
 
 VARIANTS = {
@@ -104,14 +104,21 @@ VARIANTS = {
         {"initialise": with_appearance},
     ),
     "all-frames": Variant("scores splatted into all frames", scored(window=None)),
-    "dssim": Variant("(1 - SSIM) / 2 as error", scored(error="dssim")),
-    "feature-error": Variant("distance of splatted features (appearance) as error", scored(error="features")),
+    "dssim": Variant("(1 - SSIM) / 2 as error", around={"score": scored_on(dssim_errors)}),
+    "feature-error": Variant(
+        "distance of splatted features (appearance) as error", around={"score": scored_on(feature_errors)}
+    ),
     "error-scale-0.1": Variant("an error of 0.1 counts as 1, not of 0.2", scored(error_scale=0.1)),
     "error-scale-0.4": Variant("an error of 0.4 counts as 1", scored(error_scale=0.4)),
-    "error-by-frame": Variant("errors over the 98th percentile of their frame", around={"score": by_frame}),
-    "dssim-by-frame": Variant("(1 - SSIM) / 2, scaled so", scored(error="dssim"), around={"score": by_frame}),
+    "error-by-frame": Variant(
+        "errors over the 98th percentile of their frame",
+        around={"score": scored_on(by_frame(own_errors))},
+    ),
+    "dssim-by-frame": Variant(
+        "(1 - SSIM) / 2, scaled so", around={"score": scored_on(by_frame(dssim_errors))}
+    ),
     "feature-error-by-frame": Variant(
-        "distance of features, scaled so", scored(error="features"), around={"score": by_frame}
+        "distance of features, scaled so", around={"score": scored_on(by_frame(feature_errors))}
     ),
     "hdbscan": Variant("clusters of HDBSCAN over space, time and score", around={"group": by_density}),
     "hdbscan-features": Variant("the same, over Z_ref as well", around={"group": by_density_and_features}),
@@ -126,14 +133,12 @@ VARIANTS = {
     ),
     "no-lives": Variant("no tracks, and copies live for ever (eq. 11)", untracked(1e3)),
     "no-residual": Variant("tracks alone, F_deform stays 0", fitted_with(deformation_rate=0.0)),
-    "canonical-first": Variant("an actor's first frame is its canonical time", played(canonical="first")),
     "short-lives": Variant("what no other frame sees lives no longer", played(lasting=False)),
     "long-lives": Variant(
         "copies that others replace live three times as long", played(lifespan_frames=3.75)
     ),
     "paper-loss": Variant("joint fit with L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
     "no-depth": Variant("joint fit without the term on depth", fitted_with(depth_weight=0.0)),
-    "no-shape": Variant("joint fit without the term on elongation", fitted_with(shape_weight=0.0)),
     "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),
     "prefit-50": Variant("static fit of 50 steps, not 150", prefit(50)),
     "prefit-400": Variant("static fit of 400 steps", prefit(400)),

@@ -23,7 +23,7 @@ from dreamdrive.run import digest, program_digest
 from readme.tables import MAIN_CLIP, OTHER_CLIPS, sections
 from street.case import Case, Poses, References
 from street.jobs import Job, run
-from street.methods import FULL_SIZE, OURS, PAPER, REPRESENTATIONS
+from street.methods import FULL_SIZE, OURS, REPRESENTATIONS
 
 README, FIGURES, RESULTS = Path("README.md"), Path("docs/figures.md"), Path("benchmarks/results")
 PAPER_WORLDS = TEST[:4]
@@ -114,8 +114,6 @@ def main(doc: str | None, into: Path = Path()) -> int:
     """Measure what is not there yet, print the tables, and write them where all of them are whole."""
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     options = options_of(doc)
-    if options.whole_paper and PAPER is None:
-        print("not measured: whole-paper: this program has no dreamdrive.options.PAPER", file=sys.stderr)
     streets, lost = drawn(options)
     rows, failed = recorded(options)
     report = {"machine": describe_machine(), "streets": streets, "clips": rows}

@@ -7,11 +7,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from dreamdrive.fit.losses import WEIGHTS, LossName, shape_loss
+from dreamdrive.fit.losses import WEIGHTS, LossName
 from dreamdrive.fit.parameters import LearningRates, Parameters
-from dreamdrive.fit.trainer import SHAPE_EVERY, FitOptions, Model
+from dreamdrive.fit.trainer import FitOptions, Model
 from dreamdrive.fit.views import View
-from dreamdrive.scene.deformation import DeformationField, alive_at, faded
+from dreamdrive.motion import DeformationField
 from dreamdrive.scene.exposure import transform_colour
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import render
@@ -68,7 +68,7 @@ def posed(field: DeformationField, gaussians: Gaussians, t_s: float) -> Gaussian
         "quaternions": unit + offsets.quaternion,
         "log_scales": gaussians.log_scales + offsets.log_scale,
     }
-    return faded(Gaussians(**fields), t_s)
+    return Gaussians(**fields).faded_at(t_s)
 
 
 class PlainLeaves:
@@ -128,7 +128,7 @@ class PlainTrainer:
         options = self.options
         done = step / options.steps
         dynamic = self.dynamic.gaussians()
-        rows = alive_at(dynamic, view.time_s)
+        rows = dynamic.alive_at(view.time_s)
         moved = posed(self.field, dynamic.select(rows), view.time_s)
         gaussians = Gaussians.concatenate(self.static.gaussians(), moved)
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
@@ -140,8 +140,6 @@ class PlainTrainer:
         loss = loss + geometry_loss(
             rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight, view.sky, *weights
         )
-        if step % SHAPE_EVERY == 0:
-            loss = loss + options.shape_weight * shape_loss(gaussians.log_scales, options.shape_ratio)
         loss.backward()
         moving = 0.1**done if done >= options.warm_up else 0.0
         self.shared.param_groups[0]["lr"] = options.exposure_rate * 0.1**done

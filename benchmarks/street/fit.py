@@ -40,7 +40,7 @@ class Start:
 
     def stages(self, options: Options) -> Stages:
         """Keeps what is shared by all fits of these options, a folder for each choice of them."""
-        shared = digest([options.geometry, options.seeds, options.static, options.seed])
+        shared = digest([options.geometry, options.seeds, options.static, options.device, options.seed])
         folder = self.folder / shared[:8]
         return Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
 

@@ -1,19 +1,14 @@
 """What the street benchmark compares, by name: the representations, and some at the sizes of their papers."""
 
 from dataclasses import replace
-from typing import get_args
 
-from dreamdrive import options as presets
-from dreamdrive.fit import MotionConfig, Representation
-from dreamdrive.options import QUALITIES, Options
-from dreamdrive.scene.deformation import DeformationConfig
-from dreamdrive.scene.hexplane import HexPlaneConfig
+from dreamdrive.motion import DeformationConfig, HexPlaneConfig, MotionConfig
+from dreamdrive.options import QUALITIES, Options, with_method
 from street.fit import with_steps
 
 QUALITY = QUALITIES["draft"]
 OURS = "hybrid"
-REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
-assert set(REPRESENTATIONS) == set(get_args(Representation))
+REPRESENTATIONS = ("hybrid", "static", "vibration", "deformable", "hexplane")
 
 
 class FourLevels(Options):
@@ -25,16 +20,14 @@ class FourLevels(Options):
         return HexPlaneConfig(levels=4, features=32)
 
 
-PAPER: Options | None = getattr(presets, "PAPER", None)
-"""The method as the paper has it, where the program offers it as ``dreamdrive.options.PAPER``."""
 FULL_SIZE: dict[str, Options] = {
     "deformable-8x256": replace(
         QUALITY, representation="deformable", network=DeformationConfig(depth=8, width=256)
     ),
     "hexplane-4x32": FourLevels(**{**vars(QUALITY), "representation": "hexplane"}),
-    **({} if PAPER is None else {"whole-paper": PAPER}),
+    "whole-paper": with_method(QUALITY, "paper"),
 }
-"""Methods at the size that their authors give them."""
+"""Methods at the size that their authors give them, and the whole of the paper, eq. 5 to 14 as printed."""
 METHODS = (*REPRESENTATIONS, *FULL_SIZE)
 
 

@@ -8,11 +8,11 @@ import av
 import numpy as np
 import pytest
 from tests.cli.conftest import Run
+from tests.export.ply_file import columns, count
 from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.drive import MANOEUVRES
-from dreamdrive.export import read_ply
 from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
@@ -84,9 +84,9 @@ def test_a_damaged_scene_is_refused(run: Run, out: Path) -> None:
 
 def test_export_writes_a_file_or_a_sequence(run: Run, out: Path, tmp_path: Path) -> None:
     assert run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").code == 0
-    assert len(read_ply(tmp_path / "all.ply")) == 11
+    assert count(tmp_path / "all.ply") == 11
     assert run("export", out, "--to", "ply", "-o", tmp_path / "sequence").code == 0
-    assert len(read_ply(tmp_path / "sequence" / "static.ply")) == 7
+    assert count(tmp_path / "sequence" / "static.ply") == 7
     assert len(list((tmp_path / "sequence" / "frames").iterdir())) == 3
 
 
@@ -96,9 +96,9 @@ def test_scenes_that_move_otherwise_are_rendered_and_exported(run: Run, tmp_path
     assert run("render", tmp_path / "out", "--trajectory", "forward").code == 0
     assert frames(tmp_path / "out" / "video" / "forward.mp4")[0] == 5
     assert run("export", tmp_path / "out", "--to", "ply", "-o", tmp_path / "sequence").code == 0
-    first, last = (read_ply(tmp_path / "sequence" / "frames" / f"{i:04d}.ply") for i in (0, 2))
-    assert len(first) == 4
-    assert not np.allclose(first.means, last.means)
+    first, last = (columns(tmp_path / "sequence" / "frames" / f"{i:04d}.ply") for i in (0, 2))
+    assert len(first["x"]) == 4
+    assert not np.allclose(first["x"], last["x"])
 
 
 def test_the_doctor_says_what_is_there(run: Run) -> None:
@@ -118,9 +118,9 @@ def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_doctor_says_whether_a_gpu_can_be_used(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: "there is no nvcc: install it")
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: "there is no nvcc: install it")
     assert re.search(r"GPU\s+not needed; there is no nvcc: install it", run("doctor").out)
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: None)
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: None)
     result = run("doctor")
     assert result.code == 0
     assert re.search(r"GPU\s+backend gsplat can be used; not needed", result.out)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cli.conftest import Run
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
 from tests.test_pipeline import shorten
 

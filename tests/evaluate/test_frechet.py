@@ -1,48 +1,41 @@
 """Distances of feature sets against public programs, and their edge cases."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
+from tests.golden.reading import arrays, cases, values
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate import frechet
 from dreamdrive.evaluate.frechet import frechet_distance, kernel_distance, polynomial_mmd
 
-CASES = (
-    "full_rank_500x32",
-    "identical",
-    "mean_shift_only",
-    "rank_deficient_20x64",
-    "rank_deficient_24_vs_300x64",
-    "few_2x16",
-    "constant_feature_200x8",
-    "one_dim_300x1",
-    "inception_like_relu_256x128",
-    "large_scale_logits_64x40",
-)
+LIMIT = 1e-6
+"""Of what is subtracted to get the distance, which is small beside it where sets are alike. All but LVDM's
+programs compute in float64; theirs differ by this much where covariances have no full rank."""
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_golden_distances(golden_dir: Path, case: str) -> None:
-    arrays = np.load(golden_dir / "eval" / "frechet.npz")
-    expected = json.loads((golden_dir / "eval" / "frechet.json").read_text())[case]
-    a, b = arrays[f"{case}/a"], arrays[f"{case}/b"]
+@pytest.mark.parametrize("case", cases("eval/frechet.json"))
+def test_golden_distances(case: str) -> None:
+    sets, expected = arrays("eval/frechet.npz"), values("eval/frechet.json")[case]
+    a, b = sets[f"{case}/a"].astype(np.float64), sets[f"{case}/b"].astype(np.float64)
     m = min(len(a), len(b))
-    for got, name in (
-        (frechet_distance(a, b), "reference symmetric eigh (unbiased)"),
-        (frechet_distance(a, b, "population"), "reference symmetric eigh (biased)"),
-        (frechet_distance(a, b), "torchmetrics"),
-        (frechet_distance(a, b, "population"), "cd_fvd / stylegan_v metric_utils (biased cov)"),
-        (polynomial_mmd(a[:m], b[:m]), "kid_torch_fidelity_first_m"),
-        (polynomial_mmd(a, b), "kvd_lvdm (deg 3, gamma 1/d, coef 1, all samples)"),
+    spread = sum(each.var(axis=0, ddof=1).sum() for each in (a, b))
+    spread += np.square(a.mean(axis=0) - b.mean(axis=0)).sum()
+    similar = np.mean([np.square(each).sum(axis=1).mean() / a.shape[1] for each in (a, b)])
+    for got, name, size in (
+        (frechet_distance(a, b), "reference symmetric eigh (unbiased)", spread),
+        (frechet_distance(a, b, "population"), "reference symmetric eigh (biased)", spread),
+        (frechet_distance(a, b), "torchmetrics", spread),
+        (frechet_distance(a, b, "population"), "cd_fvd / stylegan_v metric_utils (biased cov)", spread),
+        (polynomial_mmd(a[:m], b[:m]), "kid_torch_fidelity_first_m", (similar + 1) ** 3),
+        (polynomial_mmd(a, b), "kvd_lvdm (deg 3, gamma 1/d, coef 1, all samples)", (similar + 1) ** 3),
         (
             polynomial_mmd(a, b, degree=2, offset=0, unbiased=False),
             "jedi_mmd_deg2_coef0_biased (x100 = JEDi)",
+            similar**2,
         ),
     ):
-        assert got == pytest.approx(expected[name], rel=1e-6, abs=1e-8), name
+        if isinstance(wanted := expected[name], float):  # else the error that the program ends with
+            assert got == pytest.approx(wanted, rel=LIMIT, abs=LIMIT * size), name
 
 
 def test_both_routes_agree() -> None:

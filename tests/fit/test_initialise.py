@@ -80,5 +80,5 @@ def test_discs_on_the_road_lie_flat(street):
 def test_nothing_to_seed_is_said(street):
     geometry = true_geometry(street)
     geometry.depth_m[:] = 0
-    with pytest.raises(ValueError, match="no pixel of any frame has depth"):
+    with pytest.raises(ValueError, match="no frame shows anything solid"):
         initialise(street_clip(street), geometry, SeedOptions())

@@ -6,7 +6,7 @@ import pytest
 import torch
 from tests.splat.scenes import relative
 
-from dreamdrive.fit.losses import geometry_loss, render_loss, shape_loss
+from dreamdrive.fit.losses import geometry_loss, render_loss
 from dreamdrive.splat import set_threads, ssim, threads
 from splat import plain_step as plain
 
@@ -124,11 +124,6 @@ def test_cover_costs_in_the_sky_only() -> None:
     alpha, nothing = torch.tensor([[0.5, 0.25]]), torch.zeros(1, 2)
     loss = geometry_loss(nothing, alpha, nothing, nothing, torch.tensor([[True, False]]), 1.0, 0.1)
     torch.testing.assert_close(loss, torch.tensor(0.1 * 0.5 / 2))
-
-
-def test_shape_beyond_the_ratio_costs_its_logarithm() -> None:
-    scales = torch.tensor([[1.0, 20.0, 2.0], [1.0, 5.0, 1.0]])
-    torch.testing.assert_close(shape_loss(scales.log(), 10.0), torch.tensor(2.0).log() / 2)
 
 
 def test_what_gets_no_gradient_or_is_not_float32_is_refused() -> None:

@@ -18,7 +18,6 @@ from dreamdrive.data.images import read_image
 from dreamdrive.data.picture_file import MAX_PIXELS
 from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.video import RATES_HZ, Video
-from dreamdrive.export import read_ply, write_ply
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
 from dreamdrive.geometry.backends.feedforward.load import read_stored
 from dreamdrive.geometry.backends.files.depth import read_depth
@@ -26,8 +25,7 @@ from dreamdrive.models.weights import load_network
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.stored import open_weights
 from tests.data.pictures import texture
-from tests.export.test_ply import gaussians
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
 from tests.mutation.reader import Reader
 from tests.prior.vista.tiny import save_official
@@ -165,5 +163,4 @@ _WEIGHTS = (
     Reader("weights-dust3r-hub", lambda f: save_hub(f, tiny()), load_dust3r),
     Reader("weights-svd", lambda f: save_official(f / "svd.safetensors", SVD), open_weights),
 )
-_PLY = Reader("ply", lambda f: write_ply(gaussians(4), f / "a.ply"), lambda f: read_ply(f / "a.ply"))
-BINARY: tuple[Reader, ...] = (*_PICTURES, *_VIDEOS, *_ARRAYS, *_WEIGHTS, _PLY)
+BINARY: tuple[Reader, ...] = (*_PICTURES, *_VIDEOS, *_ARRAYS, *_WEIGHTS)

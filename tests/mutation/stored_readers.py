@@ -10,7 +10,6 @@ import numpy as np
 
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.errors import InputError
-from dreamdrive.export.ply import read_ply, write_ply
 from dreamdrive.run import codec
 from dreamdrive.scene import folder as scene_folder
 from dreamdrive.scene.clip import Clip, Known
@@ -19,7 +18,7 @@ from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world.files import read_world, write_world
 from tests.mutation.reader import Reader
-from tests.scene.scenes import gaussians, make_baseline, make_scene
+from tests.scene.scenes import make_baseline, make_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 
@@ -58,10 +57,6 @@ def _mend_scene(folder: Path) -> None:
 def _read_clip(folder: Path) -> None:
     codec.read_header(folder)
     codec.read(folder, Clip)
-
-
-def _ply(folder: Path) -> None:
-    write_ply(gaussians(5, 0), folder / "a.ply")
 
 
 def _features(folder: Path) -> None:
@@ -116,6 +111,5 @@ STORED: tuple[Reader, ...] = (
         lambda folder: write_world({"front": _street()}, folder / "world"),
         lambda folder: read_world(folder / "world"),
     ),
-    Reader("ply", _ply, lambda folder: read_ply(folder / "a.ply")),
     Reader("features", _features, _read_features),
 )

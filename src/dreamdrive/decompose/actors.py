@@ -7,7 +7,7 @@ spans let the copies nearest in time speak loudest, see ``lives``.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,9 +17,9 @@ from jaxtyping import Float, Int
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
+from dreamdrive.motion import Tracks
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import Tracks
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 
@@ -32,10 +32,10 @@ class ActorOptions:
     (``benchmarks/ablation.py``). Without any tracks withheld frames lose 0.71 dB, novel views 0.23 dB.
 
     Attributes:
+        tracks: False leaves every copy in its place, alive for ever, for F_deform alone to move (eq. 11).
         lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames. Three
             times as long, novel views lose 0.03 dB and standing things seem to move 43 mm farther.
         untracked_frames: The same for what has no track: a copy that stays where it was seen is wrong soon.
-        canonical: Which of the frames that show an actor is its canonical time; both give the same pictures.
         lasting: Whether copies of what no other frame sees live on, see ``lives``: without it novel views
             lose 0.11 dB, and standing things seem to move 14 mm less.
         contact_weight: Trust in one frame's depth against that in the change of size between two frames; a
@@ -46,9 +46,9 @@ class ActorOptions:
             Gaussians behind it to take on its colours.
     """
 
+    tracks: bool = True
     lifespan_frames: float = 1.25
     untracked_frames: float = 0.5
-    canonical: Literal["first", "middle"] = "middle"
     lasting: bool = True
     contact_weight: float = 0.05
     least_frames: int = 2
@@ -104,6 +104,8 @@ def cast(
         return Cast(
             replace(chosen, lifespan=torch.zeros(0, 2), actor=torch.zeros(0, dtype=torch.int64)), None, ()
         )
+    if not options.tracks:
+        return Cast(chosen, None, ())
     pixels = source_pixels(geometry, gaussians, index)
     cluster = grouping.cluster.numpy()[index]
     frames = chosen.source_frame.numpy()
@@ -230,7 +232,7 @@ def _merge(
             continue
         rows = np.flatnonzero(cluster == c)
         places = _places(geometry, path)
-        canonical_m = places[len(path.frames) // 2 if options.canonical == "middle" else 0]
+        canonical_m = places[len(path.frames) // 2]
         offsets = _offsets_at(times, clip.times_s[path.frames], places - canonical_m)
         where = np.searchsorted(path.frames, frames[rows])
         stretch = path.depth_m[where] / path.seen_depth_m[where]

@@ -9,10 +9,10 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from dreamdrive.decompose.errors import ErrorName, smoothed
+from dreamdrive.decompose.errors import smoothed
+from dreamdrive.motion import encode
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import encode
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.splat import one_torch_thread, render
@@ -31,8 +31,6 @@ class ScoreOptions:
     Attributes:
         target: What the splatted scores are compared with: ``"error"`` is the paper's error map (eq. 8),
             0.470; ``"error_and_evidence"`` also asks the recorded clip's moving evidence.
-        error: Which error, see ``errors.error_maps``: ``"l1"``; ``"dssim"`` has 0.465, and ``"features"``,
-            which calls too much moving, 0.277.
         error_scale: Error that counts as 1: absolute, so that a street where nothing moves scores nothing.
             With 0.1 0.482, with 0.4 0.483, relative to each frame's own errors 0.492.
         error_sigma_px: Blur of the error maps.
@@ -48,7 +46,6 @@ class ScoreOptions:
     """
 
     target: TargetName = "error_and_evidence"
-    error: ErrorName = "l1"
     error_scale: float = 0.2
     error_sigma_px: float = 2.0
     steps: int = 150

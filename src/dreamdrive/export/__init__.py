@@ -1,4 +1,4 @@
 """Scenes in other formats."""
 
 from dreamdrive.export.kinds import KINDS, export
-from dreamdrive.export.ply import left_out_of_ply, read_ply, write_ply
+from dreamdrive.export.ply import left_out_of_ply, write_ply

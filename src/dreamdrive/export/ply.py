@@ -1,20 +1,12 @@
 """Gaussians as PLY, in the layout that 3DGS viewers read."""
 
-import re
 from pathlib import Path
 
-import numpy as np
 import torch
 
-from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file, new_folder
-from dreamdrive.files.paths import read_bytes
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-
-_COEFFICIENTS = (1, 4, 9, 16)
-_MOST_BYTES = 4_000_000_000
-"""Largest PLY that is read: 17 million Gaussians of degree 3."""
 
 
 def write_ply(gaussians: Gaussians, path: Path) -> None:
@@ -30,40 +22,6 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
     data = _encode(gaussians)
     with new_file(path) as partial:
         partial.write_bytes(data)
-
-
-def read_ply(path: Path) -> Gaussians:
-    """Read a 3DGS PLY; fields in any order, further fields ignored.
-
-    Raises:
-        InputError: The file is missing, damaged or holds no Gaussians.
-    """
-    data = read_bytes(path, at_most=_MOST_BYTES)
-    names, count, start = _header(path, data)
-    size = 4 * len(names) * count
-    if len(data) < start + size:
-        raise InputError(f"{path} is cut off: {len(data) - start} bytes of {size} after the header")
-    table = np.frombuffer(data, dtype="<f4", count=len(names) * count, offset=start).reshape(
-        count, len(names)
-    )
-    rest = [f"f_rest_{i}" for i in range(sum(name.startswith("f_rest_") for name in names))]
-    coefficients = 1 + len(rest) // 3
-    if coefficients not in _COEFFICIENTS or len(rest) % 3 or not set(rest) <= set(names):
-        raise InputError(f"{path} has {len(rest)} f_rest fields; expected 0, 9, 24 or 45")
-
-    def take(*wanted: str) -> torch.Tensor:
-        return torch.from_numpy(np.ascontiguousarray(table[:, [names.index(n) for n in wanted]]))
-
-    base = take("f_dc_0", "f_dc_1", "f_dc_2")[:, None]
-    higher = take(*rest).view(count, 3, coefficients - 1).transpose(1, 2)
-    return Gaussians(
-        means=take("x", "y", "z"),
-        quaternions=take("rot_0", "rot_1", "rot_2", "rot_3"),
-        log_scales=take("scale_0", "scale_1", "scale_2"),
-        logit_opacities=take("opacity")[:, 0],
-        sh=torch.cat([base, higher], dim=1),
-        source_frame=torch.zeros(count, dtype=torch.int64),
-    )
 
 
 def export_ply(scene: Scene, path: Path) -> None:
@@ -121,27 +79,3 @@ def _encode(gaussians: Gaussians) -> bytes:
     ]
     table = torch.cat([c.detach().cpu().float() for c in columns], dim=1).numpy()
     return header.encode("ascii") + table.astype("<f4").tobytes()
-
-
-def _header(path: Path, data: bytes) -> tuple[list[str], int, int]:
-    """Names of the vertex fields, number of vertices, and where the numbers start."""
-    end = data.find(b"end_header\n")
-    if not data.startswith(b"ply\n") or end < 0:
-        raise InputError(f"{path} is no PLY file; expected one that 3DGS programs write")
-    lines = [line.split() for line in data[:end].decode("ascii", errors="replace").splitlines()]
-    if ["format", "binary_little_endian", "1.0"] not in lines:
-        raise InputError(f"{path} is not binary little endian; expected a PLY that 3DGS programs write")
-    elements = [line for line in lines if line[:1] == ["element"]]
-    fields = [line for line in lines if line[:1] == ["property"]]
-    is_plain = len(elements) == 1 and len(elements[0]) == 3 and elements[0][1] == "vertex"
-    if (
-        not is_plain
-        or not re.fullmatch("[0-9]{1,12}", elements[0][2])
-        or any(f[1:2] != ["float"] or len(f) != 3 for f in fields)
-    ):
-        raise InputError(f"{path}: expected one element vertex with float properties only")
-    names = [field[2] for field in fields]
-    missing = sorted(set(_fields(1)) - {"nx", "ny", "nz"} - set(names))
-    if missing or len(set(names)) != len(names):
-        raise InputError(f"{path} holds no Gaussians: {', '.join(missing) or 'a repeated field'}")
-    return names, int(elements[0][2]), end + len(b"end_header\n")

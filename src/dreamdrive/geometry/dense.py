@@ -26,8 +26,8 @@ from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
-PASSES = 8
-"""How often the frames are gone through one by one: the sweep, and seven times for what moves."""
+PASSES = 7
+"""How often the frames are gone through one by one: the sweep, and six times for what moves."""
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
@@ -94,7 +94,7 @@ def densify(
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
-        moving = _moving(view, inverse, confidence, sky, given, posed) * ~sky
+        moving = _moving(view, inverse, sky, given, posed) * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _finish(view, inverse, confidence, sky, moving)
@@ -103,7 +103,6 @@ def densify(
 def _moving(
     view: View,
     inverse: Float[np.ndarray, "f h w"],
-    confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     given: bool,
     posed: Posed,
@@ -112,7 +111,7 @@ def _moving(
         return standing_evidence(view)
     if posed.fallback is not None:
         return np.zeros(inverse.shape, np.float32)
-    return moving_evidence(view, inverse, confidence, sky, given)
+    return moving_evidence(view, inverse, sky, given)
 
 
 def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:

@@ -9,7 +9,6 @@ from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
 from dreamdrive.geometry.dense import Dense, StaticDepth, densify
 from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.moving import compared_with_traffic
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
 from dreamdrive.geometry.road import scale as scales
 from dreamdrive.scene.clip import Clip, Known
@@ -70,7 +69,7 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         "sky_share": float(dense.sky[used].mean()),
         "moving_share": float((dense.moving[used] >= 0.5).mean()),
     }
-    geometry = Geometry(
+    return Geometry(
         cameras=posed.cameras,
         depth_m=dense.depth_m,
         confidence=dense.confidence,
@@ -88,7 +87,6 @@ def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
         placed=posed.placed,
         metres_per_unit=posed.metres_per_unit,
     )
-    return replace(geometry, scale=compared_with_traffic(geometry))
 
 
 def _rough_factor(measured: Measured) -> float:

@@ -182,13 +182,13 @@ class Stages:
     def _compute(self, name: str, key: str, compute: Callable[[Work], T]) -> T:
         parts = inside(self.folder, f"{name}.parts")
 
-        def keep(part: str, make: Callable[[], U]) -> U:
-            place = parts / part
+        def keep(name: str, compute: Callable[[], U]) -> U:
+            place = parts / name
             found = _header(place)
             if found is not None and found.key == key:
                 with suppress(InputError):
                     return cast(U, codec.read(place))
-            value = make()
+            value = compute()
             self.claim()
             codec.write(place, value, asdict(_Header(key, 0, 0)))
             return cast(U, codec.read(place))

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 import torch
 from tests.scene.scenes import make_scene
+from tests.streets import small_street, street_clip, true_geometry
 
-from ablation import features, groups, scores
+from ablation import errors as errors_module
+from ablation import features, groups
 from ablation import main as ablation
 from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
+from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
 from dreamdrive.scene.features import OF_GEOMETRY
 from street import methods
 
@@ -128,9 +131,23 @@ def test_the_vote_is_that_of_eq_10() -> None:
     assert groups.majority(labels, scores, options).tolist() == [0] * 5 + [-1] * 10
 
 
+@pytest.mark.parametrize("name", ["dssim_errors", "feature_errors"])
+def test_every_error_is_largest_where_things_move(name: str) -> None:
+    street = small_street(size=(160, 96), frames=9)
+    clip, geometry = street_clip(street, hold_out=8), true_geometry(street)
+    seeds = initialise(clip, geometry, SeedOptions())
+    fitted = fit_static(clip, geometry, seeds, FitOptions(steps=40), 0, lambda *_: None)
+    before = {"prior": clip, "geometry": geometry, "initialise": seeds, "static": fitted}
+    errors = getattr(errors_module, name)(before, methods.QUALITY)
+    seen = ~clip.held_out
+    assert (errors >= 0).all()
+    assert (errors <= 1).all()
+    assert errors[seen][street.moving[seen]].mean() > 1.3 * errors[seen][~street.moving[seen]].mean()
+
+
 def test_errors_over_those_of_their_frame_do_not_depend_on_its_light() -> None:
     errors = np.random.default_rng(0).uniform(size=(1, 50, 50)).astype(np.float32)
-    both = scores.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
+    both = errors_module.scaled_by_frame(np.concatenate([errors, 0.1 * errors]), 0.2)
     np.testing.assert_allclose(both[0], both[1], rtol=1e-5)
     assert np.percentile(both[0], 98) == pytest.approx(0.2)
 

@@ -1,24 +1,20 @@
 """LPIPS against the package of its authors, with seeded weights."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from tests.evaluate.golden import Golden, seeded_state
+from tests.evaluate.networks.seeded import seeded_state
+from tests.golden.reading import cases, tensors, values
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks.lpips import CHANNELS, load_lpips
+from dreamdrive.evaluate.networks.lpips import CHANNELS, TRUNKS, load_lpips
 
 
-@pytest.fixture(scope="module")
-def golden(golden_dir: Path) -> Golden:
-    return Golden(golden_dir, "perceptual")
-
-
-def files(golden: Golden, kind: str, folder: Path) -> tuple[Path, Path]:
+def files(settings: dict[str, Any], kind: str, folder: Path) -> tuple[Path, Path]:
     """Trunk and heads as the well-known files hold them."""
-    settings = golden.values[f"lpips_{kind}"]
     slices = seeded_state(settings["net_keys"], settings["weights_seed"])
     trunk = {"features." + key.split(".", 1)[1]: value for key, value in slices.items()}
     rng = np.random.RandomState(settings["lin_seed"])
@@ -33,18 +29,20 @@ def files(golden: Golden, kind: str, folder: Path) -> tuple[Path, Path]:
     return folder / f"{kind}.pth", folder / f"{kind}_heads.pth"
 
 
-@pytest.mark.parametrize("kind", ["alex", "vgg"])
-def test_golden_distances(golden: Golden, tmp_path: Path, kind: str) -> None:
-    distance = load_lpips(*files(golden, kind, tmp_path))
+@pytest.mark.parametrize("kind", cases("eval/perceptual.json", "lpips_(.+)"))
+def test_golden_distances(tmp_path: Path, kind: str) -> None:
+    settings, images = values("eval/perceptual.json")[f"lpips_{kind}"], tensors("eval/perceptual.npz")
+    distance = load_lpips(*files(settings, kind, tmp_path))
     assert distance.kind == kind
-    settings = golden.values[f"lpips_{kind}"]
-    a, b = golden.tensor("lpips/a"), golden.tensor("lpips/b")
+    a, b = images["lpips/a"], images["lpips/b"]
+    # A sum of squares through all layers in float32: 1e-6 was seen.
     assert distance(2 * a - 1, 2 * b - 1).item() == pytest.approx(settings["normalize_true"], rel=1e-4)
     assert distance(a, b).item() == pytest.approx(settings["normalize_false_01_input"], rel=1e-4)
 
 
-def test_files_of_different_networks_are_refused(golden: Golden, tmp_path: Path) -> None:
-    trunk, heads = files(golden, "alex", tmp_path)
+def test_files_of_different_networks_are_refused(tmp_path: Path) -> None:
+    shapes = {key: list(value.shape) for key, value in TRUNKS["alex"]().state_dict().items()}
+    trunk, heads = files({"net_keys": shapes, "weights_seed": 1, "lin_seed": 2}, "alex", tmp_path)
     torch.save({"lin0.model.1.weight": torch.zeros(1, 64, 1, 1)}, heads)
     with pytest.raises(InputError, match=r"4 missing: lin1.model.1.weight.*here those of alex"):
         load_lpips(trunk, heads)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from tests.conftest import ROOT
-from tests.evaluate.golden import relative
+from tests.golden.reading import close
 from torch import Tensor
 
 from dreamdrive.errors import InputError
@@ -51,14 +51,14 @@ def test_golden_efficientnet_lite0() -> None:
     network = installed(load_efficientnet_lite0)
     settings = GOLDEN["efficientnet_lite0"]
     got = efficientnet_lite0_features(network, frames(settings))[0, :: settings["every"]]
-    assert relative(got, torch.tensor(settings["features"])) < 1e-4
+    close(got, torch.tensor(settings["features"]), 1e-4)
 
 
 def test_golden_transnetv2() -> None:
     network = installed(load_transnet)
     settings = GOLDEN["transnetv2"]
     got = transnet_features(network, frames(settings))[:: settings["every"]]
-    assert relative(got, torch.tensor(settings["features"])) < 1e-4
+    close(got, torch.tensor(settings["features"]), 1e-4)
 
 
 def test_networks_run_without_their_weights() -> None:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
+from dreamdrive.geometry.dense import densify
 from dreamdrive.geometry.depth.view import View, make_view
+from dreamdrive.geometry.moving.evidence import FLAGGED
 from dreamdrive.geometry.moving.oncoming import oncoming
 
 STEP_M = 0.8
@@ -54,3 +56,13 @@ def test_a_road_that_leaves_the_picture_is_no_trouble() -> None:
     plane = view.plane_inverse.copy()
     plane[:, :, :40] = 0
     assert oncoming(replace(view, plane_inverse=plane))[3].any()
+
+
+def test_an_oncoming_box_is_flagged_and_the_same_parked_is_not() -> None:
+    coming = toy.drive([toy.Box(15, -3.5, -STEP_M)], step_m=STEP_M)
+    dense = densify(coming.clip, coming.posed)
+    flagged, box = dense.moving[MIDDLE] >= FLAGGED, coming.box[MIDDLE]
+    assert flagged[box].mean() > 0.6
+    assert flagged[~box].mean() < 0.01
+    parked = toy.drive([toy.Box(15, -3.5, 0)], step_m=STEP_M)
+    assert (densify(parked.clip, parked.posed).moving[parked.box] >= FLAGGED).mean() < 0.02

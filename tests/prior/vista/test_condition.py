@@ -5,41 +5,55 @@ from math import pi
 import pytest
 import torch
 from diffusers.models.embeddings import Timesteps
-from tests.prior.vista.conftest import Golden
+from tests.golden.reading import cases, close, tensors
 
 from dreamdrive.prior.vista.condition import NUMBERS, clip_pixels, embed_action, numbers_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, MOTION_BUCKET, VISTA
 from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
 
 KINDS = {name: [name] for name in NUMBERS} | {"steer": ["speed", "angle"], "free": [], "all": list(NUMBERS)}
+LIMIT = 1e-5
+"""Of the largest value: sines of numbers up to some tens, which float32 rounds to 4e-6."""
+FILE = "vista/conditioning.safetensors"
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_golden_columns_of_each_action(golden: Golden, name: str) -> None:
-    given = golden.tensors("conditioning")
+@pytest.mark.parametrize("name", cases(FILE, r"(.+)\.c\.crossattn"))
+def test_golden_columns_of_each_action(name: str) -> None:
+    given = tensors(FILE)
     columns = embed_action({kind: given[f"in.{kind}"].flatten().tolist() for kind in KINDS[name]})
     image = given["in.cond_frames_without_noise"].flatten()
-    context = torch.cat([image, columns])
-    torch.testing.assert_close(context, given[f"{name}.c.crossattn"].flatten(), atol=2e-6, rtol=0)
+    close(torch.cat([image, columns]), given[f"{name}.c.crossattn"].flatten(), LIMIT)
+    assert torch.equal(given[f"{name}.c.concat"], given["in.cond_frames"])
 
 
-def test_the_golden_settings_are_ours(golden: Golden) -> None:
-    given = golden.tensors("conditioning")
-    ids = torch.tensor([VISTA.rate_hz - 1, MOTION_BUCKET, VISTA.noise])
-    vector = Timesteps(256, flip_sin_to_cos=True, downscale_freq_shift=0)(ids).flatten()
-    for branch in ("c", "uc"):
-        torch.testing.assert_close(vector, given[f"free.{branch}.vector"][0], atol=1e-5, rtol=0)
-    assert not given["all.uc.crossattn"].any()
-    assert not given["all.uc.concat"].any()
-    assert torch.equal(given["all.c.concat"], given["in.cond_frames"])
+@pytest.mark.parametrize("name", cases(FILE, r"(.+\.u?c)\.vector"))
+def test_golden_encoding_of_rate_motion_and_noise(name: str) -> None:
+    given = tensors(FILE)
+    ids = torch.cat([given[f"in.{number}"] for number in ("fps_id", "motion_bucket_id", "cond_aug")]).float()
+    vector = given[f"{name}.vector"].flatten()
+    width = len(vector) // len(ids)
+    close(Timesteps(width, flip_sin_to_cos=True, downscale_freq_shift=0)(ids).flatten(), vector, LIMIT)
 
 
-def test_golden_clip_sees_a_square(golden: Golden) -> None:
-    given = golden.tensors("clip_preprocess")
+@pytest.mark.parametrize("name", cases(FILE, r"(.+\.uc)\.crossattn"))
+def test_golden_conditions_of_the_other_branch_are_zeros(name: str) -> None:
+    given = tensors(FILE)
+    assert not given[f"{name}.crossattn"].any()
+    assert not given[f"{name}.concat"].any()
+
+
+def test_the_settings_are_those_of_the_public_script() -> None:
+    assert (VISTA.rate_hz - 1, MOTION_BUCKET, VISTA.noise) == (9, 127, 0)
+
+
+def test_golden_clip_sees_a_square() -> None:
+    given = tensors("vista/clip_preprocess.safetensors")
     made = clip_pixels(given["image_fp16"].float())
-    assert made.shape == (1, 3, 224, 224)
     stride = int(given["note_stride"])
-    torch.testing.assert_close(made[..., ::stride, ::stride], given["clip_input"], atol=1e-6, rtol=0)
+    close(made[..., ::stride, ::stride], given["clip_input"], LIMIT)
+
+
+def test_clip_sees_a_square_of_small_pictures_too() -> None:
     assert clip_pixels(torch.zeros(1, 3, 64, 64)).shape == (1, 3, 224, 224)
 
 

@@ -3,27 +3,25 @@
 from pathlib import Path
 
 import pytest
-from tests.prior.vista.conftest import Golden
+from tests.prior.vista.tiny import OFFICIAL
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.configs import config_of
-from dreamdrive.prior.vista.keys import PARTS, recipes_of
+from dreamdrive.prior.vista.keys import PARTS
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.memory import LOOKING, Free, Job, check_memory, plan_memory
+from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.prior.vista.stored import Stored, StoredPart, open_weights
 
 SIZE = (1024, 576)
 
 
 @pytest.fixture(scope="module")
-def official_size(golden: Golden) -> Stored:
-    import json
-
-    keys = json.loads((golden.folder / "vista_checkpoint_keys.json").read_text())
-    recipes = recipes_of(keys)
+def official_size() -> Stored:
     parts = {}
     for part in PARTS:
-        shapes = recipes.shapes(part, {key: tuple(shape) for key, shape in keys.items()})
+        state = make_empty(part, OFFICIAL[part], VISTA).state_dict()
+        shapes = {name: tuple(value.shape) for name, value in state.items()}
         parts[part] = StoredPart(config_of(part, shapes), shapes, lambda name: pytest.fail(name))
     return Stored(Path("vista.safetensors"), VISTA, parts)
 

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 import torch
-from tests.prior.vista.conftest import Golden
+from tests.golden.reading import cases, close, tensors
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
@@ -12,6 +12,12 @@ from dreamdrive.prior.vista.decode import CHUNK, SHARED, chunks, decode_in_chunk
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.rollout import SCALE, Model, Seen, roll_out, rounds_for
 from dreamdrive.prior.vista.sampler import Branches, Velocity
+
+FILE = "vista/rollout_standin.safetensors"
+STEPS = 4
+"""Of each round, which no entry tells."""
+LIMIT = 1e-5
+"""Of the largest value: each round starts from the rounding of the one before."""
 
 
 def stand_in(given: dict[str, Tensor], described: list[Tensor]) -> Model:
@@ -47,29 +53,34 @@ def stand_in(given: dict[str, Tensor], described: list[Tensor]) -> Model:
     return Model(encode, decode, describe, velocity)
 
 
-@pytest.mark.parametrize("rounds", [1, 3])
-def test_golden_rounds(golden: Golden, rounds: int) -> None:
-    given, described = golden.tensors("rollout_standin"), list[Tensor]()
-    model = stand_in(given, described)
-    noise = given[f"r{rounds}.noise"]
+@pytest.mark.parametrize("rounds", cases(FILE, r"r(\d+)\.latents"))
+def test_golden_rounds(rounds: str) -> None:
+    given, described = tensors(FILE), list[Tensor]()
+    model, expected = stand_in(given, described), given.under(f"r{rounds}.")
     told: list[None] = []
+    count = len(expected["noise"])
     made = roll_out(
-        model, VISTA, given["images"][:1], noise, [None] * rounds, 4, tell=lambda: told.append(None)
+        model,
+        VISTA,
+        given["images"][:1],
+        expected["noise"],
+        [None] * count,
+        STEPS,
+        tell=lambda: told.append(None),
     )
-    assert len(told) == 4 * rounds
-    # Latents reach 44 and frames 240 after three rounds; the differences are those of float32.
-    torch.testing.assert_close(made, given[f"r{rounds}.latents"], atol=2e-5, rtol=5e-6)
-    torch.testing.assert_close(torch.cat(described), given[f"r{rounds}.cond_img"], atol=1e-4, rtol=0)
-    frames = (decode_in_chunks(model.decode, made / SCALE) + 1) / 2
-    torch.testing.assert_close(frames.clamp(0, 1), given[f"r{rounds}.frames"], atol=1e-4, rtol=0)
+    assert len(told) == STEPS * count
+    close(made, expected["latents"], LIMIT)
+    close(torch.cat(described), expected["cond_img"], LIMIT)
+    decoded = (decode_in_chunks(model.decode, expected["latents"] / SCALE) + 1) / 2
+    # Ten times the limit: of what the clamp leaves, which is little of the frames.
+    close(decoded.clamp(0, 1), expected["frames"], 10 * LIMIT)
 
 
-@pytest.mark.parametrize("count", [14, 25, 47])
-def test_golden_chunks_overlap_by_their_mean(golden: Golden, count: int) -> None:
-    given = golden.tensors("rollout_standin")
-    model = stand_in(given, [])
-    made = decode_in_chunks(model.decode, given[f"decode_in_{count}"] / SCALE)
-    torch.testing.assert_close(made, given[f"decode_out_{count}"], atol=1e-5, rtol=0)
+@pytest.mark.parametrize("count", cases(FILE, r"decode_in_(\d+)"))
+def test_golden_chunks_overlap_by_their_mean(count: str) -> None:
+    given = tensors(FILE)
+    made = decode_in_chunks(stand_in(given, []).decode, given[f"decode_in_{count}"] / SCALE)
+    close(made, given[f"decode_out_{count}"], LIMIT)
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 4, 14])

@@ -1,15 +1,18 @@
 """The autoencoder against the public code."""
 
-import torch
-from tests.prior.vista.conftest import Golden
-from tests.prior.vista.golden import build
+from tests.golden.reading import close, tensors
+from tests.prior.vista.networks import build
+
+LIMIT = 3e-5
+"""Of the largest value; the same library in float32 differs by 4e-6 from the public code."""
 
 
-def test_golden_frames_there_and_back(golden: Golden) -> None:
-    given = golden.tensors("vae")
-    vae = build("vae", {k: v.float() for k, v in golden.tensors("tiny_vae_state_fp16").items()})
+def test_golden_frames_there_and_back() -> None:
+    given = tensors("vista/vae.safetensors")
+    state = tensors("vista/tiny_vae_state_fp16.safetensors")
+    vae = build("vae", {k: v.float() for k, v in state.items()})
     coded = vae.encode(given["image"]).latent_dist
-    torch.testing.assert_close(coded.parameters, given["moments"], atol=1e-5, rtol=0)
-    torch.testing.assert_close(coded.mode(), given["mode"], atol=1e-5, rtol=0)
+    close(coded.parameters, given["moments"], LIMIT)
+    close(coded.mode(), given["mode"], LIMIT)
     frames = vae.decode(given["z"], num_frames=len(given["z"])).sample
-    torch.testing.assert_close(frames, given["frames"], atol=1e-5, rtol=0)
+    close(frames, given["frames"], LIMIT)

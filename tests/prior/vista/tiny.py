@@ -24,6 +24,34 @@ _VISUAL = "conditioner.embedders.0.open_clip.model.visual."
 _BLOCKS = ("{}BlockSpatioTemporal", "CrossAttn{}BlockSpatioTemporal", "{}BlockSpatioTemporal")
 
 
+OFFICIAL: dict[Part, dict[str, Any]] = {
+    "unet": {
+        "in_channels": 8,
+        "block_out_channels": [320, 640, 1280, 1280],
+        "down_block_types": [*["CrossAttnDownBlockSpatioTemporal"] * 3, "DownBlockSpatioTemporal"],
+        "up_block_types": ["UpBlockSpatioTemporal", *["CrossAttnUpBlockSpatioTemporal"] * 3],
+        "layers_per_block": 2,
+        "cross_attention_dim": 1024 + ACTION_COLUMNS,
+        "num_attention_heads": [5, 10, 20, 20],
+    },
+    "vae": {
+        "block_out_channels": [128, 256, 512, 512],
+        "down_block_types": ["DownEncoderBlock2D"] * 4,
+        "layers_per_block": 2,
+    },
+    "image_encoder": {
+        "hidden_size": 1280,
+        "intermediate_size": 5120,
+        "num_hidden_layers": 32,
+        "num_attention_heads": 16,
+        "projection_dim": 1024,
+        "patch_size": 14,
+        "image_size": 224,
+    },
+}
+"""Sizes of the published Vista."""
+
+
 def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
     """Of each part: one width, as few layers as there can be with the block that the features come from."""
     return {

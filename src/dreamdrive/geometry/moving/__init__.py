@@ -2,4 +2,3 @@
 
 from dreamdrive.geometry.moving.evidence import FLAGGED, moving_evidence, standing_evidence
 from dreamdrive.geometry.moving.flow import pixel_grid
-from dreamdrive.geometry.moving.traffic import compared_with_traffic

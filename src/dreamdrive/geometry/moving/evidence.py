@@ -8,7 +8,6 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.depth import View, by_frame, sample
 from dreamdrive.geometry.moving import contest
-from dreamdrive.geometry.moving.floating import Floating, floating
 from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.moving.oncoming import oncoming
 from dreamdrive.geometry.moving.outline import outline
@@ -32,7 +31,6 @@ _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 def moving_evidence(
     view: View,
     inverse_depth: Float[np.ndarray, "f h w"],
-    confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     known_depth: bool,
 ) -> Float[np.ndarray, "f h w"]:
@@ -40,13 +38,11 @@ def moving_evidence(
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
     enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
-    static ones; they are found where they visibly do not stand on the road, by the motion of whole stretches
-    (``oncoming``) and by the surest pixels of depth that was found (``floating``).
+    static ones; they are found where they visibly do not stand on the road, see ``oncoming``.
 
     Args:
         view: The posed frames.
         inverse_depth: Static depth in 1/m.
-        confidence: Trust in it.
         sky: Sky masks; nothing grows into them.
         known_depth: Whether that depth was given rather than found.
     """
@@ -64,8 +60,7 @@ def moving_evidence(
     found = by_frame(view, decided)
     coming: dict[int, np.ndarray] = {}
     if not known_depth:
-        floats = _floating(view, flows, inverse_depth, confidence, sky)
-        coming = {frame: (mask & ~sky[frame]) | floats[frame] for frame, mask in oncoming(view).items()}
+        coming = {frame: mask & ~sky[frame] for frame, mask in oncoming(view).items()}
     found |= {frame: np.where(mask, 1, found[frame]) for frame, mask in coming.items()}
     flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
     for around in range(_ROUNDS):
@@ -83,26 +78,6 @@ def moving_evidence(
         inside, outside = np.maximum(found[frame], FLAGGED), np.minimum(found[frame], 0.9 * FLAGGED)
         evidence[frame] = np.where(flagged[frame], inside, outside)
     return evidence
-
-
-def _floating(
-    view: View,
-    flows: Mapping[int, list[PairFlow]],
-    inverse_depth: Float[np.ndarray, "f h w"],
-    confidence: Float[np.ndarray, "f h w"],
-    sky: Bool[np.ndarray, "f h w"],
-) -> dict[int, Bool[np.ndarray, "h w"]]:
-    """What seems to float, after the vote of the neighbours."""
-
-    def seen(frame: int) -> Floating:
-        return floating(view, frame, flows[frame], inverse_depth[frame], confidence[frame], sky[frame])
-
-    things = by_frame(view, seen)
-    likely = {frame: thing.likely.astype(np.float32) for frame, thing in things.items()}
-    return {
-        frame: decide(_vote(likely, frame, flows[frame]), things[frame].sure, view.usable[frame]) >= FLAGGED
-        for frame in view.frames
-    }
 
 
 def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:

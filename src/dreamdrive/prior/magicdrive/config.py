@@ -95,7 +95,7 @@ def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
     if "bbox_embedder_param" not in controlnet:
         raise InputError(f"controlnet/config.json has no bbox_embedder_param: {_PLAIN_SD}")
     try:
-        settings = _settings(unet, controlnet)
+        settings = parse_settings(unet, controlnet)
     except InputError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -107,6 +107,8 @@ def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
             f"controlnet/config.json: the map is {settings.map_shape}; only square maps of the "
             f"{len(CHANNELS)} channels {', '.join(CHANNELS)} are drawn here"
         )
+    if settings.views != len(NUSCENES):
+        raise InputError(f"unet/config.json: {settings.views} cameras; expected a ring of {len(NUSCENES)}")
     if settings.box_classes != len(CLASSES):
         raise InputError(
             f"controlnet/config.json: n_classes is {settings.box_classes}; expected {len(CLASSES)}"
@@ -115,7 +117,8 @@ def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
     return settings
 
 
-def _settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
+def parse_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
+    """The same of any network that is built here, whether or not there are inputs of its shapes."""
     boxes = controlnet["bbox_embedder_param"]
     _refuse_others("unet/config.json", unet, _UNET)
     _refuse_others("controlnet/config.json", controlnet, _CONTROLNET)
@@ -156,7 +159,7 @@ def _ring(neighbours: dict[str, list[int]]) -> int:
     """Number of cameras, each of which sees the one before and the one after it."""
     count = len(neighbours)
     ring = {str(i): [(i - 1) % count, (i + 1) % count] for i in range(count)}
-    if ring != neighbours or count != len(NUSCENES):
+    if ring != neighbours:
         raise InputError(
             f"unet/config.json: neighboring_view_pair is {neighbours}; "
             f"expected a ring of {len(NUSCENES)} cameras"

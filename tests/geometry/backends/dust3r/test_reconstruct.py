@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.golden import tiny
+from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 

@@ -7,9 +7,8 @@ from jaxtyping import Int
 
 from dreamdrive.errors import InputError
 
-_FORMS = "complete, swin[-K][-noncyclic], logwin[-K][-noncyclic], oneref[-R]"
-_GRAPH = re.compile(r"(complete)|(swin|logwin)(?:-(\d+))?(-noncyclic)?|(oneref)(?:-(\d+))?")
-_FILTER = re.compile(r"(seq|cyc)(\d+)")
+_FORMS = "complete, swin[-K][-noncyclic], logwin[-K][-noncyclic]"
+_GRAPH = re.compile(r"(complete)|(swin|logwin)(?:-(\d+))?(-noncyclic)?")
 _WINDOW = 3  # where none is named
 _SHORT = 24  # frames; a chain of windows over more of them drifts
 
@@ -29,10 +28,8 @@ def video_graph(frames: int) -> str:
     return "swin-3-noncyclic" if frames <= _SHORT else "logwin-5-noncyclic"
 
 
-def make_pairs(
-    frames: int, graph: str = "swin-3-noncyclic", *, symmetrise: bool = True, prefilter: str | None = None
-) -> Int[np.ndarray, "e 2"]:
-    """Pairs (E, 2) of frame indices; a frame is never paired with itself.
+def make_pairs(frames: int, graph: str = "swin-3-noncyclic") -> Int[np.ndarray, "e 2"]:
+    """Pairs (E, 2) of frame indices, all in reverse at the end; a frame is never paired with itself.
 
     Args:
         frames: Number of frames, at least 2.
@@ -40,45 +37,31 @@ def make_pairs(
 
             - ``complete``: all pairs,
             - ``swin-K``: frames up to K apart, 3 where no K is given,
-            - ``logwin-K``: frames 1, 2, 4 ... 2^(K-1) apart,
-            - ``oneref-R``: frame R with each other one, 0 where no R is given.
+            - ``logwin-K``: frames 1, 2, 4 ... 2^(K-1) apart.
 
             Windows close into a circle unless the name ends in ``-noncyclic``.
-        symmetrise: Whether each pair also comes in reverse, after all others.
-        prefilter: ``seqD`` keeps the pairs at most D apart, ``cycD`` those at most D apart on the circle.
 
     Raises:
-        InputError: Fewer than two frames, a graph or filter of another form, or no pair is left.
+        InputError: Fewer than two frames, or a graph of another form.
     """
     if frames < 2:
         raise InputError(f"{frames} frames make no pair; at least 2 are needed")
     pairs = _of_graph(frames, graph)
-    if symmetrise:
-        pairs = pairs + [(j, i) for i, j in pairs]
-    if prefilter is not None:
-        pairs = _filtered(pairs, prefilter)
-    if not pairs:
-        raise InputError(f"graph {graph!r} with the filter {prefilter!r} leaves no pair of {frames} frames")
-    return np.array(pairs, dtype=np.int64)
+    return np.array(pairs + [(j, i) for i, j in pairs], dtype=np.int64)
 
 
 def _of_graph(frames: int, graph: str) -> list[Pair]:
     match = _GRAPH.fullmatch(graph)
     if match is None:
         raise InputError(f"graph {graph!r} is unknown; expected {_FORMS}")
-    complete, window, size, noncyclic, _, reference = match.groups()
+    complete, window, size, noncyclic = match.groups()
     if complete:
         return [(i, j) for i in range(frames) for j in range(i)]
-    if window:
-        count = min(_WINDOW if size is None else int(size), frames)  # more of them pair nothing new
-        if count < 1:
-            raise InputError(f"graph {graph!r}: the window has to be at least 1")
-        steps = [1 + i if window == "swin" else 2**i for i in range(count)]
-        return _within(frames, steps, cyclic=noncyclic is None)
-    centre = 0 if reference is None else int(reference)
-    if centre >= frames:
-        raise InputError(f"graph {graph!r}: there are only frames 0 to {frames - 1}")
-    return [(centre, j) for j in range(frames) if j != centre]
+    count = min(_WINDOW if size is None else int(size), frames)  # more of them pair nothing new
+    if count < 1:
+        raise InputError(f"graph {graph!r}: the window has to be at least 1")
+    steps = [1 + i if window == "swin" else 2**i for i in range(count)]
+    return _within(frames, steps, cyclic=noncyclic is None)
 
 
 def _within(frames: int, steps: list[int], *, cyclic: bool) -> list[Pair]:
@@ -89,16 +72,3 @@ def _within(frames: int, steps: list[int], *, cyclic: bool) -> list[Pair]:
         if i != j and j < frames
     }
     return sorted(found)
-
-
-def _filtered(pairs: list[Pair], prefilter: str) -> list[Pair]:
-    match = _FILTER.fullmatch(prefilter)
-    if match is None:
-        raise InputError(f"prefilter {prefilter!r} is unknown; expected seqD or cycD with a number D")
-    most = int(match.group(2))
-    count = 1 + max(max(pair) for pair in pairs)
-
-    def apart(i: int, j: int) -> int:
-        return min(abs(i - j), count - abs(i - j)) if match.group(1) == "cyc" else abs(i - j)
-
-    return [(i, j) for i, j in pairs if apart(i, j) <= most]

@@ -21,12 +21,13 @@ def street(
     turn: float = 0.03,
     seed: int = 0,
     principal_px: tuple[float, float] | None = None,
+    focal: float = 0.9,
 ) -> Truth:
-    """A drive between two walls over a level road under the sky, with bumps on all of it."""
+    """A drive between two walls over a level road under the sky, with bumps; ``focal`` is in widths."""
     cx, cy = principal_px or (width / 2, height / 2)
     random = np.random.default_rng(seed)
-    focal = 0.9 * width
-    columns, rows = np.meshgrid((np.arange(width) - cx) / focal, (np.arange(height) - cy) / focal)
+    focal_px = focal * width
+    columns, rows = np.meshgrid((np.arange(width) - cx) / focal_px, (np.arange(height) - cy) / focal_px)
     rays = np.stack([columns, rows, np.ones_like(columns)], axis=-1)
     poses, yaw, place = [], 0.0, np.zeros(3)
     for frame in range(frames):
@@ -38,7 +39,7 @@ def street(
         place = place + step * np.array([np.sin(yaw), 0.02 * np.sin(frame), np.cos(yaw)])
     bumps = random.uniform(0, 2 * np.pi, 3)
     depths = [_ray_depth(rays, pose, bumps) for pose in poses]
-    return Truth(np.stack(depths), np.stack(poses), focal, principal_px=principal_px)
+    return Truth(np.stack(depths), np.stack(poses), focal_px, principal_px=principal_px)
 
 
 def pinholes(truth: Truth) -> np.ndarray:

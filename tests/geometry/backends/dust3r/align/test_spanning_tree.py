@@ -1,12 +1,12 @@
 """The start of an alignment: upstream's, number for number, and ours without its defects."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.goldens import scene
 from tests.geometry.backends.dust3r.align.pairs import path_error, street, window
+from tests.geometry.backends.dust3r.align.scenes import PNP, extent, runs_with, scene
+from tests.golden.reading import close
 
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
@@ -15,31 +15,60 @@ from geometry.simulated_pairs import Noise, pair_maps
 EXACT = Noise(0, 1 / 8, 0, 0, 0)
 
 
-@pytest.mark.parametrize(("name", "run"), [("A", "cosine"), ("B", "cosine"), ("B", "fixed")])
-def test_the_switch_gives_the_golden_start(golden_dir: Path, name: str, run: str) -> None:
-    maps, _, wanted = scene(golden_dir, name)
-    start = spanning_tree(maps, upstream=True, stale_focals=run != "fixed")
-    np.testing.assert_allclose(start.focals_px, wanted[f"{run}.init.focals"], rtol=1e-5)
-    np.testing.assert_allclose(start.world_from_camera, wanted[f"{run}.init.poses"], atol=1e-5)
-    np.testing.assert_allclose(_matrices(start), wanted[f"{run}.init.pw_poses"], atol=1e-5)
+@pytest.mark.parametrize(("name", "run"), runs_with("init.focals"))
+def test_the_switch_gives_the_golden_start(name: str, run: str) -> None:
+    """To the rounding of the authors' float32, and of OpenCV where it posed an image."""
+    given = scene(name)
+    wanted = given.outputs.under(f"{run}.init.")
+    start = spanning_tree(given.maps, upstream=True, stale_focals=run != "fixed")
+    close(start.focals_px, wanted["focals"], 1e-5)
+    close(_matrices(start), wanted["pw_poses"], 1e-5)
+    loose = given.posed_by_pnp(run)
     for image, depth in enumerate(start.depth):
-        np.testing.assert_allclose(depth, wanted[f"{run}.init.depth.{image}"], rtol=1e-5)
+        limit = PNP if image in loose else 1e-5
+        difference = start.world_from_camera[image] - wanted["poses"][image]
+        assert np.abs(difference[:3, :3]).max() < limit
+        assert np.abs(difference[:3, 3]).max() < limit * extent(wanted["poses"])
+        apart = np.abs(depth - wanted[f"depth.{image}"]) / np.abs(wanted[f"depth.{image}"]).max()
+        # A point in the plane of the camera may fall on either side of it.
+        assert np.quantile(apart, 0.998) < limit
 
 
-def test_an_image_of_a_golden_scene_has_its_own_focal_length(golden_dir: Path) -> None:
-    maps, inputs, _ = scene(golden_dir, "B")
+@pytest.fixture(scope="module")
+def two_lenses() -> tuple[PairMaps, np.ndarray, np.ndarray]:
+    """A drive whose every third image has a focal length 1.5 times as long, poses and focal lengths."""
+    drives = [street(6, 48, 30), street(6, 48, 30, focal=1.35)]
+    images = [drives[1] if image % 3 == 2 else drives[0] for image in range(6)]
+    focals = np.array([truth.focal_px for truth in images])
+    maps = [pair_maps(truth, window(6), Noise(outliers=0, focal=0)) for truth in drives]
+    points, confidence = (
+        tuple(
+            tuple(parts[image % 3 == 2][edge][side] for side, image in enumerate(pair))
+            for edge, pair in enumerate(window(6).tolist())
+        )
+        for parts in ([each.points for each in maps], [each.confidence for each in maps])
+    )
+    return PairMaps(window(6), points, confidence), drives[0].world_from_camera, focals
+
+
+def test_an_image_has_its_own_focal_length(two_lenses) -> None:
+    maps, _, focals = two_lenses
     ours, theirs = spanning_tree(maps), spanning_tree(maps, upstream=True)
-    assert np.abs(theirs.focals_px / inputs["gt.focals"] - 1).max() > 0.4
-    assert np.abs(ours.focals_px / inputs["gt.focals"] - 1).max() < 0.02
+    assert np.abs(theirs.focals_px / focals - 1).max() > 0.2
+    assert np.abs(ours.focals_px / focals - 1).max() < 0.02
 
 
-def test_ours_starts_nearer_to_the_golden_truth(golden_dir: Path) -> None:
-    maps, inputs, _ = scene(golden_dir, "A")
+def test_ours_starts_nearer_to_the_truth() -> None:
+    truth = street(6, 48, 30)
     errors = [
-        path_error(spanning_tree(maps, upstream=upstream).world_from_camera, inputs["gt.cam2world"])
-        for upstream in (False, True)
+        [
+            path_error(spanning_tree(maps, upstream=upstream).world_from_camera, truth.world_from_camera)
+            for upstream in (False, True)
+        ]
+        for maps in (pair_maps(truth, window(6), Noise(), seed=seed) for seed in range(4))
     ]
-    assert errors[0] < 0.5 * errors[1]
+    ours, theirs = np.mean(errors, axis=0)
+    assert ours < 0.5 * theirs
 
 
 def test_exact_pairs_give_the_truth_even_where_no_edge_starts() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.geometry.backends.dust3r.network.golden import TINY, tiny
+from tests.geometry.backends.dust3r.network.networks import TINY, tiny
 from torch import Tensor
 
 from dreamdrive.errors import InputError

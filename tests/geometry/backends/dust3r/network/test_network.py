@@ -2,37 +2,41 @@
 
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.golden import Golden, relative, tiny
+from tests.geometry.backends.dust3r.network.networks import golden_network, tiny
+from tests.golden.reading import Table, cases, close, relative, tensors, values
 from torch import Tensor, nn
 
-from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
+from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig, config_from_shapes
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap, pointmap
 from dreamdrive.geometry.backends.dust3r.network.rope import Rotation, grid_positions, rotate, rotation
 
-LIMIT = 3e-5
-# The head of 39 million weights takes seconds to seed.
-MODELS = ("linear", "dpt_small", pytest.param("dpt", marks=pytest.mark.slow))
+LIMIT = 1e-4
+"""Share of the largest value of a tensor. Float32 rounds to 6e-8 of each number; through some tens of layers
+and the exponential of the points 5e-6 was seen, and another processor adds up in another order."""
+MODELS = [
+    # The head of 39 million weights takes seconds to seed.
+    pytest.param(model, marks=pytest.mark.slow) if model == "dpt" else model
+    for model in cases("dust3r/net_config.json")
+]
 CASES = {
     "land": ("land_a", "land_b"),
     "port": ("port_a", "port_b"),
     "big": ("big_a", "big_b"),
     "mixed": ("land_a", "port_b"),
 }
+network = cache(golden_network)
 
 
-@pytest.fixture(scope="module")
-def golden(golden_dir: Path) -> Golden:
-    return Golden(golden_dir)
+def inputs() -> Table:
+    return tensors("dust3r/net_inputs.safetensors")
 
 
-@pytest.fixture(scope="module")
-def network(golden: Golden) -> Callable[[str], Dust3r]:
-    return cache(golden.network)
+def outputs(model: str) -> Table:
+    return tensors(f"dust3r/net_{model}_outputs.safetensors")
 
 
 def decoded(network: Dust3r, first: Tensor, second: Tensor) -> dict[str, Tensor]:
@@ -46,51 +50,47 @@ def decoded(network: Dust3r, first: Tensor, second: Tensor) -> dict[str, Tensor]
     }
 
 
-def check(values: dict[str, Tensor], expected: dict[str, Tensor], case: str) -> None:
+def check(values: dict[str, Tensor], expected: Table, case: str) -> None:
     for name, value in values.items():
-        assert relative(value, expected[f"{case}.{name}"]) < LIMIT, name
+        close(value, expected[f"{case}.{name}"], LIMIT, name)
 
 
 @pytest.mark.parametrize("head", ["dpt", "linear"])
-def test_the_weights_have_the_published_names_and_shapes(golden: Golden, head: str) -> None:
-    published = golden.json(f"state_dict_512_{head}")
+def test_golden_names_and_shapes_of_the_published_weights(head: str) -> None:
+    published = values(f"dust3r/state_dict_512_{head}.json")
+    shapes = {key: tuple(shape) for key, shape in published["shapes"].items()}
     with torch.device("meta"):
-        network = Dust3r(NetworkConfig(head=head))  # type: ignore[arg-type]
-    assert {key: list(value.shape) for key, value in network.state_dict().items()} == published["shapes"]
+        network = Dust3r(config_from_shapes(shapes, "golden"))
+    assert {key: tuple(value.shape) for key, value in network.state_dict().items()} == shapes
     assert sum(part.numel() for part in network.parameters()) == published["parameters"]
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_the_seeded_weights_are_those_of_the_golden_numbers(
-    golden: Golden, network: Callable[[str], Dust3r], model: str
-) -> None:
+def test_golden_checksums_of_the_weights(model: str) -> None:
     state = network(model).state_dict()
-    checksums = golden.json("net_config")[model]["checksums"]
-    for key, values in checksums.items():
-        assert list(state[key].shape) == values["shape"], key
+    checksums = values("dust3r/net_config.json")[model]["checksums"]
+    assert checksums
+    for key, sums in checksums.items():
+        assert list(state[key].shape) == sums["shape"], key
         total = state[key].double()
-        assert float(total.abs().sum()) == pytest.approx(values["abssum"], rel=1e-6), key
-        assert total.flatten()[:3].tolist() == pytest.approx(values["first"], rel=1e-6), key
+        assert float(total.abs().sum()) == pytest.approx(sums["abssum"], rel=1e-6), key
+        assert total.flatten()[:3].tolist() == pytest.approx(sums["first"], rel=1e-6), key
 
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("model", MODELS)
-def test_golden_points_and_confidences(
-    golden: Golden, network: Callable[[str], Dust3r], model: str, case: str
-) -> None:
-    images = golden.tensors("net_inputs")
+def test_golden_points_and_confidences(model: str, case: str) -> None:
+    images, expected = inputs(), outputs(model)
     first, second = (images[name] for name in CASES[case])
-    check(decoded(network(model), first, second), golden.tensors(f"net_{model}_outputs"), case)
+    assert expected[f"{case}.res1.conf"].shape[1:] == first.shape[2:]
+    check(decoded(network(model), first, second), expected, case)
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_golden_batch_of_a_pair_and_its_reverse(
-    golden: Golden, network: Callable[[str], Dust3r], model: str
-) -> None:
-    images = golden.tensors("net_inputs")
+def test_golden_batch_of_a_pair_and_its_reverse(model: str) -> None:
+    images, expected = inputs(), outputs(model)
     a, b = images["land_a"], images["land_b"]
-    values = decoded(network(model), torch.cat([a, b]), torch.cat([b, a]))
-    check(values, golden.tensors(f"net_{model}_outputs"), "batchsym")
+    check(decoded(network(model), torch.cat([a, b]), torch.cat([b, a])), expected, "batchsym")
 
 
 def as_trained(network: Dust3r, first: tuple[Tensor, bool], second: tuple[Tensor, bool]) -> dict[str, Tensor]:
@@ -104,41 +104,43 @@ def as_trained(network: Dust3r, first: tuple[Tensor, bool], second: tuple[Tensor
     return {k: v.transpose(1, 2) if turned[k[:4]] else v for k, v in values.items()}
 
 
+@pytest.mark.parametrize("case", ["manyar", "manyar_port", "manyar_cross"])
 @pytest.mark.parametrize("model", MODELS)
-def test_golden_portrait_images_stored_as_in_training(
-    golden: Golden, network: Callable[[str], Dust3r], model: str
-) -> None:
-    images = golden.tensors("net_inputs")
-    expected = golden.tensors(f"net_{model}_outputs")
+def test_golden_portrait_images_stored_as_in_training(model: str, case: str) -> None:
+    images, expected = inputs(), outputs(model)
     land = [(images[f"land_{k}"], False) for k in "ab"]
     port = [(images[f"port_{k}"].transpose(2, 3), True) for k in "ab"]
-    assert port[0][0].shape == land[0][0].shape
-    straight, turned = as_trained(network(model), *land), as_trained(network(model), *port)
-    check(turned, expected, "manyar_port")
-    check(as_trained(network(model), land[0], port[1]), expected, "manyar_cross")
-    check({k: torch.cat([straight[k], turned[k]]) for k in straight}, expected, "manyar")
+    first, second = {"manyar_port": port, "manyar_cross": [land[0], port[1]]}.get(case, land)
+    found = as_trained(network(model), first, second)
+    if case == "manyar":
+        turned = as_trained(network(model), *port)
+        found = {k: torch.cat([found[k], turned[k]]) for k in found}
+    check(found, expected, case)
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_golden_tokens(golden: Golden, network: Callable[[str], Dust3r], model: str) -> None:
-    images, expected = golden.tensors("net_inputs"), golden.tensors(f"net_{model}_outputs")
+def test_golden_tokens(model: str) -> None:
+    images, expected = inputs(), outputs(model)
     first, second = (network(model).encode(images[f"land_{k}"]) for k in "ab")
-    assert relative(first.values, expected["land.enc1"]) < LIMIT
-    assert relative(second.values, expected["land.enc2"]) < LIMIT
+    close(first.values, expected["land.enc1"], LIMIT)
+    close(second.values, expected["land.enc2"], LIMIT)
     for side in (1, 2):
         torch.testing.assert_close(grid_positions(first.rows, first.columns), expected[f"land.pos{side}"][0])
     both = network(model).decoded(first, second)
     assert len(both[0]) == len(both[1]) == int(expected["land.ntaps"])
-    tested = [key for key in expected if key.startswith("land.dec")]
-    assert len(tested) == 2 * (3 if model == "linear" else 4)
-    for key in tested:
-        side, tap = key.removeprefix("land.dec").split(".")
-        assert relative(both[int(side) - 1][int(tap)], expected[key]) < LIMIT, key
+    taps = expected.under("land.dec")
+    assert taps
+    for key, tap in taps.items():
+        side, number = map(int, key.split("."))
+        close(both[side - 1][number], tap, LIMIT, key)
 
 
-def test_golden_stages_of_the_dpt_head(golden: Golden, network: Callable[[str], Dust3r]) -> None:
-    images, expected = golden.tensors("net_inputs"), golden.tensors("net_dpt_small_outputs")
-    dpt = network("dpt_small").downstream_head1.dpt
+@pytest.mark.parametrize("model", MODELS)
+def test_golden_stages_of_the_dpt_head(model: str) -> None:
+    images, expected = inputs(), outputs(model).under("land.dpt1.")
+    if not expected:
+        pytest.skip(f"there are no golden numbers of the inside of the head of {model}")
+    dpt = network(model).downstream_head1.dpt
     parts: dict[str, nn.Module] = {"raw": dpt}
     parts |= {f"act{i}": part for i, part in enumerate(dpt.act_postprocess)}
     parts |= {f"rn{i}": dpt.scratch.get_submodule(f"layer{i + 1}_rn") for i in range(4)}
@@ -149,20 +151,19 @@ def test_golden_stages_of_the_dpt_head(golden: Golden, network: Callable[[str], 
         return lambda module, inputs, output: seen.__setitem__(name, output)
 
     hooks = [part.register_forward_hook(keep(name)) for name, part in parts.items()]
-    network("dpt_small")(images["land_a"], images["land_b"])
+    network(model)(images["land_a"], images["land_b"])
     for hook in hooks:
         hook.remove()
-    tested = [key.removeprefix("land.dpt1.") for key in expected if key.startswith("land.dpt1.")]
-    assert sorted(tested) == sorted(parts)
-    for name in tested:
-        assert relative(seen[name], expected[f"land.dpt1.{name}"]) < LIMIT, name
+    for name, value in expected.items():
+        close(seen[name], value, LIMIT, name)
 
 
-def test_golden_rotary_embedding(golden: Golden) -> None:
-    values = golden.tensors("rope")
-    cos, sin = rotation(values["positions"], values["tokens"].shape[-1], 100.0)
+def test_golden_rotary_embedding() -> None:
+    given = tensors("dust3r/rope.safetensors")
+    cos, sin = rotation(given["positions"], given["tokens"].shape[-1], 100.0)
     by = Rotation(cos[:, None], sin[:, None])  # of each image, the same for all heads
-    assert relative(rotate(values["tokens"], by), values["rotated"]) < 1e-6
+    # A position of some hundreds times a frequency is rounded to 1e-5 of a turn.
+    close(rotate(given["tokens"], by), given["rotated"], 1e-5)
 
 
 def test_the_rotary_embedding_knows_only_differences_of_positions() -> None:
@@ -197,16 +198,16 @@ def test_images_of_another_size_are_refused() -> None:
         tiny().encode(torch.zeros(1, 3, 32, 40))
 
 
-def test_a_bfloat16_trunk_stays_close_and_leaves_the_heads_alone(golden: Golden) -> None:
-    images = golden.tensors("net_inputs")
-    exact = tiny()(images["land_a"], images["land_b"])
+def test_a_bfloat16_trunk_stays_close_and_leaves_the_heads_alone() -> None:
+    images = 2 * torch.rand(2, 1, 3, 48, 64, generator=torch.Generator().manual_seed(0)) - 1
+    exact = tiny()(*images)
     lowered = tiny()
     before = sum(part.nbytes for part in lowered.parameters())
     lowered.lower_trunk()
     assert sum(part.nbytes for part in lowered.parameters()) < before
     assert {part.dtype for part in lowered.downstream_head1.parameters()} == {torch.float32}
     assert lowered.enc_blocks[0].attn.qkv.weight.dtype == torch.bfloat16
-    for a, b in zip(exact, lowered(images["land_a"], images["land_b"]), strict=True):
+    for a, b in zip(exact, lowered(*images), strict=True):
         assert a.points.dtype == b.points.dtype == torch.float32
         assert 0 < relative(b.points, a.points) < 0.03
         assert 0 < relative(b.confidence, a.confidence) < 0.03

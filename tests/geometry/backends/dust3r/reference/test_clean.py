@@ -1,17 +1,18 @@
 """Points that contradict other images lose their confidence."""
 
-from pathlib import Path
-
 import numpy as np
-from tests.geometry.backends.dust3r.align.goldens import scene
+import pytest
+from tests.geometry.backends.dust3r.align.scenes import scenes_with
+from tests.golden.reading import arrays
 
 from dreamdrive.geometry.backends.dust3r.reference.clean import clean, world_points
 
 
-def test_it_is_golden(golden_dir: Path) -> None:
-    _, _, wanted = scene(golden_dir, "A")
-    images = range(5)
-    final = {key[13:]: value for key, value in wanted.items() if key.startswith("cosine.final.")}
+@pytest.mark.parametrize("name", scenes_with("clean_conf.0"))
+def test_it_is_golden(name: str) -> None:
+    """But for points that rounding brings over an edge: of a pixel, or of being a thousandth nearer."""
+    wanted = arrays(f"dust3r/align_{name}_outputs.safetensors")
+    final, images = wanted.under("cosine.final."), wanted.numbers("im_conf.")
     found = clean(
         [wanted[f"im_conf.{i}"] for i in images],
         [final[f"depth.{i}"] for i in images],
@@ -20,7 +21,7 @@ def test_it_is_golden(golden_dir: Path) -> None:
         final["focals"],
     )
     for image in images:
-        np.testing.assert_array_equal(found[image], wanted[f"clean_conf.{image}"])
+        assert (found[image] != wanted[f"clean_conf.{image}"]).mean() <= 0.002
 
 
 def test_a_floater_goes_and_what_it_hid_stays() -> None:

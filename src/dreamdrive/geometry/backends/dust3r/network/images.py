@@ -31,25 +31,31 @@ def fitting(width_px: int, height_px: int, size: int = 512, *, square_ok: bool =
     Raises:
         InputError: Nothing would be left of one side, or a side would be no multiple of 16.
     """
-    shortest, longest = sorted((width_px, height_px))
-    if shortest < 1 or size < _MULTIPLE:
+    if min(width_px, height_px) < 1 or size < _MULTIPLE:
         raise InputError(f"frames of {width_px}x{height_px} px cannot be brought to {size} px")
-    long_side = round(SQUARE_SIZE * longest / shortest) if size == SQUARE_SIZE else size
-    resized = (round(width_px * long_side / longest), round(height_px * long_side / longest))
-    middle = (resized[0] // 2, resized[1] // 2)
-    half = _half_square(middle) if size == SQUARE_SIZE else _half_sides(resized, square_ok)
-    picture = (2 * half[0], 2 * half[1])
+    found = any_fitting(width_px, height_px, size, square_ok=square_ok)
+    picture = found.size
     if min(picture) < _MULTIPLE or picture[0] % _MULTIPLE or picture[1] % _MULTIPLE:
         raise InputError(
             f"frames of {width_px}x{height_px} px become {picture[0]}x{picture[1]} px at size {size}; "
             f"both sides have to be multiples of {_MULTIPLE}: choose another size (512, 224) or shape"
         )
+    return found
+
+
+def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = False) -> Fitting:
+    """The same rule, whether or not the network takes the picture."""
+    shortest, longest = sorted((width_px, height_px))
+    long_side = round(SQUARE_SIZE * longest / shortest) if size == SQUARE_SIZE else size
+    resized = (round(width_px * long_side / longest), round(height_px * long_side / longest))
+    middle = (resized[0] // 2, resized[1] // 2)
+    half = _half_square(middle) if size == SQUARE_SIZE else _half_sides(resized, square_ok)
     return Fitting(
         (width_px, height_px),
         resized,
         middle[0] - half[0],
         middle[1] - half[1],
-        picture,
+        (2 * half[0], 2 * half[1]),
         shrinks=longest > long_side,
     )
 
