@@ -21,6 +21,7 @@ def make(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     seed: Annotated[int, arg(metavar="S")] = 0,
+    edition: Annotated[int, arg(metavar="N")] = 1,
     layout: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     frames: Annotated[int, arg(metavar="N")] = 24,
     fps: Annotated[float, arg(metavar="F")] = 10.0,
@@ -35,6 +36,7 @@ def make(
     Args:
         out: Folder to write.
         seed: Decides the street.
+        edition: Which edition of streets; each draws the same for ever. A layout names its own.
         layout: Draw this street instead, see docs/layout.md.
         frames: Number of frames.
         fps: Frames a second.
@@ -71,7 +73,8 @@ def make(
     check_free(out, force, MARK)
     count = frames * (len(MOUNTS) if cameras == "surround" else 1)
     _check_memory(count, wanted, free_bytes())
-    street = draw_street(seed, StreetOptions(seconds=frames / fps)) if layout is None else read_layout(layout)
+    drawn = StreetOptions(frames / fps, edition=edition)
+    street = draw_street(seed, drawn) if layout is None else read_layout(layout)
     wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
     console = Console()
