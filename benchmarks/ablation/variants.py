@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ablation.groups import by_density, by_density_and_features, by_voxels, scaled_by_frame
-from dreamdrive.fit import Representation
+from dreamdrive.choices import Representation
 from dreamdrive.options import Quality
 from street.fit import Scale, Vote, own_scale, own_vote, with_steps
 from street.jobs import QUALITY

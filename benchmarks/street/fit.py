@@ -13,9 +13,10 @@ import torch
 from common.keep import is_current, load, save
 from common.workers import threads
 from dreamdrive import __version__
+from dreamdrive.choices import Representation
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.decompose.group import Grouping
-from dreamdrive.fit import Parts, Representation, fit
+from dreamdrive.fit import Parts, fit
 from dreamdrive.options import Quality
 from dreamdrive.run.stages import stage_seed
 from dreamdrive.scene.folder import load_scene, save_scene

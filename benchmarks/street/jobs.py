@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from common.keep import kept, save
+from dreamdrive.choices import Representation
 from dreamdrive.evaluate.extractors import Toolbox
-from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES
 from dreamdrive.run.stages import digest
 from street.case import Case, Poses, References, case_digest, start

@@ -9,7 +9,7 @@ import numpy as np
 from common.keep import save
 from common.pandaset_truth import Movers, moving_masks
 from common.places import DATA
-from dreamdrive.fit import Representation
+from dreamdrive.choices import Representation
 from dreamdrive.options import Quality
 from dreamdrive.prior import choose_prior
 from dreamdrive.run.held_out import score_scene

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dreamdrive.errors import InputError as InputError
     from dreamdrive.pipeline import generate as generate
-    from dreamdrive.run.outcome import Outcome as Outcome
+    from dreamdrive.run import Outcome as Outcome
     from dreamdrive.scene.camera import Camera as Camera
     from dreamdrive.scene.clip import Clip as Clip
     from dreamdrive.scene.control import Control as Control
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dreamdrive.scene.geometry import Geometry as Geometry
     from dreamdrive.scene.scene import Scene as Scene
     from dreamdrive.scene.trajectory import Trajectory as Trajectory
-    from dreamdrive.splat.scene_view import render_scene as render_scene
+    from dreamdrive.splat import render_scene as render_scene
 
 __version__ = "0.1.0"
 
@@ -28,12 +28,12 @@ _HOME = {
     "Gaussians": "dreamdrive.scene.gaussians",
     "Geometry": "dreamdrive.scene.geometry",
     "InputError": "dreamdrive.errors",
-    "Outcome": "dreamdrive.run.outcome",
+    "Outcome": "dreamdrive.run",
     "Scene": "dreamdrive.scene.scene",
     "Trajectory": "dreamdrive.scene.trajectory",
     "generate": "dreamdrive.pipeline",
     "load_scene": "dreamdrive.scene.folder",
-    "render_scene": "dreamdrive.splat.scene_view",
+    "render_scene": "dreamdrive.splat",
     "save_scene": "dreamdrive.scene.folder",
 }
 

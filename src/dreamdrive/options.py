@@ -1,16 +1,14 @@
 """What ``--quality`` means: one row of numbers a name."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
+from dreamdrive.choices import QualityName, Representation
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
-from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
+from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, SeedOptions
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.scene.deformation import DeformationConfig
 from dreamdrive.scene.hexplane import HexPlaneConfig
 from dreamdrive.scene.vibration import VibrationConfig
-
-QualityName = Literal["draft", "standard", "high"]
 
 
 @dataclass(frozen=True)

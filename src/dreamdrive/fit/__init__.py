@@ -1,7 +1,7 @@
 """Seeds become Gaussians, and Gaussians are fitted to the frames."""
 
 from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier, NoDensifier
-from dreamdrive.fit.hybrid import Parts, Representation, fit
+from dreamdrive.fit.hybrid import Parts, fit
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
 from dreamdrive.fit.motion import MotionConfig

@@ -1,7 +1,6 @@
 """The joint fit of static and dynamic Gaussians (eq. 11-14), and its baselines."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import torch
 
@@ -20,8 +19,6 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.vibration import Vibration
-
-Representation = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,13 @@
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
+from dreamdrive.choices import DATASETS, Representation
 from dreamdrive.data.clip_reader import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import Source, open_source
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
-from dreamdrive.fit import Representation
 from dreamdrive.options import Options
 from dreamdrive.prior import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
@@ -96,7 +96,7 @@ def plan(control: Control, prior: str) -> Planned | None:
         stop = selection.stop or max(FRAMES, selection.start + FRAMES)
         count = len(range(max(0, stop))[selection.start :: selection.step])
         return Planned(count, 1, control.size or SIZE, None, selection.start, selection.step, True)
-    if prior != "replay" or control.path is None:
+    if prior != "replay" or control.path is None or DATASETS.package(control.dataset):
         return None
     return _of_recording(control, selection)
 

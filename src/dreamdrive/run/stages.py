@@ -11,12 +11,13 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar, cast, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, cast, get_args, runtime_checkable
 
 import numpy as np
 import torch
 
 from dreamdrive import _native
+from dreamdrive.choices import Stage
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import remove
 from dreamdrive.files.json_file import of_type
@@ -26,7 +27,7 @@ from dreamdrive.run import codec
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
 
-STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
+STAGES: tuple[str, ...] = get_args(Stage)
 """All stages in their order; each result depends on some of those before it."""
 
 T = TypeVar("T")
