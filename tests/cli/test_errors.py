@@ -10,6 +10,7 @@ import pytest
 from tests.cli.conftest import Run
 
 from dreamdrive import pipeline
+from dreamdrive.run import production
 
 
 @pytest.fixture
@@ -106,7 +107,7 @@ def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
 def test_a_clip_that_memory_cannot_hold_is_refused_before_it_is_read(
     run: Run, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "free_bytes", lambda: 600_000_000)
+    monkeypatch.setattr(production, "free_bytes", lambda: 600_000_000)
     expect(
         run,
         tmp_path / "out",
