@@ -22,8 +22,8 @@ from common.pandaset_truth import camera_path, moving_masks
 from common.places import DATA, DREAMDRIVE
 from common.report import as_json, exit_code, write
 from dreamdrive.evaluate.paths import compare_paths
-from dreamdrive.scene.folder import load_scene
 from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.stored import load_scene
 
 HELD_OUT = ["--hold-out", "8"]
 

@@ -13,11 +13,11 @@ from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.pipeline import generate
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.folder import load_scene
 from dreamdrive.scene.layout import Layout
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity, fit_similarity
 from dreamdrive.splat.scene_view import render_scene
+from dreamdrive.stored import load_scene
 from dreamdrive.world import Drive, drive
 
 FPS = 10.0

@@ -15,8 +15,8 @@ from dreamdrive.progress import Work
 from dreamdrive.run import Stages, digest, program_digest
 from dreamdrive.run.stages import trusted
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
+from dreamdrive.stored import load_scene, save_scene
 
 PROBE_STEPS = 30
 SHARED = ("prior", "geometry", "initialise", "static")

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dreamdrive.errors import InputError as InputError
     from dreamdrive.pipeline import generate as generate
-    from dreamdrive.run.outcome import Outcome as Outcome
+    from dreamdrive.run import Outcome as Outcome
     from dreamdrive.scene.camera import Camera as Camera
     from dreamdrive.scene.clip import Clip as Clip
     from dreamdrive.scene.control import Control as Control
-    from dreamdrive.scene.folder import load_scene as load_scene
-    from dreamdrive.scene.folder import save_scene as save_scene
     from dreamdrive.scene.gaussians import Gaussians as Gaussians
     from dreamdrive.scene.geometry import Geometry as Geometry
     from dreamdrive.scene.scene import Scene as Scene
     from dreamdrive.scene.trajectory import Trajectory as Trajectory
-    from dreamdrive.splat.scene_view import render_scene as render_scene
+    from dreamdrive.splat import render_scene as render_scene
+    from dreamdrive.stored import load_scene as load_scene
+    from dreamdrive.stored import save_scene as save_scene
 
 __version__ = "0.1.0"
 
@@ -28,13 +28,13 @@ _HOME = {
     "Gaussians": "dreamdrive.scene.gaussians",
     "Geometry": "dreamdrive.scene.geometry",
     "InputError": "dreamdrive.errors",
-    "Outcome": "dreamdrive.run.outcome",
+    "Outcome": "dreamdrive.run",
     "Scene": "dreamdrive.scene.scene",
     "Trajectory": "dreamdrive.scene.trajectory",
     "generate": "dreamdrive.pipeline",
-    "load_scene": "dreamdrive.scene.folder",
-    "render_scene": "dreamdrive.splat.scene_view",
-    "save_scene": "dreamdrive.scene.folder",
+    "load_scene": "dreamdrive.stored.folder",
+    "render_scene": "dreamdrive.splat",
+    "save_scene": "dreamdrive.stored.folder",
 }
 
 

@@ -1,15 +1,12 @@
 """What ``--quality`` means: one row of numbers a name."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
+from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig, RepresentationName
-
-QualityName = Literal["draft", "standard", "high"]
-MethodName = Literal["dreamdrive", "paper"]
+from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class Options:
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
     representation: RepresentationName = "hybrid"
-    device: Literal["cpu", "cuda"] = "cpu"
+    device: DeviceName = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
     method: MethodName = "dreamdrive"
     seed: int = 0

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import torch
 
+from dreamdrive.choices import BACKENDS, QualityName
 from dreamdrive.decompose import Cast, Grouping, cast, error_maps, group, score
 from dreamdrive.device import computing_on
 from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
 from dreamdrive.motion import REPRESENTATIONS
-from dreamdrive.options import Options, QualityName
+from dreamdrive.options import Options
 from dreamdrive.progress import StageProgress
 from dreamdrive.run import (
     REPORT,
@@ -128,7 +129,7 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     device = torch.device(o.device)
     geometry = run(
         "geometry",
-        [o.geometry, o.seed],
+        [o.geometry, BACKENDS.package(o.geometry.method), o.seed],
         lambda work: reconstruct(clip, o.geometry, seed=seed["geometry"], work=work),
         check=partial(check.geometry, clip),
         given=given.geometry,

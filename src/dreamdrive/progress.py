@@ -21,7 +21,7 @@ def silent(done: int, total: int) -> None:
 class Keep(Protocol):
     """Gives a part of a stage's result by its name: what an interrupted run left, or what it computes."""
 
-    def __call__(self, name: str, compute: Callable[[], T]) -> T:
+    def __call__(self, name: str, compute: Callable[[], T], /) -> T:
         """The part."""
         ...
 

@@ -13,9 +13,9 @@ from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.drive import MANOEUVRES
-from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.stored import save_scene
 
 
 @pytest.fixture
@@ -109,7 +109,8 @@ def test_the_doctor_says_what_is_there(run: Run) -> None:
 
 
 def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dreamdrive.run.report.PACKAGES", ("torch", "not-installed-package"))
+    for module in ("dreamdrive.run", "dreamdrive.run.report"):
+        monkeypatch.setattr(f"{module}.PACKAGES", ("torch", "not-installed-package"))
     monkeypatch.setattr("dreamdrive.cli.doctor.available_memory_mb", lambda: 500)
     result = run("doctor")
     assert result.code == 2

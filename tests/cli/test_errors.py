@@ -92,8 +92,8 @@ def test_a_single_picture_names_the_prior_to_come(run: Run, tmp_path: Path) -> N
         run,
         tmp_path / "out",
         *(photo, "--weights", tmp_path / "weights"),
-        message=f"error: {photo} is a photo: name the video model of --weights with --prior "
-        "vista|svd|cosmos|diffusers",
+        message=f"error: {photo} is a photo: name the video model of --weights with --prior NAME, such as "
+        "--prior vista",
     )
 
 

@@ -11,9 +11,9 @@ import torch
 from dreamdrive.cli.evaluate_decomposition import decomposition
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.errors import InputError
-from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.world.files import write_world
 

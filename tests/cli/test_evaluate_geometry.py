@@ -13,9 +13,9 @@ from tests.cli.conftest import Run
 from tests.streets import bare_street, street_clip, true_geometry
 
 from dreamdrive.run import codec
-from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.stored import save_scene
 from dreamdrive.world import Drive
 from dreamdrive.world.files import write_world
 

@@ -53,7 +53,7 @@ def test_a_recording_is_sampled_with_its_files_named(run: Run, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--prior", "sora"], "--prior sora: unknown; available are replay, street-world"),
+        (["--prior", "sora"], "invalid choice 'sora' for argument"),
         (["--prior", "street-world", "--prompt", "rain"], "street-world takes no prompt"),
         (["--prior", "street-world", "--action", "command=up"], "'up' is no command; expected one of left"),
         (["--prior", "cosmos"], "prior cosmos needs --weights PATH"),

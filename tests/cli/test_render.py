@@ -11,7 +11,7 @@ from tests.cli.conftest import Run
 from tests.cli.test_commands import driving, frames
 from tests.scene.scenes import make_scene
 
-from dreamdrive.scene.folder import save_scene
+from dreamdrive.stored import save_scene
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ import numpy as np
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.errors import InputError
 from dreamdrive.run import codec
-from dreamdrive.scene import folder as scene_folder
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.stored import folder as scene_folder
+from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.world.files import read_world, write_world
 from tests.mutation.reader import Reader
 from tests.scene.scenes import make_baseline, make_scene

@@ -10,7 +10,8 @@ from tests.prior.paths import circle
 
 from dreamdrive.data import read_clip, write_trajectory
 from dreamdrive.errors import InputError
-from dreamdrive.prior import PRIORS, choose_prior, prior_of, replay
+from dreamdrive.prior import PRIORS, choose_prior, prior_of
+from dreamdrive.prior.replay import replay
 from dreamdrive.scene.action import Command
 from dreamdrive.scene.control import Control
 
@@ -33,7 +34,7 @@ def test_replay_is_the_recording_with_features(folder):
 
 def test_every_control_reaches_the_reader():
     """What it says it takes must be handed on: both have the same names."""
-    assert choose_prior("replay").takes == set(inspect.signature(read_clip).parameters)
+    assert choose_prior("replay").takes == {"dataset", *inspect.signature(read_clip).parameters}
 
 
 def test_replay_needs_an_input():

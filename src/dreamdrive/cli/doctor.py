@@ -1,12 +1,18 @@
 """``dreamdrive doctor``: what this installation and machine offer, and what is missing."""
 
 import platform
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
 from dreamdrive.cli.machine import available_cores, available_memory_mb, use_all_cores
 from dreamdrive.errors import InputError
+
+if TYPE_CHECKING:
+    from dreamdrive.data import DataSet
+    from dreamdrive.models import Backend
 
 _NEEDED_MB = 3000
 """Free memory with which 24 frames at 480x270 fit."""
@@ -58,25 +64,31 @@ def _native() -> tuple[str, list[str]]:
 
 
 def _backends(console: Console) -> None:
-    """What ``generate --prior`` and ``--geometry`` offer; nothing is needed but what is ready."""
-    try:
-        from dreamdrive.geometry import BACKENDS
-        from dreamdrive.prior import PRIORS
-    except ImportError:
-        return
-    offers = [("prior", each) for each in PRIORS.values()] + [
-        ("geometry", each) for each in BACKENDS.values()
-    ]
-    for stage, backend in offers:
-        takes = "ready" if backend.weights is None else f"give --weights, {backend.weights}"
-        console.print(f"\n {stage} {backend.name}: {backend.about}", highlight=False, soft_wrap=True)
-        for name, value in (
-            ("to use it", backend.missing_package() or takes),
-            ("memory", backend.memory),
-            ("licence", backend.licence),
-        ):
-            console.print(f"   {name}: {value}", highlight=False, soft_wrap=True)
+    """What ``generate`` offers by name; nothing of it is needed."""
+    for what, table in (("prior", PRIORS), ("geometry", BACKENDS), ("data set", DATASETS)):
+        for name in table:
+            try:
+                lines = _about(table[name])
+                lines += [f"package: {package} {version}" for package, version in table.package(name).items()]
+            except InputError as error:
+                lines = ["cannot be used", str(error)]
+            except ImportError:
+                return  # what dreamdrive itself needs is missing, which is told below
+            console.print(f"\n {what} {name}: {lines[0]}", highlight=False, soft_wrap=True)
+            for line in lines[1:]:
+                console.print(f"   {line}", highlight=False, soft_wrap=True)
     console.print()
+
+
+def _about(entry: "Backend | DataSet") -> list[str]:
+    """What an entry is, and what it takes to use it, a line each."""
+    from dreamdrive.data import DataSet
+
+    if isinstance(entry, DataSet):
+        return [entry.about]
+    takes = "ready" if entry.weights is None else f"give --weights, {entry.weights}"
+    to_use = entry.missing_package() or takes
+    return [entry.about, f"to use it: {to_use}", f"memory: {entry.memory}", f"licence: {entry.licence}"]
 
 
 def _gpu() -> str:

@@ -2,11 +2,12 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, arg
 
+from dreamdrive.choices import Covariance, Resize, Stlpips
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.tables import interval, number, print_table, write_json
@@ -26,9 +27,9 @@ def evaluate_video(
     lpips_trunk: _File = None,
     lpips_heads: _File = None,
     transnet: _File = None,
-    resize: Literal["tf1", "torch", "antialias", "clean"] = "tf1",
-    covariance: Literal["sample", "population"] = "sample",
-    stlpips: Literal["alex", "vgg", "both"] = "alex",
+    resize: Resize = "tf1",
+    covariance: Covariance = "sample",
+    stlpips: Stlpips = "alex",
     window: Annotated[int, arg(metavar="FRAMES")] = 16,
     stride: Annotated[int | None, arg(metavar="FRAMES", help_behavior_hint="")] = None,
     resamples: Annotated[int, arg(metavar="N")] = 200,

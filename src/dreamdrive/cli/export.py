@@ -1,18 +1,19 @@
 """``dreamdrive export``: a scene in another program's format."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, arg
 
+from dreamdrive.choices import ExportKind
 from dreamdrive.cli.scene import open_scene
 
 
 def export(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
-    to: Literal["ply"],
+    to: ExportKind,
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE|DIR")],
 ) -> None:
     """Write a scene in a format that other programs read.

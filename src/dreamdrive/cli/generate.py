@@ -3,14 +3,19 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rich.console import Console
 from tyro.conf import Positional, arg
 
+from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName, Stage
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
+from dreamdrive.cli.names import DataSetName, GeometryName, PriorName
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.sizes import parse_size
+
+if TYPE_CHECKING:
+    from dreamdrive.run import Outcome
 
 _ROUGH = 3
 """Exit code of a result that is there and rough, for those who ask for one."""
@@ -20,28 +25,13 @@ def generate(
     input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
-    prior: Annotated[
-        Literal[
-            "replay",
-            "street-world",
-            "svd",
-            "vista",
-            "magicdrive",
-            "magicdrive-t",
-            "cosmos",
-            "diffusers",
-        ]
-        | None,
-        arg(metavar="NAME", help_behavior_hint=""),
-    ] = None,
-    geometry: Annotated[
-        Literal["classical", "dust3r", "da3", "mapanything", "vggt", "pi3"] | None,
-        arg(metavar="NAME", help_behavior_hint="(default: classical)"),
-    ] = None,
+    dataset: Annotated[DataSetName | None, arg(help_behavior_hint="")] = None,
+    prior: Annotated[PriorName | None, arg(help_behavior_hint="")] = None,
+    geometry: Annotated[GeometryName | None, arg(help_behavior_hint="(default: classical)")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     geometry_weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
-    quality: Literal["draft", "standard", "high"] = "standard",
-    method: Literal["dreamdrive", "paper"] = "dreamdrive",
+    quality: QualityName = "standard",
+    method: MethodName = "dreamdrive",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
@@ -58,16 +48,10 @@ def generate(
     features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     hold_out: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     options: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    representation: Annotated[
-        Literal["static", "deformable", "hexplane", "vibration", "hybrid"] | None,
-        arg(help_behavior_hint="(default: hybrid)"),
-    ] = None,
-    device: Annotated[Literal["cpu", "cuda"] | None, arg(help_behavior_hint="(default: cpu)")] = None,
+    representation: Annotated[RepresentationName | None, arg(help_behavior_hint="(default: hybrid)")] = None,
+    device: Annotated[DeviceName | None, arg(help_behavior_hint="(default: cpu)")] = None,
     seed: Annotated[int, arg(metavar="S")] = 0,
-    recompute_from: Annotated[
-        Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
-        arg(name="from", metavar="STAGE", help_behavior_hint=""),
-    ] = None,
+    recompute_from: Annotated[Stage | None, arg(name="from", help_behavior_hint="")] = None,
     force: bool = False,
     strict: bool = False,
 ) -> None:
@@ -77,6 +61,7 @@ def generate(
         input: A video, a folder of images or of several cameras (docs/guides/surround.md), a layout as JSON,
             or a photo for a video model; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
+        dataset: How the recording lies on disk; without it that of dreamdrive's own that recognises INPUT.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
             others are video models, see docs/guides/priors.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
@@ -120,12 +105,13 @@ def generate(
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.options import QUALITIES, with_method
     from dreamdrive.pipeline import generate as run
-    from dreamdrive.run import lines_of, read_options
+    from dreamdrive.run import read_options
     from dreamdrive.scene.control import Control
 
     stop_like_an_interruption()
     control = Control(
         path=input,
+        dataset=dataset,
         frames=frames,
         fps=fps,
         size=None if size is None else parse_size(size),
@@ -143,11 +129,9 @@ def generate(
     chosen = with_method(QUALITIES[quality], method)
     if options is not None:
         chosen = read_options(options, chosen)
-    how = {"method": geometry, "camera_height_m": camera_height, "refine_poses": refine_poses or None}
-    how = replace(chosen.geometry, **{name: value for name, value in how.items() if value is not None})
-    given = {"representation": representation, "device": device}
-    given = {name: value for name, value in given.items() if value is not None}
-    chosen = replace(chosen, geometry=how, **given)
+    found = _given(method=geometry, camera_height_m=camera_height, refine_poses=refine_poses or None)
+    chosen = replace(chosen, geometry=replace(chosen.geometry, **found))
+    chosen = replace(chosen, **_given(representation=representation, device=device))
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(
@@ -163,11 +147,22 @@ def generate(
             progress=bars,
             say=console.print,
         )
+    _tell(console, outcome, out)
+    if strict and outcome.rough:
+        sys.exit(_ROUGH)
+
+
+def _tell(console: Console, outcome: "Outcome", out: Path) -> None:
+    from dreamdrive.run import lines_of
+
     if outcome.already_finished:
         console.print(f"{out} is already finished; --from STAGE computes it again from a stage on")
     for line in lines_of(outcome):
         console.print(line)
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
         console.print(f"{what:<7} {out / name}")
-    if strict and outcome.rough:
-        sys.exit(_ROUGH)
+
+
+def _given(**flags: Any) -> dict[str, Any]:
+    """The flags that were given: these count more than the file of options."""
+    return {name: value for name, value in flags.items() if value is not None}

@@ -15,6 +15,7 @@ from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.machine import Terminated
+from dreamdrive.cli.names import REGISTRY
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.world import world
@@ -58,7 +59,8 @@ def main() -> None:
             COMMANDS,
             prog="dreamdrive",
             description=dreamdrive.__doc__,
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
+            config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
+            registry=REGISTRY,
         )
     except InputError as error:
         errors.print(f"error: {error}")

@@ -1,12 +1,14 @@
 """``dreamdrive prior``: priors on their own."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from dreamdrive.choices import DeviceName, DtypeName
 from dreamdrive.cli.machine import use_all_cores
+from dreamdrive.cli.names import PriorName
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
@@ -16,7 +18,7 @@ def convert(
     file: Annotated[Positional[Path], arg(metavar="FILE")],
     folder: Annotated[Positional[Path], arg(metavar="DIR")],
     *,
-    dtype: Literal["float16", "float32"] = "float16",
+    dtype: DtypeName = "float16",
     force: bool = False,
 ) -> None:
     """Turn the single file of Vista or Stable Video Diffusion into a folder, which loads faster.
@@ -49,7 +51,7 @@ def sample(
     input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
-    prior: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    prior: Annotated[PriorName | None, arg(help_behavior_hint="")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
@@ -60,7 +62,7 @@ def sample(
     action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    device: Literal["cpu", "cuda"] = "cpu",
+    device: DeviceName = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     force: bool = False,
 ) -> None:
@@ -145,7 +147,7 @@ def features(
     sigma: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.3)")] = None,
     channels: Annotated[int | None, arg(metavar="C", help_behavior_hint="(default: 16)")] = None,
     action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
-    device: Literal["cpu", "cuda"] = "cpu",
+    device: DeviceName = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
 ) -> None:
     """Take the features of a recorded clip from the network of Vista or Stable Video Diffusion.

@@ -3,11 +3,12 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
+from dreamdrive.choices import Format, Show
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
@@ -22,8 +23,8 @@ def render(
         UseAppendAction[tuple[str, ...]], arg(metavar="NAME|FILE", help_behavior_hint="(required)")
     ],
     shift_m: Annotated[float, arg(metavar="M")] = 2.0,
-    show: Literal["colour", "depth", "dynamic", "static"] = "colour",
-    format: Literal["mp4", "png", "npz"] = "mp4",
+    show: Show = "colour",
+    format: Format = "mp4",
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
@@ -45,8 +46,7 @@ def render(
         raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
     use_all_cores()
     from dreamdrive.drive import check_numbers, drives_of
-    from dreamdrive.show import Look, check_size, video_rate, write_drive
-    from dreamdrive.show.places import places
+    from dreamdrive.show import Look, check_size, places, video_rate, write_drive
 
     look = Look(show, format, None if size is None else parse_size(size), fps)
     check_numbers(shift_m, fps)

@@ -16,7 +16,7 @@ def open_scene(out: Path) -> "Scene":
     Raises:
         InputError: There is none.
     """
-    from dreamdrive.scene.folder import load_scene
+    from dreamdrive.stored import load_scene
 
     if not out.exists():
         raise InputError(f"{out} does not exist; expected the folder that dreamdrive generate wrote")

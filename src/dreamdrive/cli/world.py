@@ -3,7 +3,7 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Suppress, arg, subcommand
@@ -12,6 +12,9 @@ from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
+
+if TYPE_CHECKING:
+    from dreamdrive.world import Drive, Mount
 
 _PIXEL_BYTES = 22
 """Of one frame and its truth: colour, depth, flow and labels."""
@@ -54,8 +57,6 @@ def make(
     from dreamdrive.world import (
         MARK,
         MOUNTS,
-        Drive,
-        Mount,
         StreetOptions,
         World,
         corruption,
@@ -77,8 +78,7 @@ def make(
     street = draw_street(seed, drawn) if layout is None else read_layout(layout)
     wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
-    console = Console()
-    start = time.perf_counter()
+    console, start = Console(), time.perf_counter()
     with Bars(console) as bars:
         drives: dict[Mount, Drive] = {
             mount: drive(

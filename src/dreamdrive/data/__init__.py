@@ -1,5 +1,6 @@
 """Readers: recordings, calibration, poses and trajectories on disk, converted at the door."""
 
 from dreamdrive.data.clip_reader import read_clip
+from dreamdrive.data.dataset import DataSet, dataset_of, read_dataset
 from dreamdrive.data.lens import Lens
 from dreamdrive.data.poses import read_trajectory, write_trajectory

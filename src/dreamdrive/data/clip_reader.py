@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.data.cuts import find_cuts
+from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import ImageFolder
@@ -286,3 +287,12 @@ def _provenance(source: Source, picked: _Picked, notes: list[str]) -> dict[str, 
         "lens": None if sampler.lens is None else sampler.lens.to_json(),
         "notes": notes,
     }
+
+
+RECORDING = DataSet(
+    name="recording",
+    about="a video or a folder of images",
+    recognises=lambda path: True,  # what it is not is said by whoever opens it
+    read=read_clip,
+    deep=False,
+)

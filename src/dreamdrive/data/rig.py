@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data.clip_reader import read_clip
+from dreamdrive.data.dataset import DataSet
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import is_path
@@ -175,3 +176,11 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
             "notes": list(dict.fromkeys(notes)),
         },
     )
+
+
+RIG_FOLDER = DataSet(
+    name="rig",
+    about=f"a folder of several cameras with {RIG}",
+    recognises=is_rig,
+    read=read_rig_clip,
+)

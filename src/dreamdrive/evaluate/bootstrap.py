@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
+from dreamdrive.choices import Covariance
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.frechet import Covariance, frechet_distance
+from dreamdrive.evaluate.frechet import frechet_distance
 
 SPLITS = 10
 """Random halvings that a floor is the mean of."""

@@ -3,17 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from dreamdrive.choices import Resize, Stlpips
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks import (
     MissingWeightsError,
-    Resize,
     efficientnet_lite,
     i3d,
     inception,
@@ -24,8 +23,6 @@ from dreamdrive.evaluate.networks import (
 from dreamdrive.evaluate.pixels import psnr, ssim
 from dreamdrive.models import sha256
 
-Stlpips = Literal["alex", "vgg", "both"]
-"""Trunk of the shift-tolerant LPIPS; that of VGG takes four times as long."""
 Frames = UInt8[Tensor, "t h w 3"]
 
 

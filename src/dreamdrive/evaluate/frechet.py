@@ -1,14 +1,14 @@
 """Distances between two sets of features: Fréchet (FID, FVD) and kernel (KID, KVD)."""
 
 from functools import reduce
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from jaxtyping import Float
 
+from dreamdrive.choices import Covariance
 from dreamdrive.errors import InputError
 
-Covariance = Literal["sample", "population"]
 """Whether covariances are divided by N - 1, as most programs do, or by N, as StyleGAN-V and cd-fvd do."""
 
 KERNEL_SUBSETS = 100

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from dreamdrive.choices import Covariance, Resize, Stlpips
 from dreamdrive.data.source import Source
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.bootstrap import (
@@ -20,9 +21,9 @@ from dreamdrive.evaluate.bootstrap import (
     mean_with_interval,
 )
 from dreamdrive.evaluate.clips import open_clips, pairs_of, read_frames
-from dreamdrive.evaluate.extractors import Extractor, Frames, Stlpips, Toolbox, WeightFiles, open_toolbox
-from dreamdrive.evaluate.frechet import Covariance, frechet_distance, kernel_distance
-from dreamdrive.evaluate.networks import MIN_FRAMES, Resize
+from dreamdrive.evaluate.extractors import Extractor, Frames, Toolbox, WeightFiles, open_toolbox
+from dreamdrive.evaluate.frechet import frechet_distance, kernel_distance
+from dreamdrive.evaluate.networks import MIN_FRAMES
 
 MIN_SIDE_PX = 32
 """Below this nothing is left of an image after the strides of the networks."""

@@ -3,11 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from dreamdrive.choices import ExportKind
 from dreamdrive.errors import InputError
 from dreamdrive.export.ply import export_ply
 from dreamdrive.scene.scene import Scene
 
-KINDS: dict[str, Callable[[Scene, Path], None]] = {"ply": export_ply}
+KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {"ply": export_ply}
 """What ``export --to`` takes."""
 
 

@@ -6,20 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends import CLASSICAL
-from dreamdrive.geometry.backends.dust3r import DUST3R
-from dreamdrive.geometry.backends.feedforward import FEED_FORWARD
-from dreamdrive.geometry.cameras import refined
+from dreamdrive.choices import BACKENDS
+from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
+from dreamdrive.geometry.cameras import Posed, refined
+from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.protocol import GeometryBackend, GeometryOptions
 from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-
-BACKENDS: dict[str, GeometryBackend] = {
-    backend.name: backend for backend in (CLASSICAL, DUST3R, *FEED_FORWARD)
-}
 
 
 def backend_of(method: str, weights: Path | None = None) -> GeometryBackend:
@@ -28,9 +23,7 @@ def backend_of(method: str, weights: Path | None = None) -> GeometryBackend:
     Raises:
         InputError: The method is unknown, lacks weights or its package, or takes no weights.
     """
-    if method not in BACKENDS:
-        raise InputError(f"Unknown geometry method {method!r}; choose from: {', '.join(BACKENDS)}.")
-    backend = BACKENDS[method]
+    backend = BACKENDS.choose(method)
     backend.check_start("geometry", weights)
     return backend
 
@@ -42,7 +35,7 @@ def reconstruct(
     seed: int = 0,
     work: Work = Work(),
 ) -> Geometry:
-    """Reconstruct a clip by a method of ``BACKENDS``; geometry given as files comes in by ``files.attach``.
+    """Reconstruct a clip by one of ``BACKENDS``; geometry given as files comes in by ``attach``.
 
     Args:
         clip: Frames, with what is known of their geometry; those of several cameras see ``surround``.

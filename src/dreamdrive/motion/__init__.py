@@ -7,7 +7,6 @@ from dreamdrive.motion.table import (
     MOTIONS,
     REPRESENTATIONS,
     Representation,
-    RepresentationName,
     rebuilt,
     start_motion,
 )

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
+from dreamdrive.choices import RepresentationName
 from dreamdrive.motion.deformation import DeformationField
 from dreamdrive.motion.hexplane import HexPlaneField
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
@@ -34,8 +35,6 @@ class Representation:
     motion: type[Motion] | None
     step: float
 
-
-RepresentationName = Literal["hybrid", "static", "deformable", "hexplane", "vibration"]
 
 REPRESENTATIONS: Mapping[RepresentationName, Representation] = MappingProxyType(
     {

@@ -1,6 +1,6 @@
 """What every prior offers."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from dreamdrive.errors import InputError
@@ -45,12 +45,7 @@ class Prior(Backend):
             InputError: A field is given that it does not take, that contradicts another or is outside its
                 range, or weights or a package are missing.
         """
-        given = [field.name for field in fields(control) if getattr(control, field.name) is not None]
-        if refused := [name for name in given if name not in self.takes | {"seed", "weights"}]:
-            raise InputError(
-                f"the prior {self.name} takes no {' and no '.join(refused)}; "
-                f"it takes {', '.join(sorted(self.takes))}"
-            )
+        control.check_taken(self.takes, f"the prior {self.name}")
         if control.trajectory is not None and control.action is not None:
             raise InputError("--trajectory and --action both tell where to drive; give one of them")
         if control.action is not None:

@@ -1,6 +1,6 @@
 """How a run is kept apart from others, and what it says."""
 
-from dreamdrive.run import check
+from dreamdrive.run import check, codec
 from dreamdrive.run.lock import only_run
 from dreamdrive.run.options_file import read_options
 from dreamdrive.run.outcome import Outcome, lines_of, outcome_of, read_outcome

@@ -20,8 +20,7 @@ from dreamdrive.files.json_file import parse_json
 from dreamdrive.files.paths import TEXT_BYTES, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, read_own
 from dreamdrive.fit import StaticFit
-from dreamdrive.geometry.cameras import Posed
-from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry import Measured, Posed
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.exposure import Exposure

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
+from dreamdrive.choices import DATASETS
 from dreamdrive.data.clip_reader import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
@@ -88,7 +89,7 @@ def plan(control: Control, prior: str) -> Planned | None:
         stop = selection.stop or max(FRAMES, selection.start + FRAMES)
         count = len(range(max(0, stop))[selection.start :: selection.step])
         return Planned(count, 1, control.size or SIZE, None, selection.start, selection.step, True)
-    if prior != "replay" or control.path is None:
+    if prior != "replay" or control.path is None or DATASETS.package(control.dataset):
         return None
     return _of_recording(control, selection)
 

@@ -20,10 +20,10 @@ from dreamdrive.run.request import Request
 from dreamdrive.run.stages import Stages, trusted
 from dreamdrive.run.workspace import REPORT, Workspace
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.show import Scored, draw_geometry, lens_of, write_held_out, write_png, write_videos
+from dreamdrive.stored import save_scene
 
 T = TypeVar("T")
 

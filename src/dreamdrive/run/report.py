@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from dreamdrive import __version__
+from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
 from dreamdrive.evaluate import compare_paths
 from dreamdrive.run.held_out import Likeness
 from dreamdrive.run.judge import facts_of, limits_of, rough_because
@@ -44,13 +45,16 @@ def describe(
         held_out: Likeness of the withheld frames, by index in the clip.
         baselines: The same of predictions that need no scene.
     """
+    options = request["options"]
     blended = baselines.get("flow_interpolation", {})
-    facts = facts_of(clip, geometry, request["options"]["quality"], held_out, blended)
+    facts = facts_of(clip, geometry, options["quality"], held_out, blended)
+    outside = PRIORS.package(options["prior"]) | BACKENDS.package(options["geometry"])
+    outside |= DATASETS.package(options["dataset"])
     report = {
         "version": __version__,
-        "versions": {"python": platform.python_version(), **package_versions()},
+        "versions": {"python": platform.python_version(), **package_versions(), **outside},
         "input": request["input"],
-        "options": request["options"],
+        "options": options,
         "seed": request["seed"],
         "stages": {name: asdict(record) for name, record in records.items()},
         "steps": steps,

@@ -4,12 +4,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dreamdrive.data.rig import is_rig
+from dreamdrive.choices import DATASETS, PRIORS, QualityName
+from dreamdrive.data import dataset_of
 from dreamdrive.errors import InputError
-from dreamdrive.geometry import GeometryOptions, backend_of
-from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
+from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, bent_model, companions
 from dreamdrive.models import find_weights
-from dreamdrive.options import QUALITIES, Options, QualityName, with_method
+from dreamdrive.options import QUALITIES, Options, with_method
 from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.progress import Work
 from dreamdrive.run.stages import digest, file_digest
@@ -43,7 +43,8 @@ class Request:
     def reading(self) -> list[object]:
         """All that the frames depend on."""
         files = {name: value for name, value in self.digests.items() if name != "weights"}
-        return [self.prior, self._settings, files, self.control.seed]
+        packages = PRIORS.package(self.prior) | DATASETS.package(self.control.dataset)
+        return [self.prior, packages, self._settings, files, self.control.seed]
 
     @property
     def _settings(self) -> dict[str, Any]:
@@ -88,7 +89,7 @@ def request_of(
     Raises:
         InputError: The input or an option cannot be used.
     """
-    prior = prior or prior_of(control.path, weights is not None)
+    prior = prior or ("replay" if control.dataset else prior_of(control.path, weights is not None))
     whole = QUALITIES[options] if isinstance(options, str) else options
     control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)
     choose_prior(prior).check(control)
@@ -149,15 +150,11 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         if not path.exists():
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
-        deep = name in ("geometry-files", "prior-weights") or is_rig(path)
-        digests[name] = file_digest(_pictures(path) if name == "input" else path, deep=deep)
+        deep = name in ("geometry-files", "prior-weights")
+        if name == "input" and not (deep := dataset_of(control.dataset, path).deep):
+            path = path / "frames" if (path / "frames").is_dir() else path  # as of ``data.source``
+        digests[name] = file_digest(path, deep=deep)
         beside = companions(path) if name == "geometry-files" else []
         if beside:
             digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
     return digests
-
-
-def _pictures(path: Path) -> Path:
-    """What counts of an input: of a folder with ``frames`` in it, as of ``data.source``, these alone."""
-    frames = path / "frames"
-    return frames if frames.is_dir() and not is_rig(path) else path

@@ -11,22 +11,23 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar, cast, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, cast, get_args, runtime_checkable
 
 import numpy as np
 import torch
 
 from dreamdrive import _native
+from dreamdrive.choices import Stage
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import remove
 from dreamdrive.files.json_file import of_type
 from dreamdrive.files.paths import inside, open_file
 from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run import codec
-from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
+from dreamdrive.stored import load_scene, save_scene
 
-STAGES = ("prior", "geometry", "initialise", "static", "score", "group", "fit")
+STAGES: tuple[str, ...] = get_args(Stage)
 """All stages in their order; each result depends on some of those before it."""
 
 T = TypeVar("T")

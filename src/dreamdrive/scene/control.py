@@ -1,8 +1,9 @@
 """What a user asks a prior for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
+from dreamdrive.errors import InputError
 from dreamdrive.scene.action import Action
 
 
@@ -12,6 +13,7 @@ class Control:
 
     Attributes:
         path: A video, a folder of images, a photo, a layout; ``None`` where the prior needs no input.
+        dataset: Name of the data set that the path is of; without it see ``data.dataset_of``.
         frames: ``START:STOP:STEP`` over the indices of the source, or of the frames that a prior makes.
         fps: Rate of the input in frames a second, before the step of ``frames``.
         size: Width and height of the clip in pixels.
@@ -29,6 +31,7 @@ class Control:
     """
 
     path: Path | None = None
+    dataset: str | None = None
     frames: str | None = None
     fps: float | None = None
     size: tuple[int, int] | None = None
@@ -43,3 +46,13 @@ class Control:
     features: Path | None = None
     hold_out: int | None = None
     seed: int = 0
+
+    def check_taken(self, takes: frozenset[str], by: str) -> None:
+        """Whether all that is given is honoured; ``seed`` and ``weights`` go without saying.
+
+        Raises:
+            InputError: It is not.
+        """
+        given = [field.name for field in fields(self) if getattr(self, field.name) is not None]
+        if refused := [name for name in given if name not in takes | {"seed", "weights"}]:
+            raise InputError(f"{by} takes no {' and no '.join(refused)}; it takes {', '.join(sorted(takes))}")

@@ -5,12 +5,13 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
+from dreamdrive.choices import Format, Show
 from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import RATES_HZ, Drive, frame_rate
@@ -23,9 +24,6 @@ from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
 from dreamdrive.show.videos import write_png
 from dreamdrive.splat import SceneView, render_scene
-
-Show = Literal["colour", "depth", "dynamic", "static"]
-Format = Literal["mp4", "png", "npz"]
 
 NOTE = "render.json"
 """What lies beside pictures and arrays: calibration, poses and times; a folder without it is not replaced."""

@@ -11,7 +11,8 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.evaluate.networks.resize import Resize, resize
+from dreamdrive.choices import Resize
+from dreamdrive.evaluate.networks.resize import resize
 from dreamdrive.models import load_network
 
 FILE = "pt_inception-2015-12-05-6726825d.pth (also named weights-inception-2015-12-05-6726825d.pth)"

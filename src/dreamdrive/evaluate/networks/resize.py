@@ -1,15 +1,11 @@
 """The ways in which programs bring images to the size of a network; each gives another FID."""
 
-from typing import Literal
-
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.nn import functional
 
-Resize = Literal["tf1", "torch", "antialias", "clean"]
-"""tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);
-antialias: the same with antialiasing (torchmetrics); clean: antialiased bicubic (clean-fid)."""
+from dreamdrive.choices import Resize
 
 
 def resize(

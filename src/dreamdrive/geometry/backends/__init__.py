@@ -1,3 +1,1 @@
-"""Ways of getting geometry, one each; only the table in ``geometry`` imports them."""
-
-from dreamdrive.geometry.backends.classical import CLASSICAL
+"""Ways of getting geometry, one each; only ``choices.BACKENDS`` names them."""

@@ -1,5 +1,6 @@
 """Structure from motion and its gate, focal length, odometry, known poses, checks of paths."""
 
+from dreamdrive.geometry.cameras import contradiction, odometry, sfm
 from dreamdrive.geometry.cameras.focal import settle
 from dreamdrive.geometry.cameras.mapping import STEPS
 from dreamdrive.geometry.cameras.paths import fill, rebase

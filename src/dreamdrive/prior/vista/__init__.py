@@ -3,7 +3,6 @@
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
-from dreamdrive.prior.vista.features import FeatureOptions, video_features
 from dreamdrive.prior.vista.kinds import KINDS, KindName
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip

@@ -5,11 +5,12 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from dreamdrive.choices import DtypeName
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
 from dreamdrive.prior.vista.configs import Shapes
@@ -18,7 +19,6 @@ from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
 from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
 from dreamdrive.progress import Progress, silent
 
-DtypeName = Literal["float16", "float32"]
 _DTYPES: dict[str, tuple[torch.dtype, str, int]] = {
     "float16": (torch.float16, "F16", 2),
     "float32": (torch.float32, "F32", 4),

@@ -28,8 +28,7 @@ from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.cameras import contradiction, stands, without_poses
 from dreamdrive.geometry.depth import above_horizon, sky_mask
-from dreamdrive.geometry.evidence import Evidence, free_pixels
-from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.evidence import Evidence, free_pixels, look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.frames import check_frames
@@ -72,7 +71,7 @@ def reconstruct(
     if weights is None:
         raise InputError("geometry dust3r needs the weights of its network")
     check_frames(clip, "dust3r")
-    evidence = look(clip)
+    evidence = look.look(clip)
     contradiction.check(clip, evidence)
     maps, how = _seen(clip, weights, lambda done, total: work(done, total + 1))
     # Of a standing camera the path is noise, in which no unit can be read.

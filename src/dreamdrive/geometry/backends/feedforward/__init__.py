@@ -3,10 +3,3 @@
 Each is other people's code, installed by who wants it, and weights that lie on this machine; here are the few
 lines that show it a clip and take its answer. What they have in common is in ``reconstruct``.
 """
-
-from dreamdrive.geometry.backends.feedforward.da3 import DA3
-from dreamdrive.geometry.backends.feedforward.mapanything import MAPANYTHING
-from dreamdrive.geometry.backends.feedforward.pi3 import PI3
-from dreamdrive.geometry.backends.feedforward.vggt import VGGT
-
-FEED_FORWARD = (DA3, MAPANYTHING, VGGT, PI3)

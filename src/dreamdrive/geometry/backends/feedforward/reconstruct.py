@@ -14,8 +14,7 @@ from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
 from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show
 from dreamdrive.geometry.cameras import contradiction, stands, unit_in, without_poses
-from dreamdrive.geometry.evidence import free_pixels
-from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.evidence import free_pixels, look
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.frames import check_frames
@@ -75,7 +74,7 @@ class FeedForward:
         if weights is None:
             raise InputError(f"geometry {self.name} needs the weights of its network")
         check_frames(clip, self.name)
-        evidence = look(clip)
+        evidence = look.look(clip)
         contradiction.check(clip, evidence)
         # Of a standing camera the path is noise, in which no unit can be read.
         shown = without_poses(clip) if stands(clip, evidence) else clip

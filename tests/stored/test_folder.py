@@ -11,7 +11,7 @@ import torch
 from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.stored import load_scene, save_scene
 
 
 def contents(path: Path) -> dict[str, bytes]:

@@ -19,12 +19,13 @@ from dreamdrive.files.checked import build, check_finite
 from dreamdrive.files.json_file import of_type, parse_json
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
+from dreamdrive.motion import rebuilt
 from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.stored_index import MAX_PIXELS, StoredIndex, increasing
+from dreamdrive.stored.index import MAX_PIXELS, StoredIndex, increasing
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -143,8 +144,6 @@ def _described(motion: SceneMotion) -> dict[str, Any]:
 
 def _rebuilt(values: dict[str, Any], state: dict[str, Tensor]) -> SceneMotion:
     # Here, since what moves is built on the nouns of this package.
-    from dreamdrive.motion import rebuilt
-
     return rebuilt(values.get("kind", _FIRST_MOTION), {k: v for k, v in values.items() if k != "kind"}, state)
 
 

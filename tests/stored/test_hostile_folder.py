@@ -13,7 +13,7 @@ from safetensors.torch import load_file, save
 from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.folder import load_scene, save_scene
+from dreamdrive.stored import load_scene, save_scene
 
 Index = dict[str, Any]
 
