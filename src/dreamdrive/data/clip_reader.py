@@ -15,7 +15,7 @@ from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import ImageFolder
 from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
 from dreamdrive.data.lens import Lens, Undistorter
-from dreamdrive.data.poses import read_poses
+from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import Sizing, choose_size
@@ -61,7 +61,7 @@ def read_clip(
         fps: Rate of the input before the step. Without it a video's own times count, and a folder has 10 Hz.
         size: Exact width and height; without it 480 wide, or the source's width if that is less.
         intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
-        poses: Pose file (see ``poses.read_poses``).
+        poses: Pose file (see ``poses.read_pose_file``).
         hfov_deg: Horizontal field of view of the source, instead of ``intrinsics``.
         trajectory: Path that whoever made the recording was asked to drive, in a pose file.
         features: Features of the source's pictures (see ``feature_file.read_features``).
@@ -83,7 +83,8 @@ def read_clip(
     def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
         if file is None:
             return None
-        found, said = read_poses(file, path.resolve().name, index, times_s, source.count, option)
+        rows = read_pose_file(file, option, path.resolve().name)
+        found, said = of_frames(rows, index, times_s, source.count)
         notes.extend(said)
         return found
 

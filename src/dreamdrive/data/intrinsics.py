@@ -6,8 +6,10 @@ from math import isfinite, radians, tan
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from dreamdrive.data.camera_models import LensCamera, model_cameras
 from dreamdrive.data.distortion import Distortion, check_bend
+from dreamdrive.data.formats.cameras import LensCamera, different
+from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
+from dreamdrive.data.formats.nerfstudio import frame_camera, transforms_frames
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.scene.camera import Camera
@@ -62,7 +64,7 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
     """Read a calibration file: JSON with ``width``, ``height``, ``intrinsics`` and optional ``distortion``.
 
     The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy. A
-    COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``camera_models``.
+    COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``model_cameras``.
 
     Args:
         path: The file, such as a clip's ``meta.json``, or a folder with a COLMAP model.
@@ -97,6 +99,30 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         raise InputError(f"--intrinsics {path}: {error}") from None
     distortion = _distortion(path, values.get("distortion"), notes)
     return Calibration(camera, distortion, True, tuple(notes))
+
+
+def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
+    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither.
+
+    Args:
+        path: A file or a folder.
+        option: How messages call it, such as ``--intrinsics``.
+
+    Raises:
+        InputError: It is one of them and cannot be used.
+    """
+    transforms = path / "transforms.json" if path.is_dir() else path
+    if transforms.suffix.lower() == ".json" and transforms.is_file():
+        values = read_json(transforms, option)
+        if not isinstance(values.get("frames"), list) or {"intrinsics", "world_from_camera"} & values.keys():
+            return None
+        where = f"{option} {transforms}"
+        return different([frame_camera(frame, where) for frame in transforms_frames(values, where)])[0]
+    folder = find_colmap(path) if path.is_dir() else None
+    if folder is None:
+        return None
+    model = read_colmap(folder)
+    return different([colmap_camera(camera, str(folder)) for camera in model.cameras.values()])[0]
 
 
 def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> Calibration:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.formats.cameras import LensCamera, different
 from dreamdrive.data.poses import to_first
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.declared import NAME
@@ -40,7 +40,8 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
     given = reader(place, wanted)
     onto = OntoClip.of(clip)
     rig, camera = _rig(clip, given, onto, str(place))
-    depth, notes = _depth(given.depth, onto, len(clip), bent=not given.cameras or _is_bent(given))
+    bent = not given.cameras or any(each.distortion is not None for each in given.cameras)
+    depth, notes = _depth(given.depth, onto, len(clip), bent)
     poses = to_first(given.world_from_camera)
     points = None if given.sparse is None else _moved(given.sparse.points, given.world_from_camera[0])
     known = replace(
@@ -62,27 +63,23 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
     return replace(attached, provenance={**clip.provenance, "notes": said})
 
 
-def _is_bent(given: Given) -> bool:
-    return any(each.distortion is not None for each in given.cameras)
-
-
 def _rig(
     clip: Clip, given: Given, onto: OntoClip, where: str
 ) -> tuple[tuple[Camera, ...], Int[np.ndarray, " f"]]:
     """The pinholes of the frames: those of the files, or the clip's own where its lens was taken out."""
     if not given.cameras:
         return clip.rig, clip.camera
-    bent = next((each for each in given.cameras if each.distortion is not None), None)
+    cameras, camera = different(given.cameras)
+    bent = next((each for each in cameras if each.distortion is not None), None)
     if bent is None:
-        rig = tuple(onto.camera(each.camera, where) for each in given.cameras)
+        rig = tuple(onto.camera(each.camera, where) for each in cameras)
         if onto.lens is not None:
             _check_same(rig, onto.lens.camera, where)
-        return rig, given.camera
+        return rig, camera
     if onto.lens is None:
         raise InputError(_bent_words(bent, where))
-    if len(given.cameras) > 1:
-        count = len(given.cameras)
-        raise InputError(f"{where}: {count} cameras with distortion; expected one for all frames")
+    if len(cameras) > 1:
+        raise InputError(f"{where}: {len(cameras)} cameras with distortion; expected one for all frames")
     onto.sizing((bent.camera.width_px, bent.camera.height_px), where)
     return clip.rig, clip.camera
 
