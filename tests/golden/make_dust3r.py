@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from tests.geometry.backends.dust3r.align.pairs import street, window
 from tests.geometry.backends.dust3r.align.scenes import scene
-from tests.geometry.backends.dust3r.align.test_focal import CLIP, _plane
+from tests.geometry.backends.dust3r.align.test_focal import _plane
 from tests.geometry.backends.dust3r.align.test_spanning_tree import _matrices
 from tests.geometry.backends.dust3r.network.networks import config_of, golden_network, seeded_state
 from tests.geometry.backends.dust3r.network.test_network import CASES, as_trained, decoded
@@ -15,7 +15,7 @@ from tests.geometry.backends.dust3r.reference.test_objective import PARTS
 from tests.golden.cut import write
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align.focal import median_px, weiszfeld_px
+from dreamdrive.geometry.backends.dust3r.align.focal import weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
@@ -152,8 +152,7 @@ def _focals(to: Path, rng: np.random.Generator) -> None:
         height, width = rng.integers(14, 50, 2).tolist()
         points = _plane(width, height, 0.9 * width) * rng.normal(1, 0.03, (height, width, 3))
         points, pp = points.astype(np.float32), (width / 2 - 1, height / 2 + 0.5)
-        table[case] = {"pp": pp, "weiszfeld": weiszfeld_px(points, pp), "median": median_px(points, pp)}
-        table[case]["weiszfeld_clipped"] = weiszfeld_px(points, pp, CLIP)
+        table[case] = {"pp": pp, "weiszfeld": weiszfeld_px(points, pp)}
         clouds[case] = points
     write(to / "dust3r/weiszfeld_inputs.safetensors", clouds)
     write(to / "dust3r/weiszfeld.json", table)

@@ -37,6 +37,17 @@ class Calibration:
     notes: tuple[str, ...]
 
 
+def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
+    """The camera of an input, as far as it is told.
+
+    Raises:
+        InputError: It is told twice, or cannot be read.
+    """
+    if intrinsics is not None and hfov_deg is not None:
+        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
+    return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
+
+
 def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibration:
     """A pinhole for a source without calibration: principal point in the centre, square pixels.
 
@@ -132,7 +143,7 @@ def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> C
             "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
         )
     camera = cameras[0].camera
-    notes = _scaled(path, (camera.width_px, camera.height_px), size)
+    notes = _scaled(path, cameras[0].size, size)
     try:
         camera = camera.resized(*size)
     except ValueError as error:

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from msgspec import Meta
 
 from dreamdrive.data.array_file import read_npz
-from dreamdrive.data.formats.cameras import IndexedPinhole
+from dreamdrive.data.formats.cameras import IndexedPinhole, Intrinsics
 from dreamdrive.data.formats.pandaset import Cuboid, moving_cuboids, pandaset_camera
 from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.poses import read_pose_file
@@ -23,9 +23,10 @@ _PNG_PER_M = 256.0
 """Grey levels a metre in KITTI's 16-bit depth pictures."""
 
 
-class _Sides(msgspec.Struct):
+class _About(msgspec.Struct):
     width: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
     height: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
+    intrinsics: Intrinsics | None = None
 
 
 @dataclass(frozen=True)
@@ -109,18 +110,18 @@ def read_poses_txt(folder: Path) -> Recorded:
     """
     poses = read_pose_file(folder / "poses.txt", "--truth").world_from_camera
     file = folder / "meta.json"
-    meta = read_json(file, "--truth")
+    values = read_json(file, "--truth")
     try:
-        size = of_type(meta, _Sides, "calibration")
-        known = meta.get("intrinsics") is not None
-        pinhole = of_type(meta, IndexedPinhole, "calibration").camera() if known else None
+        about = of_type(values, _About, "calibration")
+        k = about.intrinsics
+        pinhole = None if k is None else IndexedPinhole(about.width, about.height, k).camera()
     except ValueError as error:
         raise InputError(
             f"--truth {file} is unusable ({error}); expected JSON with width, height and, where known, "
             'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
         ) from error
     numbered = _numbered(folder / "lidar_depth")
-    return Recorded(poses, (size.width, size.height), pinhole, numbered, None)
+    return Recorded(poses, (about.width, about.height), pinhole, numbered, None)
 
 
 def _numbered(folder: Path) -> dict[int, Path]:

@@ -26,10 +26,15 @@ class LensCamera:
     distortion: Distortion | None
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of its pictures in pixels."""
+        return self.camera.width_px, self.camera.height_px
+
+    @property
     def key(self) -> tuple[object, ...]:
         """What makes two cameras the same."""
         c = self.camera
-        return (c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px, self.distortion)
+        return (c.fx_px, c.fy_px, c.cx_px, c.cy_px, self.size, self.distortion)
 
 
 def different(found: Sequence[LensCamera]) -> tuple[list[LensCamera], Int[np.ndarray, " f"]]:

@@ -72,7 +72,7 @@ def _rig(
     cameras, camera = different(given.cameras)
     bent = next((each for each in cameras if each.distortion is not None), None)
     if bent is None:
-        rig = tuple(onto.camera(each.camera, where) for each in cameras)
+        rig = tuple(onto.sizing(each.size, where).camera(each.camera) for each in cameras)
         if onto.lens is not None:
             _check_same(rig, onto.lens.camera, where)
         return rig, camera
@@ -80,7 +80,7 @@ def _rig(
         raise InputError(_bent_words(bent, where))
     if len(cameras) > 1:
         raise InputError(f"{where}: {len(cameras)} cameras with distortion; expected one for all frames")
-    onto.sizing((bent.camera.width_px, bent.camera.height_px), where)
+    onto.sizing(bent.size, where)
     return clip.rig, clip.camera
 
 

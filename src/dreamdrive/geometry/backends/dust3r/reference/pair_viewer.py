@@ -5,18 +5,17 @@ import numpy as np
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align import (
     PNP_CONFIDENCE,
-    FocalRule,
     Start,
-    focal_px,
     graph_of,
     pose_by_pnp,
+    weiszfeld_px,
 )
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 
 _PNP_STEPS = 100
 
 
-def view_pair(maps: PairMaps, rule: FocalRule = "weiszfeld", confident: float = PNP_CONFIDENCE) -> Start:
+def view_pair(maps: PairMaps, confident: float = PNP_CONFIDENCE) -> Start:
     """Cameras and depth of two images from the more trusted direction of their pair.
 
     The other camera is posed by PnP of its pixels to its points in the frame of the first. Where that fails,
@@ -25,7 +24,6 @@ def view_pair(maps: PairMaps, rule: FocalRule = "weiszfeld", confident: float = 
 
     Args:
         maps: The edges (0, 1) and (1, 0).
-        rule: How a pointmap tells its focal length.
         confident: Confidence above which a pixel is used by PnP.
 
     Raises:
@@ -38,7 +36,7 @@ def view_pair(maps: PairMaps, rule: FocalRule = "weiszfeld", confident: float = 
             f"A single pair is viewed from its edges (0, 1) and (1, 0); got {maps.edges.tolist()}."
         )
     forth, back = edge_of[0, 1], edge_of[1, 0]
-    focals = [focal_px(maps.points[edge][0], maps.confidence[edge][0], rule) for edge in (forth, back)]
+    focals = [weiszfeld_px(maps.points[edge][0]) for edge in (forth, back)]
     scores = [float(np.prod([side.mean() for side in maps.confidence[edge]])) for edge in (forth, back)]
     first, edge = (0, forth) if scores[0] > scores[1] else (1, back)
     other = 1 - first
