@@ -15,7 +15,7 @@ from dreamdrive.geometry.cameras import register
 from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
-PNP_CONFIDENCE = 3.0
+_PNP_CONFIDENCE = 3.0  # above which the authors' program uses a pixel
 _PNP_STEPS = 10
 _ROBUST_STEPS = 5
 _REGISTERED = 2_000  # pixels of a pair that are registered
@@ -178,7 +178,7 @@ class _Tree:
     def _pose_by_pnp(self, image: int) -> np.ndarray:
         trusts = [self.maps.confidence[half.edge][half.side] for half in self.graph.halves[image]]
         trust = np.max(trusts, axis=0)
-        threshold = PNP_CONFIDENCE if self.upstream else 1.0
+        threshold = _PNP_CONFIDENCE if self.upstream else 1.0
         cx, cy = self.graph.principal_px[image].tolist()
         stretch = float(self.graph.stretch[image])
         focal = self.focals.get(image)
