@@ -85,8 +85,30 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         InputError: The file is missing, malformed, or for images of another shape.
     """
     cameras = model_cameras(path, "--intrinsics")
-    if cameras is not None:
-        return _of_model(cameras, path, size)
+    if cameras is not None and len(cameras) != 1:
+        raise InputError(
+            f"--intrinsics {path} holds {len(cameras)} different cameras; expected one for all frames: let "
+            "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
+        )
+    try:
+        found, notes = _of_json(path) if cameras is None else (cameras[0], [])
+        (width, height), (wide, high) = found.size, size
+        if abs(width / height * high / wide - 1) > _ASPECT_TOLERANCE:
+            raise InputError(
+                f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
+                f"{wide}x{high}, another shape; give the calibration of this input"
+            )
+        if found.size != size:
+            notes = [f"The calibration is scaled from {width:g}x{height:g} to {wide}x{high}.", *notes]
+        return Calibration(found.camera.resized(*size), found.distortion, True, tuple(notes))
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"--intrinsics {path}: {error}") from None
+
+
+def _of_json(path: Path) -> tuple[LensCamera, list[str]]:
+    """The camera at the size that the file is for, and what to say about its lens."""
     values = read_json(path, "--intrinsics")
     pinhole = values.get("intrinsics")
     if not isinstance(pinhole, dict):
@@ -97,19 +119,16 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
     pinhole = cast("dict[str, Any]", pinhole)
     width, height = (_number(path, values, name) for name in ("width", "height"))
     fx, fy, cx, cy = (_number(path, pinhole, name) for name in ("fx", "fy", "cx", "cy"))
-    if min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
+    whole = width % 1 == height % 1 == 0
+    if not whole or min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
         raise InputError(
-            f"--intrinsics {path}: expected positive sizes and focal lengths and a principal point inside "
-            f"the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}"
+            f"--intrinsics {path}: expected whole positive sizes, positive focal lengths and a principal "
+            f"point inside the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, "
+            f"cx {cx:g}, cy {cy:g}"
         )
-    notes = _scaled(path, (width, height), size)
-    sx, sy = size[0] / width, size[1] / height
-    try:
-        camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
-    except ValueError as error:
-        raise InputError(f"--intrinsics {path}: {error}") from None
-    distortion = _distortion(path, values.get("distortion"), notes)
-    return Calibration(camera, distortion, True, tuple(notes))
+    camera = Camera(fx, fy, cx + 0.5, cy + 0.5, int(width), int(height))
+    distortion, notes = _distortion(path, values.get("distortion"))
+    return LensCamera(camera, distortion), notes
 
 
 def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
@@ -136,34 +155,6 @@ def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
     return different([colmap_camera(camera, str(folder)) for camera in model.cameras.values()])[0]
 
 
-def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> Calibration:
-    if len(cameras) > 1:
-        raise InputError(
-            f"--intrinsics {path} holds {len(cameras)} different cameras; expected one for all frames: let "
-            "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
-        )
-    camera = cameras[0].camera
-    notes = _scaled(path, cameras[0].size, size)
-    try:
-        camera = camera.resized(*size)
-    except ValueError as error:
-        raise InputError(f"--intrinsics {path}: {error}") from None
-    return Calibration(camera, cameras[0].distortion, True, tuple(notes))
-
-
-def _scaled(path: Path, made_for: tuple[float, float], size: tuple[int, int]) -> list[str]:
-    """What to say where a calibration is for images of another size."""
-    (width, height), (wide, high) = made_for, size
-    if made_for == size:
-        return []
-    if abs(width / height * high / wide - 1) > _ASPECT_TOLERANCE:
-        raise InputError(
-            f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
-            f"{wide}x{high}, another shape; give the calibration of this input"
-        )
-    return [f"The calibration is scaled from {width:g}x{height:g} to {wide}x{high}."]
-
-
 def _number(path: Path, values: dict[str, Any], name: str) -> float:
     value = values.get(name)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
@@ -171,11 +162,10 @@ def _number(path: Path, values: dict[str, Any], name: str) -> float:
     return float(value)
 
 
-def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | None:
+def _distortion(path: Path, value: object) -> tuple[Distortion | None, list[str]]:
     if value is None or isinstance(value, str):
         said = f' (the calibration says "{value}")' if value else ""
-        notes.append(f"No distortion coefficients are given: the lens distortion is taken as zero{said}.")
-        return None
+        return None, [f"No distortion coefficients are given: the lens distortion is taken as zero{said}."]
     values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
     name, numbers = values.get("model"), values.get("coefficients")
     if not isinstance(name, str) or not isinstance(numbers, list):
@@ -192,7 +182,7 @@ def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | Non
             f"--intrinsics {path}: distortion {name!r} with {len(coefficients)} coefficients; expected "
             f"{' or '.join(map(str, allowed))} in OpenCV's order"
         )
-    return Distortion(model, coefficients) if any(coefficients) or model == "fisheye" else None
+    return (Distortion(model, coefficients) if any(coefficients) or model == "fisheye" else None), []
 
 
 def _model(path: Path, name: str) -> tuple[Literal["opencv", "fisheye"], list[str]]:

@@ -134,15 +134,3 @@ def depth_file(path: Path, frame: Mapping[str, Any]) -> Path | None:
     if not is_path(name):
         raise InputError(f"{path}: depth_file_path {name!r} is no name of a file")
     return path.parent / str(name)
-
-
-def depth_factor(values: Mapping[str, Any], where: str) -> float:
-    """What the number 1 in a depth file means, in the unit of the poses.
-
-    Raises:
-        InputError: The file says something else than a positive number.
-    """
-    factor = values.get("depth_unit_scale_factor", USUAL_FACTOR)
-    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0 < factor < 1e6:
-        raise InputError(f"{where}: depth_unit_scale_factor is {factor!r}; expected a positive number")
-    return float(factor)

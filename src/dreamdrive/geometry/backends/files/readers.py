@@ -24,7 +24,6 @@ from dreamdrive.data.formats.cameras import IndexedPinhole, LensCamera
 from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
 from dreamdrive.data.formats.nerfstudio import (
     USUAL_FACTOR,
-    depth_factor,
     depth_file,
     frame_camera,
     frame_names,
@@ -144,10 +143,13 @@ def _named_depth(
         of[row] = file
     if declared.depth_unit is not None:
         return DepthFiles(of, declared.depth_unit, not declared.depth_in_poses_unit), ()
+    factor = record.get("depth_unit_scale_factor", USUAL_FACTOR)
+    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0 < factor < 1e6:
+        raise InputError(f"{path}: depth_unit_scale_factor is {factor!r}; expected a positive number")
     said = ()
     if of and "depth_unit_scale_factor" not in record:
         said = (f"{path.name} has no depth_unit_scale_factor: stored depth times {USUAL_FACTOR} is taken.",)
-    return DepthFiles(of, depth_factor(record, str(path)), metric=False), said
+    return DepthFiles(of, float(factor), metric=False), said
 
 
 def read_pandaset(path: Path, wanted: Wanted) -> Given:

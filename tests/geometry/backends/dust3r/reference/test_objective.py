@@ -132,7 +132,7 @@ def test_rates_fall_from_the_first_to_the_last(schedule: Schedule) -> None:
     t = np.arange(10) / 10
     rate = 0.01 + 0.09 * ((1 + np.cos(np.pi * t)) / 2 if schedule == "cosine" else 1 - t)
     assert 5 - float(start.im_focals.detach()) == pytest.approx(rate.sum(), rel=1e-5)
-    assert 5 - float(half.im_focals) == pytest.approx(rate[:5].sum(), rel=1e-5)
+    assert 5 - float(half.im_focals.detach()) == pytest.approx(rate[:5].sum(), rel=1e-5)
 
 
 class _Sum(Objective):

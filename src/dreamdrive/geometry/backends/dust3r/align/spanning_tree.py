@@ -32,14 +32,12 @@ class Start:
         focals_px: Focal length (N,) of each image.
         depth: Depth along z (H, W) of each image, positive.
         pairs: Similarity of each edge from its first camera's frame to the world.
-        unsure: Images whose pose has only that of another image to go by.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focals_px: Float[np.ndarray, " n"]
     depth: tuple[Float[np.ndarray, "_ _"], ...]
     pairs: tuple[Similarity, ...]
-    unsure: tuple[int, ...] = ()
 
 
 def spanning_tree(
@@ -92,7 +90,6 @@ class _Tree:
         self.points: dict[int, np.ndarray] = {}
         self.poses: dict[int, np.ndarray] = {}
         self.focals: dict[int, float] = {}
-        self.unsure: list[int] = []
 
     def _scores(self) -> np.ndarray:
         if self.upstream:
@@ -186,7 +183,6 @@ class _Tree:
         if found is not None:
             self.focals[image], pose = found
             return pose
-        self.unsure.append(image)
         if self.upstream:
             return np.eye(4)
         partner = next(int(i) for i, j in self.maps.edges if j == image)
@@ -204,7 +200,6 @@ class _Tree:
             focals_px=np.array([self.focals[image] for image in range(len(self.graph))]),
             depth=tuple(self._depth(xyz, pose) for xyz, pose in zip(points, poses, strict=True)),
             pairs=tuple(Similarity(scale * p.scale, p.rotation, scale * p.translation) for p in pairs),
-            unsure=tuple(self.unsure),
         )
 
     def _depth(self, points: Float[np.ndarray, "h w 3"], pose: np.ndarray) -> Float[np.ndarray, "h w"]:

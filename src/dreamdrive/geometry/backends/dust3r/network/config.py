@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from dreamdrive.errors import InputError
 
@@ -273,9 +273,12 @@ def _is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _is_mode(value: Any, kinds: tuple[str, ...]) -> bool:
-    listed = isinstance(value, tuple | list) and len(value) == 3  # pyright: ignore[reportUnknownArgumentType]
-    return listed and value[0] in kinds and all(map(_is_number, value[1:]))
+def _mode(kinds: tuple[str, ...]) -> tuple[Callable[[Any], bool], str]:
+    def fits(value: Any) -> bool:
+        listed = isinstance(value, tuple | list) and len(cast("Sequence[Any]", value)) == 3
+        return listed and value[0] in kinds and all(map(_is_number, value[1:]))
+
+    return fits, f"; expected a kind of {', '.join(kinds)} and two bounds"
 
 
 def _rope_base(value: object) -> float:
@@ -315,16 +318,8 @@ _KEYWORDS: dict[str, tuple[Any, Callable[[Any], bool], str]] = {
     ),
     "output_mode": ("pts3d", lambda v: v == "pts3d", " is not supported; expected 'pts3d'"),
     "head_type": ("linear", lambda v: v in get_args(HeadKind), "; expected 'dpt' or 'linear'"),
-    "depth_mode": (
-        ("exp", -math.inf, math.inf),
-        lambda v: _is_mode(v, get_args(DepthMode)),
-        f"; expected a kind of {', '.join(get_args(DepthMode))} and two bounds",
-    ),
-    "conf_mode": (
-        ("exp", 1, math.inf),
-        lambda v: _is_mode(v, get_args(ConfidenceMode)),
-        f"; expected a kind of {', '.join(get_args(ConfidenceMode))} and two bounds",
-    ),
+    "depth_mode": (("exp", -math.inf, math.inf), *_mode(get_args(DepthMode))),
+    "conf_mode": (("exp", 1, math.inf), *_mode(get_args(ConfidenceMode))),
 }
 """Keywords of the authors' constructor: what it takes where none is given, what fits, what was expected."""
 
