@@ -78,6 +78,7 @@ def test_no_distortion(write, value):
     [
         ({"intrinsics": None}, "holds no calibration"),
         ({"intrinsics": {"fx": 1.0}}, "expected a number for fy, got null"),
+        ({"width": 1280.5}, "expected whole positive sizes"),
         ({"width": "wide"}, 'expected a number for width, got "wide"'),
         (
             {"intrinsics": {**GOOD["intrinsics"], "fx": float("nan")}},
@@ -177,6 +178,10 @@ def test_a_colmap_model_is_a_calibration(tmp_path):
     found = read_intrinsics(tmp_path, (1280, 720))
     assert (found.camera.fy_px, found.camera.cx_px) == (990.0, 640.0)
     assert found.distortion == Distortion("opencv", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0))
+    (tmp_path / "images.txt").write_text("")
+    (tmp_path / "cameras.txt").write_text("")
+    with pytest.raises(InputError, match="holds 0 different cameras; expected one"):
+        read_intrinsics(tmp_path, (1280, 720))
     (tmp_path / "points3D.txt").unlink()
     with pytest.raises(InputError, match=r"points3D\.txt is missing"):
         read_intrinsics(tmp_path, (1280, 720))

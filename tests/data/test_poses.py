@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.data import read_trajectory, write_trajectory
-from dreamdrive.data.poses import read_poses, to_first
+from dreamdrive.data.poses import of_frames, read_pose_file, to_first
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -28,7 +28,8 @@ def kitti(poses: np.ndarray) -> str:
 
 def read(path: Path, index: list[int], count: int, fps: float = 10.0, camera: str = "front_camera"):
     """As the clip reader calls it."""
-    return read_poses(path, camera, np.array(index), np.array(index) / fps, lambda: count)
+    rows = read_pose_file(path, "--poses", camera)
+    return of_frames(rows, np.array(index), np.array(index) / fps, lambda: count)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dreamdrive.data.images import read_image
 from dreamdrive.data.intrinsics import read_intrinsics
-from dreamdrive.data.pose_files import read_pose_file
+from dreamdrive.data.poses import read_pose_file
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import torch
 from tests.geometry.backends.dust3r.align.pairs import street, window
-from tests.geometry.backends.dust3r.align.scenes import scene
-from tests.geometry.backends.dust3r.align.test_focal import CLIP, _plane
+from tests.geometry.backends.dust3r.align.test_focal import _plane
 from tests.geometry.backends.dust3r.align.test_spanning_tree import _matrices
 from tests.geometry.backends.dust3r.network.networks import config_of, golden_network, seeded_state
 from tests.geometry.backends.dust3r.network.test_network import CASES, as_trained, decoded
@@ -15,7 +14,7 @@ from tests.geometry.backends.dust3r.reference.test_objective import PARTS
 from tests.golden.cut import write
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align.focal import median_px, weiszfeld_px
+from dreamdrive.geometry.backends.dust3r.align.focal import weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
@@ -25,9 +24,7 @@ from dreamdrive.geometry.backends.dust3r.network.rope import Rotation, grid_posi
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
 from dreamdrive.geometry.backends.dust3r.reference.adam import descend
-from dreamdrive.geometry.backends.dust3r.reference.clean import clean, world_points
 from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, Raw, raw_parameters
-from dreamdrive.geometry.backends.dust3r.reference.pair_viewer import view_pair
 from dreamdrive.geometry.fitting import prepare
 from geometry.simulated_pairs import Noise, Truth, pair_maps
 
@@ -50,8 +47,6 @@ def make(to: Path, rng: np.random.Generator) -> None:
         **_alignment(to, "B", _cropped(whole), street(count, *size), rng, ("cosine", "fixed")),
     }
     write(to / "dust3r/align_config.json", settings)
-    _cleaned(to)
-    _pair(to, rng)
 
 
 def _networks(to: Path, rng: np.random.Generator) -> None:
@@ -152,8 +147,7 @@ def _focals(to: Path, rng: np.random.Generator) -> None:
         height, width = rng.integers(14, 50, 2).tolist()
         points = _plane(width, height, 0.9 * width) * rng.normal(1, 0.03, (height, width, 3))
         points, pp = points.astype(np.float32), (width / 2 - 1, height / 2 + 0.5)
-        table[case] = {"pp": pp, "weiszfeld": weiszfeld_px(points, pp), "median": median_px(points, pp)}
-        table[case]["weiszfeld_clipped"] = weiszfeld_px(points, pp, CLIP)
+        table[case] = {"pp": pp, "weiszfeld": weiszfeld_px(points, pp)}
         clouds[case] = points
     write(to / "dust3r/weiszfeld_inputs.safetensors", clouds)
     write(to / "dust3r/weiszfeld.json", table)
@@ -207,9 +201,7 @@ def _alignment(
         found["loss"] = descend(objective, raw, own["niter"], **rates)  # type: ignore[arg-type]
         end = objective.start_of(raw)
         found |= {"final.focals": end.focals_px, "final.poses": end.world_from_camera}
-        for i, depth in enumerate(end.depth):
-            cloud = world_points(depth, end.world_from_camera[i], float(end.focals_px[i]))
-            found |= {f"final.depth.{i}": depth, f"final.pts3d.{i}": cloud}
+        found |= {f"final.depth.{i}": depth for i, depth in enumerate(end.depth)}
         outputs |= {f"{run}.{key}": value for key, value in found.items()}
     write(to / f"dust3r/align_{name}_outputs.safetensors", outputs)
     return settings
@@ -227,37 +219,3 @@ def _first_steps(objective: Objective, raw: Raw, settings: dict[str, Any]) -> Ar
         descend(objective, moved, steps, of=settings["niter"], **rates)
         found |= {f"step{steps}.{part}": value for part, value in _parts(moved).items()}
     return found
-
-
-def _cleaned(to: Path) -> None:
-    given = scene("A")
-    final, images = given.outputs.under("cosine.final."), range(given.images)
-    trust = [
-        np.max(
-            [
-                c[side]
-                for e, c in zip(given.maps.edges, given.maps.confidence, strict=True)
-                for side in (0, 1)
-                if e[side] == i
-            ],
-            axis=0,
-        )
-        for i in images
-    ]
-    depth, points = ([final[f"{kind}.{i}"] for i in images] for kind in ("depth", "pts3d"))
-    found = clean(trust, depth, points, final["poses"], final["focals"])
-    outputs = dict(given.outputs) | {f"im_conf.{i}": trust[i] for i in images}
-    outputs |= {f"clean_conf.{i}": found[i] for i in images}
-    write(to / "dust3r/align_A_outputs.safetensors", outputs)
-
-
-def _pair(to: Path, rng: np.random.Generator) -> None:
-    truth = street(2, *rng.integers(24, 50, 2).tolist())
-    maps = pair_maps(truth, np.array([(0, 1), (1, 0)]), Noise())
-    _save_maps(to, "C", maps, truth)
-    found = view_pair(maps)
-    outputs: Arrays = {"poses": found.world_from_camera, "focals": found.focals_px}
-    for i, depth in enumerate(found.depth):
-        cloud = world_points(depth, found.world_from_camera[i], float(found.focals_px[i]))
-        outputs |= {f"depth.{i}": depth, f"pts3d.{i}": cloud}
-    write(to / "dust3r/align_C_outputs.safetensors", outputs)

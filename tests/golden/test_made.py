@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.conftest import ROOT
 
-READERS = ("tests/evaluate", "tests/geometry/dust3r", "tests/prior")
+READERS = ("tests/evaluate", "tests/geometry/backends/dust3r", "tests/prior")
 
 
 @pytest.mark.slow

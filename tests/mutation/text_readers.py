@@ -10,8 +10,7 @@ import pycolmap
 from dreamdrive.cli.actions import EXAMPLES, parse_action
 from dreamdrive.data.intrinsics import read_intrinsics
 from dreamdrive.data.layout_file import read_layout, write_layout
-from dreamdrive.data.pose_files import PoseRows, read_pose_file, write_pose_file
-from dreamdrive.data.poses import read_poses, read_trajectory
+from dreamdrive.data.poses import of_frames, read_pose_file, read_trajectory, write_trajectory
 from dreamdrive.data.rig import read_rig, write_rig
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.geometry_truth import read_geometry_truth
@@ -23,6 +22,7 @@ from dreamdrive.geometry.backends.files.formats import companions
 from dreamdrive.prior.magicdrive.config import read_settings
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.camera import FARTHEST_M
+from dreamdrive.scene.trajectory import Trajectory
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
 from tests.geometry.backends.dust3r.network.test_config import CALL, HUB
 from tests.geometry.backends.files import drives
@@ -50,7 +50,7 @@ def _poses(path: Path, camera: str | None = None) -> None:
     rows = read_pose_file(path, "--poses", camera)
     assert np.isfinite(rows.world_from_camera).all()
     assert np.abs(rows.world_from_camera[:, :3, 3]).max() <= FARTHEST_M
-    read_poses(path, camera or "", np.array([0, 2]), np.array([0.0, 0.2]), lambda: 4)
+    of_frames(rows, np.array([0, 2]), np.array([0.0, 0.2]), lambda: 4)
 
 
 def _attached(folder: Path) -> None:
@@ -113,7 +113,7 @@ def _kitti(folder: Path) -> None:
 
 def _tum(path: Path) -> None:
     path.parent.mkdir(exist_ok=True)
-    write_pose_file(path, PoseRows(_TRUTH, _TIMES_S))
+    write_trajectory(Trajectory(_TRUTH, _TIMES_S), path)
 
 
 def _colmap_text(folder: Path) -> Path:

@@ -1,6 +1,6 @@
 """A recording on disk becomes a clip: pinhole frames of one size, with times and whatever is known."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -14,9 +14,9 @@ from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import ImageFolder
-from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
+from dreamdrive.data.intrinsics import Calibration, calibration
 from dreamdrive.data.lens import Lens, Undistorter
-from dreamdrive.data.poses import read_poses
+from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import Sizing, choose_size
@@ -62,7 +62,7 @@ def read_clip(
         fps: Rate of the input before the step. Without it a video's own times count, and a folder has 10 Hz.
         size: Exact width and height; without it 480 wide, or the source's width if that is less.
         intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
-        poses: Pose file (see ``poses.read_poses``).
+        poses: Pose file (see ``poses.read_pose_file``).
         hfov_deg: Horizontal field of view of the source, instead of ``intrinsics``.
         trajectory: Path that whoever made the recording was asked to drive, in a pose file.
         features: Features of the source's pictures (see ``feature_file.read_features``).
@@ -73,10 +73,8 @@ def read_clip(
     """
     if fps is not None and not (isfinite(fps) and fps > 0):
         raise InputError(f"--fps {fps:g}: expected a positive number of frames a second")
-    if intrinsics is not None and hfov_deg is not None:
-        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
     source = open_source(path)
-    picked = _gather(source, Selection.parse(frames), size, intrinsics, hfov_deg)
+    picked = _gather(source, Selection.parse(frames), size, lambda of: calibration(of, intrinsics, hfov_deg))
     index = np.array(picked.index)
     times_s, said = _times(source, index, picked.times_s, fps)
     notes = [*said, *picked.notes]
@@ -84,7 +82,8 @@ def read_clip(
     def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
         if file is None:
             return None
-        found, said = read_poses(file, path.resolve().name, index, times_s, source.count, option)
+        rows = read_pose_file(file, option, path.resolve().name)
+        found, said = of_frames(rows, index, times_s, source.count)
         notes.extend(said)
         return found
 
@@ -128,20 +127,13 @@ class _Sampler:
     undistorter: Undistorter | None
 
     @staticmethod
-    def create(
-        source: tuple[int, int], size: tuple[int, int] | None, intrinsics: Path | None, hfov_deg: float | None
-    ) -> "_Sampler":
-        calibration = (
-            guess_camera(source, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, source)
-        )
+    def create(source: tuple[int, int], size: tuple[int, int] | None, known: Calibration) -> "_Sampler":
         sizing = choose_size(source, size)
-        camera = sizing.camera(calibration.camera)
-        if calibration.distortion is None:
-            return _Sampler(calibration, sizing, camera, None, None)
-        lens = Lens(calibration.distortion, camera)
-        return _Sampler(
-            calibration, sizing, camera, lens, Undistorter.create(lens, calibration.camera, sizing)
-        )
+        camera = sizing.camera(known.camera)
+        if known.distortion is None:
+            return _Sampler(known, sizing, camera, None, None)
+        lens = Lens(known.distortion, camera)
+        return _Sampler(known, sizing, camera, lens, Undistorter.create(lens, known.camera, sizing))
 
     def __call__(self, raw: RawFrame) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:
         apply = self.sizing.apply if self.undistorter is None else self.undistorter.apply
@@ -181,8 +173,7 @@ def _gather(
     source: Source,
     selection: Selection,
     size: tuple[int, int] | None,
-    intrinsics: Path | None,
-    hfov_deg: float | None,
+    calibrated: Callable[[tuple[int, int]], Calibration],
 ) -> _Picked:
     """Read the selected frames, each brought to the clip's size as it comes."""
     count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
@@ -191,7 +182,7 @@ def _gather(
     most = MAX_FRAMES
     for raw in _limited(source, wanted):
         if picked is None:
-            sampler = _Sampler.create(raw.size, size, intrinsics, hfov_deg)
+            sampler = _Sampler.create(raw.size, size, calibrated(raw.size))
             picked = _Picked(sampler, raw)
             most = _most_frames(sampler.sizing.target)
         elif raw.size != picked.first.size:

@@ -6,8 +6,10 @@ from math import isfinite, radians, tan
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from dreamdrive.data.camera_models import LensCamera, model_cameras
 from dreamdrive.data.distortion import Distortion, check_bend
+from dreamdrive.data.formats.cameras import LensCamera, different
+from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
+from dreamdrive.data.formats.nerfstudio import frame_camera, transforms_frames
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.scene.camera import Camera
@@ -33,6 +35,17 @@ class Calibration:
     distortion: Distortion | None
     known: bool
     notes: tuple[str, ...]
+
+
+def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
+    """The camera of an input, as far as it is told.
+
+    Raises:
+        InputError: It is told twice, or cannot be read.
+    """
+    if intrinsics is not None and hfov_deg is not None:
+        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
+    return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
 
 
 def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibration:
@@ -62,7 +75,7 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
     """Read a calibration file: JSON with ``width``, ``height``, ``intrinsics`` and optional ``distortion``.
 
     The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy. A
-    COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``camera_models``.
+    COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``model_cameras``.
 
     Args:
         path: The file, such as a clip's ``meta.json``, or a folder with a COLMAP model.
@@ -72,8 +85,30 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         InputError: The file is missing, malformed, or for images of another shape.
     """
     cameras = model_cameras(path, "--intrinsics")
-    if cameras is not None:
-        return _of_model(cameras, path, size)
+    if cameras is not None and len(cameras) != 1:
+        raise InputError(
+            f"--intrinsics {path} holds {len(cameras)} different cameras; expected one for all frames: let "
+            "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
+        )
+    try:
+        found, notes = _of_json(path) if cameras is None else (cameras[0], [])
+        (width, height), (wide, high) = found.size, size
+        if abs(width / height * high / wide - 1) > _ASPECT_TOLERANCE:
+            raise InputError(
+                f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
+                f"{wide}x{high}, another shape; give the calibration of this input"
+            )
+        if found.size != size:
+            notes = [f"The calibration is scaled from {width:g}x{height:g} to {wide}x{high}.", *notes]
+        return Calibration(found.camera.resized(*size), found.distortion, True, tuple(notes))
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"--intrinsics {path}: {error}") from None
+
+
+def _of_json(path: Path) -> tuple[LensCamera, list[str]]:
+    """The camera at the size that the file is for, and what to say about its lens."""
     values = read_json(path, "--intrinsics")
     pinhole = values.get("intrinsics")
     if not isinstance(pinhole, dict):
@@ -84,47 +119,40 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
     pinhole = cast("dict[str, Any]", pinhole)
     width, height = (_number(path, values, name) for name in ("width", "height"))
     fx, fy, cx, cy = (_number(path, pinhole, name) for name in ("fx", "fy", "cx", "cy"))
-    if min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
+    whole = width % 1 == height % 1 == 0
+    if not whole or min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
         raise InputError(
-            f"--intrinsics {path}: expected positive sizes and focal lengths and a principal point inside "
-            f"the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}"
+            f"--intrinsics {path}: expected whole positive sizes, positive focal lengths and a principal "
+            f"point inside the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, "
+            f"cx {cx:g}, cy {cy:g}"
         )
-    notes = _scaled(path, (width, height), size)
-    sx, sy = size[0] / width, size[1] / height
-    try:
-        camera = Camera(fx * sx, fy * sy, (cx + 0.5) * sx, (cy + 0.5) * sy, *size)
-    except ValueError as error:
-        raise InputError(f"--intrinsics {path}: {error}") from None
-    distortion = _distortion(path, values.get("distortion"), notes)
-    return Calibration(camera, distortion, True, tuple(notes))
+    camera = Camera(fx, fy, cx + 0.5, cy + 0.5, int(width), int(height))
+    distortion, notes = _distortion(path, values.get("distortion"))
+    return LensCamera(camera, distortion), notes
 
 
-def _of_model(cameras: list[LensCamera], path: Path, size: tuple[int, int]) -> Calibration:
-    if len(cameras) > 1:
-        raise InputError(
-            f"--intrinsics {path} holds {len(cameras)} different cameras; expected one for all frames: let "
-            "COLMAP share it (--ImageReader.single_camera 1), or undistort the pictures and give their model"
-        )
-    camera = cameras[0].camera
-    notes = _scaled(path, (camera.width_px, camera.height_px), size)
-    try:
-        camera = camera.resized(*size)
-    except ValueError as error:
-        raise InputError(f"--intrinsics {path}: {error}") from None
-    return Calibration(camera, cameras[0].distortion, True, tuple(notes))
+def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
+    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither.
 
+    Args:
+        path: A file or a folder.
+        option: How messages call it, such as ``--intrinsics``.
 
-def _scaled(path: Path, made_for: tuple[float, float], size: tuple[int, int]) -> list[str]:
-    """What to say where a calibration is for images of another size."""
-    (width, height), (wide, high) = made_for, size
-    if made_for == size:
-        return []
-    if abs(width / height * high / wide - 1) > _ASPECT_TOLERANCE:
-        raise InputError(
-            f"--intrinsics {path} is for {width:g}x{height:g} images, but the input is "
-            f"{wide}x{high}, another shape; give the calibration of this input"
-        )
-    return [f"The calibration is scaled from {width:g}x{height:g} to {wide}x{high}."]
+    Raises:
+        InputError: It is one of them and cannot be used.
+    """
+    transforms = path / "transforms.json" if path.is_dir() else path
+    if transforms.suffix.lower() == ".json" and transforms.is_file():
+        values = read_json(transforms, option)
+        if not isinstance(values.get("frames"), list) or {"intrinsics", "world_from_camera"} & values.keys():
+            return None
+        where = f"{option} {transforms}"
+        return different([frame_camera(frame, where) for frame in transforms_frames(values, where)])[0]
+    folder = find_colmap(path) if path.is_dir() else None
+    if folder is None:
+        return None
+    model = read_colmap(folder)
+    return different([colmap_camera(camera, str(folder)) for camera in model.cameras.values()])[0]
 
 
 def _number(path: Path, values: dict[str, Any], name: str) -> float:
@@ -134,11 +162,10 @@ def _number(path: Path, values: dict[str, Any], name: str) -> float:
     return float(value)
 
 
-def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | None:
+def _distortion(path: Path, value: object) -> tuple[Distortion | None, list[str]]:
     if value is None or isinstance(value, str):
         said = f' (the calibration says "{value}")' if value else ""
-        notes.append(f"No distortion coefficients are given: the lens distortion is taken as zero{said}.")
-        return None
+        return None, [f"No distortion coefficients are given: the lens distortion is taken as zero{said}."]
     values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
     name, numbers = values.get("model"), values.get("coefficients")
     if not isinstance(name, str) or not isinstance(numbers, list):
@@ -155,7 +182,7 @@ def _distortion(path: Path, value: object, notes: list[str]) -> Distortion | Non
             f"--intrinsics {path}: distortion {name!r} with {len(coefficients)} coefficients; expected "
             f"{' or '.join(map(str, allowed))} in OpenCV's order"
         )
-    return Distortion(model, coefficients) if any(coefficients) or model == "fisheye" else None
+    return (Distortion(model, coefficients) if any(coefficients) or model == "fisheye" else None), []
 
 
 def _model(path: Path, name: str) -> tuple[Literal["opencv", "fisheye"], list[str]]:

@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.images import SUFFIXES, read_image
-from dreamdrive.data.intrinsics import Calibration, guess_camera, read_intrinsics
+from dreamdrive.data.intrinsics import calibration
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.remarks import of_damage
 from dreamdrive.data.select import UNBOUNDED
@@ -77,17 +77,6 @@ def read_photo(
 def is_photo(path: Path) -> bool:
     """Whether it is a file of one picture, not a recording."""
     return path.is_file() and path.suffix.lower() in SUFFIXES
-
-
-def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
-    """The camera of an input, as far as it is told.
-
-    Raises:
-        InputError: It is told twice, or cannot be read.
-    """
-    if intrinsics is not None and hfov_deg is not None:
-        raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
-    return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
 
 
 def leading_frames(path: Path, count: int, rate_hz: float = 1.0) -> tuple[list[RawFrame], list[str]]:

@@ -6,11 +6,44 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.pose_files import PoseRows, read_pose_file, write_pose_file
+from dreamdrive.data.formats.pandaset import pandaset_camera
+from dreamdrive.data.formats.pose_lists import (
+    FORMATS,
+    json_of,
+    poses_of_json,
+    poses_of_text,
+    text_of,
+)
+from dreamdrive.data.formats.rigid import PoseRows
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import read_text
 from dreamdrive.scene.trajectory import Trajectory
 
 _CLOCK_NOTE = "The times of the pose file count from its first row, taken as frame 0 of the input."
+
+
+def read_pose_file(path: Path, option: str, camera: str | None = None) -> PoseRows:
+    """Read a pose file of any of the formats; the content decides which it is.
+
+    Args:
+        path: The file.
+        option: How messages call it, such as ``--poses``.
+        camera: Name of the camera to look for in PandaSet's ``cameras.json``.
+
+    Raises:
+        InputError: The file is missing or malformed, or a pose holds NaN or is not rigid.
+    """
+    where = f"{option} {path}"
+    text = read_text(path, where)
+    if not text.lstrip().startswith(("{", "[")):
+        return poses_of_text(text, where)
+    values = read_json(path, option)
+    if "world_from_camera" in values:
+        return poses_of_json(values, where)
+    if "cameras" in values:
+        return pandaset_camera(values, where, camera).rows
+    raise InputError(f"{where}: expected {FORMATS}")
 
 
 def read_trajectory(path: Path) -> Trajectory:
@@ -26,42 +59,41 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
-    """Write JSON, or TUM unless the name ends in ``.json``.
+    """Write TUM, or JSON where the name ends in ``.json``; an older file is replaced in one step.
 
     Raises:
         InputError: The file cannot be written.
     """
+    draft = path.with_name(path.name + ".part")
     try:
-        write_pose_file(path, PoseRows(trajectory.world_from_camera, trajectory.times_s))
+        draft.write_text(
+            json_of(trajectory) if path.suffix.lower() == ".json" else text_of(trajectory), "utf-8"
+        )
+        draft.replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def read_poses(
-    path: Path,
-    camera: str,
+def of_frames(
+    rows: PoseRows,
     index: Int[np.ndarray, " f"],
     times_s: Float[np.ndarray, " f"],
     count: Callable[[], int],
-    option: str = "--poses",
 ) -> tuple[Float[np.ndarray, "f 4 4"], tuple[str, ...]]:
-    """The poses of the selected frames, in the frame of the first of them, and notes for the report.
+    """Those of a file's poses that are of the selected frames, in the frame of the first, and notes.
 
     A file has one pose per frame of the source, or one per selected frame; with any other number, poses with
     times are matched to the nearest frame within half a frame.
 
     Args:
-        path: Trajectory JSON, TUM, KITTI or PandaSet's ``cameras.json``.
-        camera: Name of the camera in ``cameras.json``: that of the input folder.
+        rows: The poses.
         index: Index of each selected frame in the source.
         times_s: Time of each selected frame since frame 0 of the source.
         count: Number of frames in the source; called only where it decides.
-        option: How messages call the file.
 
     Raises:
-        InputError: The file is malformed or its poses fit the frames in no way.
+        InputError: The poses fit the frames in no way.
     """
-    rows = read_pose_file(path, option, camera)
     notes: tuple[str, ...] = ()
     if len(rows) == len(index):
         chosen = np.arange(len(index))
@@ -69,11 +101,11 @@ def read_poses(
         chosen = np.asarray(index)
     elif rows.times_s is None:
         raise InputError(
-            f"{option} {path} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of "
+            f"{rows.where} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of "
             "them selected; expected one pose per frame of the input or per selected frame"
         )
     else:
-        chosen, notes = _by_time(f"{option} {path}", rows.times_s, index, times_s)
+        chosen, notes = _by_time(rows.where, rows.times_s, index, times_s)
     return to_first(rows.world_from_camera[chosen]), notes
 
 

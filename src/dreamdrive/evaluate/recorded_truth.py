@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -11,9 +11,10 @@ from jaxtyping import Bool, Float
 from msgspec import Meta
 
 from dreamdrive.data.array_file import read_npz
-from dreamdrive.data.camera_models import IndexedPinhole, MatrixPinhole, NamedFrames
+from dreamdrive.data.formats.cameras import IndexedPinhole, Intrinsics
+from dreamdrive.data.formats.pandaset import Cuboid, moving_cuboids, pandaset_camera
 from dreamdrive.data.picture_file import read_picture
-from dreamdrive.data.pose_files import read_pose_file
+from dreamdrive.data.poses import read_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.scene.camera import FARTHEST_M, MAX_SIDE_PX, Camera
@@ -22,39 +23,10 @@ _PNG_PER_M = 256.0
 """Grey levels a metre in KITTI's 16-bit depth pictures."""
 
 
-Place = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
-
-
-class Cuboid(msgspec.Struct):
-    """A box of one frame as PandaSet has it; its yaw turns about the vertical.
-
-    Attributes:
-        position: Its middle in the world, z up, in metres.
-        size_wlh: Width, length and height in metres.
-        yaw: In radians.
-        motion: PandaSet's label, such as ``Moving``.
-        stationary: What is told where there is no label of motion.
-    """
-
-    position: tuple[Place, Place, Place]
-    size_wlh: tuple[Place, Place, Place]
-    yaw: Place
-    motion: str | None = None
-    stationary: bool | None = None
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is labelled as moving, or without a label of motion is not stationary."""
-        return self.motion == "Moving" or (self.motion is None and self.stationary is False)
-
-
-class _Cuboids(msgspec.Struct):
-    frames: list[list[Cuboid]]
-
-
-class _Sides(msgspec.Struct):
+class _About(msgspec.Struct):
     width: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
     height: Annotated[int, Meta(ge=1, le=MAX_SIDE_PX)]
+    intrinsics: Intrinsics | None = None
 
 
 @dataclass(frozen=True)
@@ -81,14 +53,14 @@ class Recorded:
         size: Width and height of the frames in pixels.
         pinhole: Their calibration; None where there is none.
         depth_files: File with the points of a frame, by its index.
-        boxes: Boxes of what moves, by the index of the frame; None where nothing says what moves.
+        boxes: Boxes of what moves in each frame; None where nothing says what moves.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
     size: tuple[int, int]
     pinhole: Camera | None
     depth_files: Mapping[int, Path]
-    boxes: Mapping[int, Sequence[Cuboid]] | None
+    boxes: Sequence[Sequence[Cuboid]] | None
 
     def points(self, frame: int) -> Points:
         """The points of a frame, from its file.
@@ -103,7 +75,7 @@ class Recorded:
         if self.boxes is not None and self.pinhole is not None:
             camera = self.pinhole.at(self.world_from_camera[frame])
             points = _lifted(camera, place_px, depth_m)
-            for box in self.boxes.get(frame, ()):
+            for box in self.boxes[frame]:
                 moving |= _inside(points, box)
         return Points(place_px, depth_m, moving)
 
@@ -119,23 +91,15 @@ def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
         InputError: The file is damaged or knows no such camera.
     """
     file = folder / "cameras.json"
-    poses = read_pose_file(file, "--truth", camera).world_from_camera
-    # The poses were found under this name.
-    entry: dict[str, Any] = read_json(file, "--truth")["cameras"][camera]
-    try:
-        pinhole = of_type(entry, MatrixPinhole, "calibration").camera()
-        named = of_type(entry, NamedFrames, "calibration").frames
-    except ValueError as error:
-        raise InputError(
-            f"--truth {file}: {camera} has no usable width, height and K ({error}); expected pixels and a "
-            "3x3 matrix"
-        ) from error
-    sweeps = list(range(len(poses))) if named is None else named
-    place = {sweep: frame for frame, sweep in enumerate(sweeps)}
+    found = pandaset_camera(read_json(file, "--truth"), f"--truth {file}", camera)
+    pinhole = found.pinhole()
+    place = {sweep: frame for frame, sweep in enumerate(found.sweeps)}
     lidar = _numbered(folder / f"lidar_depth_{str(camera).removesuffix('_camera')}")
     files = {place[sweep]: path for sweep, path in lidar.items() if sweep in place}
+    boxes = folder / "cuboids.json"
+    moving = moving_cuboids(boxes, "--truth", found.sweeps) if boxes.is_file() else None
     size = pinhole.width_px, pinhole.height_px
-    return Recorded(poses, size, pinhole, files, _boxes(folder / "cuboids.json", sweeps))
+    return Recorded(found.rows.world_from_camera, size, pinhole, files, moving)
 
 
 def read_poses_txt(folder: Path) -> Recorded:
@@ -146,39 +110,24 @@ def read_poses_txt(folder: Path) -> Recorded:
     """
     poses = read_pose_file(folder / "poses.txt", "--truth").world_from_camera
     file = folder / "meta.json"
-    meta = read_json(file, "--truth")
+    values = read_json(file, "--truth")
     try:
-        size = of_type(meta, _Sides, "calibration")
-        known = meta.get("intrinsics") is not None
-        pinhole = of_type(meta, IndexedPinhole, "calibration").camera() if known else None
+        about = of_type(values, _About, "calibration")
+        k = about.intrinsics
+        pinhole = None if k is None else IndexedPinhole(about.width, about.height, k).camera()
     except ValueError as error:
         raise InputError(
             f"--truth {file} is unusable ({error}); expected JSON with width, height and, where known, "
             'intrinsics {"fx", "fy", "cx", "cy"} in pixels'
         ) from error
     numbered = _numbered(folder / "lidar_depth")
-    return Recorded(poses, (size.width, size.height), pinhole, numbered, None)
+    return Recorded(poses, (about.width, about.height), pinhole, numbered, None)
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
     """Files with points by the number that is their name; none where there is no folder."""
     files = sorted(folder.glob("*")) if folder.is_dir() else []
     return {int(f.stem): f for f in files if f.suffix in (".npz", ".png") and f.stem.isdecimal()}
-
-
-def _boxes(path: Path, sweeps: Sequence[int]) -> dict[int, list[Cuboid]] | None:
-    """Boxes of what moves, by frame: so labelled, or without a label of motion but not stationary."""
-    if not path.is_file():
-        return None
-    try:
-        frames = of_type(read_json(path, "--truth"), _Cuboids, "cuboids").frames
-        found = {frame: [b for b in frames[sweep] if b.moves] for frame, sweep in enumerate(sweeps)}
-    except (InputError, IndexError) as error:
-        raise InputError(
-            f"--truth {path} is damaged ({error}); expected frames, each a list of boxes with motion, "
-            "position, size_wlh and yaw: take it away to do without what moves"
-        ) from error
-    return found
 
 
 def _inside(points: Float[np.ndarray, "n 3"], box: Cuboid) -> Bool[np.ndarray, " n"]:

@@ -58,12 +58,7 @@ def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None,
 
 
 def check_free(path: Path, replace: bool, mark: str) -> None:
-    """Fail before the work where ``new_folder`` would fail after it.
-
-    Args:
-        path: The folder to create.
-        replace: Whether an existing folder may be replaced.
-        mark: Name of the file by which a folder of this kind is known.
+    """Fail before the work where ``new_folder``, of the same arguments, would fail after it.
 
     Raises:
         InputError: Something is in the way.

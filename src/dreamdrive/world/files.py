@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta
 
 from dreamdrive.data.array_file import read_npz
-from dreamdrive.data.camera_models import IndexedPinhole
+from dreamdrive.data.formats.cameras import IndexedPinhole
 from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
 from dreamdrive.data.picture_file import read_picture
 from dreamdrive.data.rig import write_rig

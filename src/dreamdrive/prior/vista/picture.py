@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dreamdrive.data.intrinsics import Calibration
+from dreamdrive.data.intrinsics import Calibration, calibration
 from dreamdrive.data.lens import Lens, Undistorter
-from dreamdrive.data.photo import calibration, leading_frames
+from dreamdrive.data.photo import leading_frames
 from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera

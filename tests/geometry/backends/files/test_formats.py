@@ -5,12 +5,14 @@ import pytest
 from tests.geometry.backends.files import drives
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.files.colmap import read_colmap_model
 from dreamdrive.geometry.backends.files.formats import companions, recognise
-from dreamdrive.geometry.backends.files.nerfstudio import read_transforms
-from dreamdrive.geometry.backends.files.pandaset import read_pandaset
-from dreamdrive.geometry.backends.files.plain import read_plain
-from dreamdrive.geometry.backends.files.pose_lists import read_pose_list
+from dreamdrive.geometry.backends.files.readers import (
+    read_colmap_model,
+    read_pandaset,
+    read_plain,
+    read_pose_list,
+    read_transforms,
+)
 
 POSE = np.eye(4).tolist()
 

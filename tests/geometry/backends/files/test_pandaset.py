@@ -47,10 +47,10 @@ def test_a_single_camera_needs_no_name(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"K": [[1, 2], [3]]}, "front: expected width, height and K"),
+        ({"K": [[1, 2], [3]]}, "front has no usable width, height and K"),
         ({"K": np.full((3, 3), np.nan).tolist()}, "NaN or Infinity, which JSON has not"),
-        ({"K": None}, "front: expected width, height and K"),
-        ({"width": "wide"}, "front: expected width, height and K"),
+        ({"K": None}, "front has no usable width, height and K"),
+        ({"width": "wide"}, "front has no usable width, height and K"),
         ({"width": 96}, "another aspect"),
         ({"camera_to_world": (2 * TRUTH).tolist()}, "not rigid"),
         ({"camera_to_world": TRUTH[:3].tolist(), "frames": [0, 1, 2]}, "has 3 poses, but the input has 6"),

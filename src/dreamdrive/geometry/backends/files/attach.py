@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.formats.cameras import different
 from dreamdrive.data.poses import to_first
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.declared import NAME
@@ -40,9 +40,11 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
     given = reader(place, wanted)
     onto = OntoClip.of(clip)
     rig, camera = _rig(clip, given, onto, str(place))
-    depth, notes = _depth(given.depth, onto, len(clip), bent=not given.cameras or _is_bent(given))
+    bent = not given.cameras or any(each.distortion is not None for each in given.cameras)
+    depth, notes = _depth(given.depth, onto, len(clip), bent)
     poses = to_first(given.world_from_camera)
-    points = None if given.sparse is None else _moved(given.sparse.points, given.world_from_camera[0])
+    first = given.world_from_camera[0]
+    points = None if given.sparse is None else (given.sparse.points - first[:3, 3]) @ first[:3, :3]
     known = replace(
         clip.known,
         world_from_camera=poses,
@@ -62,38 +64,29 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
     return replace(attached, provenance={**clip.provenance, "notes": said})
 
 
-def _is_bent(given: Given) -> bool:
-    return any(each.distortion is not None for each in given.cameras)
-
-
 def _rig(
     clip: Clip, given: Given, onto: OntoClip, where: str
 ) -> tuple[tuple[Camera, ...], Int[np.ndarray, " f"]]:
     """The pinholes of the frames: those of the files, or the clip's own where its lens was taken out."""
     if not given.cameras:
         return clip.rig, clip.camera
-    bent = next((each for each in given.cameras if each.distortion is not None), None)
-    if bent is None:
-        rig = tuple(onto.camera(each.camera, where) for each in given.cameras)
+    cameras, camera = different(given.cameras)
+    bend = next((each.distortion for each in cameras if each.distortion is not None), None)
+    if bend is None:
+        rig = tuple(onto.sizing(each.size, where).camera(each.camera) for each in cameras)
         if onto.lens is not None:
             _check_same(rig, onto.lens.camera, where)
-        return rig, given.camera
+        return rig, camera
     if onto.lens is None:
-        raise InputError(_bent_words(bent, where))
-    if len(given.cameras) > 1:
-        count = len(given.cameras)
-        raise InputError(f"{where}: {count} cameras with distortion; expected one for all frames")
-    onto.sizing((bent.camera.width_px, bent.camera.height_px), where)
+        numbers = " ".join(f"{each:.4g}" for each in bend.coefficients)
+        raise InputError(
+            f"{where}: its camera has the lens distortion {bend.model} {numbers}, but the frames were read "
+            "as a pinhole's: give it as --intrinsics, too, without --hfov, or undistort the pictures first"
+        )
+    if len(cameras) > 1:
+        raise InputError(f"{where}: {len(cameras)} cameras with distortion; expected one for all frames")
+    onto.sizing(cameras[0].size, where)
     return clip.rig, clip.camera
-
-
-def _bent_words(bent: LensCamera, where: str) -> str:
-    assert bent.distortion is not None
-    numbers = " ".join(f"{each:.4g}" for each in bent.distortion.coefficients)
-    return (
-        f"{where}: its camera has the lens distortion {bent.distortion.model} {numbers}, but the frames were "
-        "read as a pinhole's: give it as --intrinsics, too, without --hfov, or undistort the pictures first"
-    )
 
 
 def _check_same(rig: tuple[Camera, ...], pinhole: Camera, where: str) -> None:
@@ -125,11 +118,6 @@ def _depth(
     if len(files.of) < count:
         notes.append(f"{len(files.of)} of {count} frames have a depth file; the others have no depth.")
     return depth, notes
-
-
-def _moved(points: Float[np.ndarray, "p 3"], first: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "p 3"]:
-    """Points of the file's world in the frame of its first selected camera."""
-    return (points - first[:3, 3]) @ first[:3, :3]
 
 
 def _scaled_by_depth(clip: Clip, given: Given, where: str) -> tuple[Known, str]:

@@ -8,6 +8,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 
 NAME = "geometry.json"
+OPTION = "--geometry-files"
 _UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "1/256 m": 1 / 256}
 _KEYS = ("metric", "depth_unit", "camera")
 
@@ -38,7 +39,7 @@ def read_declared(folder: Path) -> Declared:
     path = folder / NAME
     if not path.is_file():
         return Declared()
-    values = read_json(path, "--geometry-files")
+    values = read_json(path, OPTION)
     unknown = [key for key in values if key not in _KEYS]
     if unknown:
         raise InputError(f"{path}: {', '.join(unknown)} is not known; expected {', '.join(_KEYS)}")

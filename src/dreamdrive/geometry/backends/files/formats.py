@@ -3,17 +3,22 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from dreamdrive.data.camera_models import find_colmap, model_cameras
+from dreamdrive.data.formats.colmap import find_colmap
+from dreamdrive.data.formats.nerfstudio import depth_file, transforms_frames
+from dreamdrive.data.intrinsics import model_cameras
 from dreamdrive.errors import InputError
+from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import open_file
-from dreamdrive.geometry.backends.files import nerfstudio
-from dreamdrive.geometry.backends.files.colmap import read_colmap_model
-from dreamdrive.geometry.backends.files.declared import NAME
+from dreamdrive.geometry.backends.files.declared import NAME, OPTION
 from dreamdrive.geometry.backends.files.given import Given
-from dreamdrive.geometry.backends.files.json_record import OPTION, read_record
-from dreamdrive.geometry.backends.files.pandaset import read_pandaset
-from dreamdrive.geometry.backends.files.plain import read_plain
-from dreamdrive.geometry.backends.files.pose_lists import CALIBRATION, read_pose_list
+from dreamdrive.geometry.backends.files.readers import (
+    CALIBRATION,
+    read_colmap_model,
+    read_pandaset,
+    read_plain,
+    read_pose_list,
+    read_transforms,
+)
 from dreamdrive.geometry.backends.files.wanted import Wanted
 
 EXPECTED = (
@@ -58,12 +63,12 @@ def _is_json(path: Path) -> bool:
 
 
 def _of_json(path: Path) -> Reader:
-    record = read_record(path)
+    record = read_json(path, OPTION)
     if isinstance(record.get("cameras"), dict):
         return read_pandaset
     if "world_from_camera" in record:
         return read_pose_list if "times_s" in record and "intrinsics" not in record else read_plain
-    return nerfstudio.read_transforms if "frames" in record else read_plain
+    return read_transforms if "frames" in record else read_plain
 
 
 def bent_model(path: Path) -> Path | None:
@@ -77,7 +82,7 @@ def bent_model(path: Path) -> Path | None:
     if not path.exists():
         return None
     reader, place = recognise(path)
-    if reader not in (read_colmap_model, nerfstudio.read_transforms):
+    if reader not in (read_colmap_model, read_transforms):
         return None
     cameras = model_cameras(place, OPTION) or []
     return place if any(each.distortion is not None for each in cameras) else None
@@ -91,8 +96,9 @@ def companions(path: Path) -> list[Path]:
     """
     reader, place = recognise(path)
     named: list[Path] = []
-    if reader is nerfstudio.read_transforms:
-        named = nerfstudio.depth_files(place)
+    if reader is read_transforms:
+        frames = transforms_frames(read_json(place, OPTION), str(place))
+        named = [file for frame in frames if (file := depth_file(place, frame)) is not None]
     if path.is_file():
         named += [path.parent / NAME, path.parent / CALIBRATION, path.parent / "depth"]
     return sorted({each for each in named if each.exists()})

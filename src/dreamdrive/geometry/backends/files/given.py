@@ -1,13 +1,13 @@
 """What the files of any format say about the selected frames of a clip."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from dreamdrive.data.camera_models import LensCamera
+from dreamdrive.data.formats.cameras import LensCamera
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,7 @@ class Given:
     Attributes:
         world_from_camera: Rigid poses (F, 4, 4), axes x right, y down, z forward, in the file's own world.
         metric: Whether the unit of the poses is the metre.
-        cameras: The different cameras, at the size of their pictures; none where the format has no
-            intrinsics.
-        camera: Index into ``cameras`` of each frame (F,).
+        cameras: That of each frame, at the size of its picture; none where the format has no intrinsics.
         depth: Where depth lies.
         sparse: Sparse points, where the format has them.
         notes: What the report should say, a sentence each.
@@ -58,8 +56,7 @@ class Given:
 
     world_from_camera: Float[np.ndarray, "f 4 4"]
     metric: bool
-    cameras: tuple[LensCamera, ...]
-    camera: Int[np.ndarray, " f"]
+    cameras: Sequence[LensCamera] = ()
     depth: DepthFiles = field(default_factory=DepthFiles)
     sparse: SparsePoints | None = None
     notes: tuple[str, ...] = ()

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from dreamdrive.data.lens import Lens
 from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 
 _ASPECT_TOLERANCE = 0.01
@@ -64,11 +63,6 @@ class OntoClip:
         if made_for != self.size and off_source <= off_frame:
             return Sizing(made_for, self.scaled, self.offset, self.size)
         return Sizing(made_for, self.size, (0, 0), self.size)
-
-    def camera(self, camera: Camera, where: str) -> Camera:
-        """The camera of the frames, from that of the pictures."""
-        made_for = (camera.width_px, camera.height_px)
-        return self.sizing(made_for, where).camera(camera)
 
     def depth(self, depth: Float[np.ndarray, "h w"], bent: bool, where: str) -> Float[np.ndarray, "h2 w2"]:
         """The depth of each pixel of a frame: that of the pixel of the picture in which its centre lies.

@@ -5,31 +5,21 @@ import pytest
 from tests.geometry.backends.dust3r.align.pairs import street, window
 from tests.golden.reading import arrays, cases, values
 
-from dreamdrive.geometry.backends.dust3r.align.focal import (
-    FocalRule,
-    focal_px,
-    focal_votes,
-    median_px,
-    robust_px,
-    weiszfeld_px,
-)
+from dreamdrive.geometry.backends.dust3r.align.focal import focal_votes, robust_px, weiszfeld_px
+from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.weighted import weighted_median
 from geometry.simulated_pairs import Noise, pair_maps
 
-CLIP = (0.5, 3.5)
-"""Least and greatest focal length of the clipped rule, in those of a field of view of 60 degrees."""
 LIMIT = 1e-5
 """Relative: ten steps of a weighted mean over all pixels, which the authors' program adds up in float32."""
 
 
 @pytest.mark.parametrize("case", cases("dust3r/weiszfeld.json"))
-def test_the_papers_rules_are_golden(case: str) -> None:
+def test_the_papers_rule_is_golden(case: str) -> None:
     wanted = values("dust3r/weiszfeld.json")[case]
     points = arrays("dust3r/weiszfeld_inputs.safetensors")[case]
     principal = tuple(wanted["pp"])
     assert weiszfeld_px(points, principal) == pytest.approx(wanted["weiszfeld"], rel=LIMIT)
-    assert median_px(points, principal) == pytest.approx(wanted["median"], rel=LIMIT)
-    assert weiszfeld_px(points, principal, CLIP) == pytest.approx(wanted["weiszfeld_clipped"], rel=LIMIT)
 
 
 def test_a_fifth_of_gross_outliers_moves_the_robust_rule_by_little() -> None:
@@ -46,17 +36,16 @@ def test_masked_pixels_do_not_count() -> None:
     points[:8, :, :2] *= 6
     confidence = np.full((24, 40), 3.0, np.float32)
     confidence[:8] = 1
-    assert focal_px(points, confidence) == pytest.approx(36, rel=1e-5)
-    assert abs(focal_px(points, confidence, "weiszfeld") / 36 - 1) > 0.02
+    assert robust_px(points, confidence) == pytest.approx(36, rel=1e-5)
+    assert abs(weiszfeld_px(points) / 36 - 1) > 0.02
 
 
-@pytest.mark.parametrize("rule", ["robust", "weiszfeld", "median"])
-def test_a_pinhole_beside_the_middle_with_oblong_pixels(rule: FocalRule) -> None:
+def test_a_pinhole_beside_the_middle_with_oblong_pixels() -> None:
     columns, rows = np.meshgrid((np.arange(40) - 17) / 36, (np.arange(24) - 14) / 18)
     depth = 4 + 0.05 * np.arange(24)[:, None] + 0 * columns
     points = np.stack([columns * depth, rows * depth, depth], axis=-1).astype(np.float32)
-    assert focal_px(points, None, rule, (17, 14), 2.0) == pytest.approx(36, rel=1e-5)
-    assert abs(focal_px(points, None, rule) / 36 - 1) > 0.05
+    assert robust_px(points, None, (17, 14), 2.0) == pytest.approx(36, rel=1e-5)
+    assert abs(robust_px(points) / 36 - 1) > 0.05
 
 
 def test_nothing_to_go_by_is_not_a_focal_length() -> None:
@@ -65,10 +54,12 @@ def test_nothing_to_go_by_is_not_a_focal_length() -> None:
 
 def test_votes_share_a_focal_length_and_tell_their_spread() -> None:
     truth = street(12, 64, 36)
-    exact = focal_votes(pair_maps(truth, window(12), Noise(0, 1 / 8, 0, 0, 0)))
+    maps = pair_maps(truth, window(12), Noise(0, 1 / 8, 0, 0, 0))
+    exact = focal_votes(maps, graph_of(maps))
     assert exact.shared_px == pytest.approx(truth.focal_px, rel=1e-5)
     assert exact.spread < 1e-5
-    noisy = focal_votes(pair_maps(truth, window(12), Noise(focal=0.05)))
+    maps = pair_maps(truth, window(12), Noise(focal=0.05))
+    noisy = focal_votes(maps, graph_of(maps))
     assert noisy.shared_px == pytest.approx(truth.focal_px, rel=0.03)
     assert 0.03 < noisy.spread < 0.08
     assert noisy.per_image_px(12).shape == (12,)

@@ -34,7 +34,7 @@ def problem() -> tuple[ImageSamples, State]:
     maps = pair_maps(street(3, 40, 24), np.array([(0, 1), (1, 0), (2, 1)]), Noise(outliers=0))
     start = spanning_tree(maps)
     state = State.of(start.world_from_camera, start.focals_px, start.pairs)
-    return draw_samples(maps, graph_of(maps), 30, "pooled", 0)[1], state
+    return draw_samples(maps, graph_of(maps), 30, 0)[1], state
 
 
 def loss(samples: ImageSamples, state: State, penalty: Penalty, reference: torch.Tensor) -> float:
@@ -61,7 +61,7 @@ def test_the_gradient_is_that_of_the_loss_at_the_best_depth(
     # A relative cost measures by the depth itself: where that has settled, both stand for the same reference.
     for _ in range(20):
         middle = samples.misses(state).depth(middle, penalty, middle, 10)
-    gradient = normal_equations(samples, state, middle, penalty).gradient.numpy()
+    gradient = normal_equations(samples, state, middle, penalty)[1].numpy()
     size = 1e-5
     for index in range(0, len(gradient), 2):
         after, before = (
@@ -76,12 +76,12 @@ def test_with_full_bend_shifts_have_newtons_hessian(problem: tuple[ImageSamples,
     penalty = Distance(0.05)
     depth = samples.misses(state).middle()
     depth = samples.misses(state).depth(depth, penalty, depth, _STEPS)
-    bent = normal_equations(samples, state, depth, penalty, bend=1.0).hessian.numpy()
-    plain = normal_equations(samples, state, depth, penalty, bend=0.0).hessian.numpy()
+    bent = normal_equations(samples, state, depth, penalty, bend=1.0)[0].numpy()
+    plain = normal_equations(samples, state, depth, penalty, bend=0.0)[0].numpy()
     size = 1e-5
     for index in (3, 4, 5, 10, 11, 12):
         sides = [
-            normal_equations(moved, own, deep, penalty).gradient.numpy()[index]
+            normal_equations(moved, own, deep, penalty)[1].numpy()[index]
             for moved, own, deep in (
                 _at(samples, own_part(samples, state, index, sign * size), depth, penalty) for sign in (1, -1)
             )
@@ -137,10 +137,10 @@ def test_what_is_fixed_does_not_move(problem: tuple[ImageSamples, State]) -> Non
 def test_only_some_pixels_are_drawn_and_they_stand_for_all() -> None:
     truth = street(3, 40, 24)
     maps = pair_maps(truth, window(3), Noise())
-    some, every = (draw_samples(maps, graph_of(maps), count, "pooled", 0) for count in (100, 10_000))
+    some, every = (draw_samples(maps, graph_of(maps), count, 0) for count in (100, 10_000))
     assert [len(each.pixels) for each in some] == [100] * 3
     assert [len(each.pixels) for each in every] == [int((truth.depth[i] > 0).sum()) for i in range(3)]
     for few, all_of in zip(some, every, strict=True):
         assert float(few.weight.sum()) == pytest.approx(float(all_of.weight.sum()), rel=0.05)
-    again = draw_samples(replace(maps), graph_of(maps), 100, "pooled", 0)
+    again = draw_samples(replace(maps), graph_of(maps), 100, 0)
     assert all(torch.equal(a.points, b.points) for a, b in zip(some, again, strict=True))

@@ -33,13 +33,15 @@ def straight() -> Truth:
 
 def shown(maps: PairMaps) -> TurnedFocal:
     graph = graph_of(maps)
-    return turned_focal(maps, focal_votes(maps, graph=graph), graph)
+    return turned_focal(maps, focal_votes(maps, graph), graph)
 
 
 @pytest.mark.parametrize("bias", [0.05, 0.0, -0.05])
 def test_a_corner_shows_what_all_pairs_have_wrong(corner: Truth, bias: float) -> None:
     maps = pair_maps(corner, window(FRAMES), replace(EXACT, common_focal=bias))
-    assert focal_votes(maps).shared_px == pytest.approx((1 + bias) * corner.focal_px, rel=1e-4)
+    assert focal_votes(maps, graph_of(maps)).shared_px == pytest.approx(
+        (1 + bias) * corner.focal_px, rel=1e-4
+    )
     found = shown(maps)
     assert found.focal_px == pytest.approx(corner.focal_px, rel=0.002)
     assert found.observed
@@ -94,7 +96,7 @@ def test_a_tenth_of_points_anywhere_does_no_harm(corner: Truth) -> None:
 def test_plain_reference_code_finds_the_same(corner: Truth) -> None:
     """A grid of focal lengths, OpenCV's poses at each, and a parabola through the sums of squares."""
     maps = pair_maps(corner, window(FRAMES), replace(EXACT, common_focal=0.05, place=0.003))
-    votes = focal_votes(maps)
+    votes = focal_votes(maps, graph_of(maps))
     grid = votes.shared_px * np.exp(np.linspace(-0.08, 0.02, 6))
     sums = [sum(_squares(maps, votes, edge, focal) for edge in range(len(maps))) for focal in grid]
     curve = np.polyfit(np.log(grid), sums, 2)
@@ -128,13 +130,13 @@ def test_oblong_pixels_and_a_principal_point_beside_the_middle() -> None:
     maps, given = PairMaps(maps.edges, points, confidence), pinholes(truth)
     given[:, 1] /= 2
     graph = graph_of(maps).through(given)
-    found = turned_focal(maps, focal_votes(maps, graph=graph), graph)
+    found = turned_focal(maps, focal_votes(maps, graph), graph)
     assert found.focal_px == pytest.approx(truth.focal_px, rel=0.002)
 
 
 def test_three_images_are_too_few(corner: Truth) -> None:
     maps = pair_maps(corner, window(3), replace(EXACT, common_focal=0.05))
-    assert shown(maps) == TurnedFocal(focal_votes(maps).shared_px, float("inf"))
+    assert shown(maps) == TurnedFocal(focal_votes(maps, graph_of(maps)).shared_px, float("inf"))
 
 
 def test_pairs_are_brought_to_a_known_focal_length(corner: Truth) -> None:

@@ -2,9 +2,7 @@
 
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.backends.dust3r.align.areas import Normalisation, half_areas
-from dreamdrive.geometry.backends.dust3r.align.focal import FocalRule, focal_px, robust_px
+from dreamdrive.geometry.backends.dust3r.align.focal import robust_px
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.backends.dust3r.align.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import BASE_SCALE, PNP_CONFIDENCE, Start
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import BASE_SCALE, Start

@@ -9,7 +9,6 @@ from jaxtyping import Float
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
-from dreamdrive.geometry.backends.dust3r.align.samples import Dense
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
@@ -75,13 +74,15 @@ class Found:
 
     Attributes:
         state: Cameras and pairs.
-        dense: Depth of all pixels, and the loss.
+        depth: Along z (H, W) of each image.
+        loss: Over all pixels.
         samples: What cameras and pairs were solved with.
         losses: Over the samples.
     """
 
     state: State
-    dense: Dense
+    depth: tuple[Float[np.ndarray, "_ _"], ...]
+    loss: float
     samples: Sequence[ImageSamples]
     losses: tuple[float, ...]
 
@@ -114,10 +115,10 @@ def report(
     return Aligned(
         world_from_camera=poses if known_poses is None else known_poses.astype(np.float64),
         focals_px=found.state.focal_px,
-        depth=tuple(depth * np.float32(frame.scale) for depth in found.dense.depth),
+        depth=tuple(depth * np.float32(frame.scale) for depth in found.depth),
         pairs=_pairs(found.state, frame),
         confidence=tuple(confidence),
-        loss=found.dense.loss,
+        loss=found.loss,
         losses=found.losses,
         focal_error=0.0 if focal_known else max(error, _NETWORK_FOCAL) if shown is None else shown,
         network_focal_px=votes.shared_px,
@@ -137,7 +138,7 @@ def _frame(found: Found, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity
     if known is None:
         turn = state.rotation[0].T
         return Similarity(1.0, turn, -turn @ state.centre[0])
-    middle = float(np.median([np.median(depth) for depth in found.dense.depth]))
+    middle = float(np.median([np.median(depth) for depth in found.depth]))
     return Similarity(unit_in(known, state.world_from_camera, middle), np.eye(3), np.zeros(3))
 
 
@@ -166,7 +167,7 @@ def _pair_spread(maps: PairMaps, state: State) -> float:
 def _residuals(found: Found, edges: int) -> Float[np.ndarray, " e"]:
     parts: list[list[np.ndarray]] = [[] for _ in range(edges)]
     for samples in found.samples:
-        here = found.dense.depth[samples.image].ravel()[samples.index].astype(np.float64)
+        here = found.depth[samples.image].ravel()[samples.index].astype(np.float64)
         misses = samples.misses(found.state)
         along = misses.length.numpy() * (here - misses.foot.numpy())
         relative = np.sqrt(along**2 + misses.across2.numpy()) / here

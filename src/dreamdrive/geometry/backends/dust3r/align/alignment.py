@@ -9,16 +9,14 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned, Found, report
-from dreamdrive.geometry.backends.dust3r.align.areas import Normalisation
-from dreamdrive.geometry.backends.dust3r.align.focal import FocalRule, FocalVotes, focal_votes
+from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
 from dreamdrive.geometry.backends.dust3r.align.freedom import FocalFreedom, Freedom
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
-from dreamdrive.geometry.backends.dust3r.align.known import onto_known
 from dreamdrive.geometry.backends.dust3r.align.memory import check_budget, predicted_bytes
 from dreamdrive.geometry.backends.dust3r.align.penalty import Cauchy, Distance, Penalty
 from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.backends.dust3r.align.solver import solve
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import onto_known, spanning_tree
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
@@ -38,10 +36,7 @@ class AlignOptions:
             with relative misses under a cost that forgives outliers, and counts those across the ray more
             than those along it. It also brings each pair to the focal length that is known or shared, which
             is the one that the turns of the camera show, where they do; see ``turned_focal``.
-        normalisation: How the paper's loss divides, see ``areas.half_areas``.
         focal: One focal length for all images, which one camera took, or one for ``each``.
-        focal_rule: How a pointmap tells its focal length, from which the solver starts; ``weiszfeld`` is the
-            paper's.
         samples_per_image: Pixels of an image that cameras and pairs are solved with; depth is solved at all.
         outlier: Relative miss from which on the robust cost grows slowly.
         sharper: How much more a miss across the ray counts than one along it, in the robust cost.
@@ -51,9 +46,7 @@ class AlignOptions:
     """
 
     objective: Literal["distance", "robust"] = "robust"
-    normalisation: Normalisation = "pooled"
     focal: FocalFreedom = "shared"
-    focal_rule: FocalRule = "robust"
     samples_per_image: int = 2000
     outlier: float = 0.05
     sharper: float = 3.0
@@ -111,7 +104,7 @@ def align(
 
 def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
     """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
-    votes = focal_votes(sure, options.focal_rule, graph)
+    votes = focal_votes(sure, graph)
     turned = None
     if options.objective == "robust" and options.focal == "shared" and known.intrinsics is None:
         turned = turned_focal(sure, votes, graph)
@@ -130,19 +123,17 @@ def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions,
     freedom = Freedom(
         None if known.intrinsics is not None else options.focal, poses=known.world_from_camera is None
     )
-    samples = draw_samples(sure, graph, options.samples_per_image, options.normalisation, options.seed)
+    samples = draw_samples(sure, graph, options.samples_per_image, options.seed)
     penalty: Penalty = Distance(_FLOOR * float(np.median([np.median(depth) for depth in start.depth])))
-    if options.objective == "distance":
-        found = solve(samples, state, penalty, freedom, steps=options.steps)
-    else:
-        found = solve(samples, state, penalty, freedom, steps=options.steps, tolerance=_COARSE)
+    if options.objective == "robust":
+        state, _ = solve(samples, state, penalty, freedom, steps=options.steps, tolerance=_COARSE)
         penalty = Cauchy(options.outlier, options.sharper)
-        found = solve(samples, found.state, penalty, freedom, steps=options.steps)
-    dense = solve_depth(maps, graph, found.state, penalty, options.normalisation)
+    state, losses = solve(samples, state, penalty, freedom, steps=options.steps)
+    depth, loss = solve_depth(maps, graph, state, penalty)
     return report(
         maps,
         graph,
-        Found(found.state, dense, samples, found.losses),
+        Found(state, depth, loss, samples, losses),
         votes,
         turned,
         focal_known=known.intrinsics is not None,

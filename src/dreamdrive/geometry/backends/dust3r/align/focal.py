@@ -4,7 +4,6 @@ It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,7 +12,6 @@ from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.geometry.weighted import weighted_median
 
-FocalRule = Literal["robust", "weiszfeld", "median"]
 _STEPS, _ROBUST_STEPS = 10, 6
 _TINY_PX = 1e-8
 _TUKEY = 4.685  # of the spread: 95 % as good as least squares where there are no outliers
@@ -66,84 +64,32 @@ class FocalVotes:
         return focals
 
 
-def focal_votes(maps: PairMaps, rule: FocalRule = "robust", graph: Graph | None = None) -> FocalVotes:
-    """The focal length of every edge's first image by its own pointmap.
-
-    Args:
-        maps: The pairs.
-        rule: See ``focal_px``.
-        graph: Where the principal points are; None has them in the middle.
-    """
+def focal_votes(maps: PairMaps, graph: Graph) -> FocalVotes:
+    """The focal length of every edge's first image by its own pointmap, by the robust rule."""
     focals: list[float] = []
     for image, points, confidence in zip(maps.edges[:, 0], maps.points, maps.confidence, strict=True):
-        if graph is None:
-            focals.append(focal_px(points[0], confidence[0], rule))
-        else:
-            cx, cy = graph.principal_px[image].tolist()
-            focals.append(focal_px(points[0], confidence[0], rule, (cx, cy), float(graph.stretch[image])))
+        cx, cy = graph.principal_px[image].tolist()
+        focals.append(robust_px(points[0], confidence[0], (cx, cy), float(graph.stretch[image])))
     weights = [float(np.log(confidence[0]).sum(dtype=np.float64)) for confidence in maps.confidence]
     return FocalVotes(maps.edges[:, 0], np.array(focals), np.array(weights))
 
 
-def focal_px(
-    points: Float[np.ndarray, "h w 3"],
-    confidence: Float[np.ndarray, "h w"] | None = None,
-    rule: FocalRule = "robust",
-    principal_px: tuple[float, float] | None = None,
-    stretch: float = 1.0,
-) -> float:
-    """Focal length fx in pixels by a named rule; only the robust one looks at the confidence.
-
-    Args:
-        points: Pointmap (H, W, 3) in the frame of its own camera.
-        confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
-        rule: ``weiszfeld`` is the paper's; ``median`` is its program's other choice.
-        principal_px: Column and row; None is the middle (W/2, H/2).
-        stretch: fx / fy.
-    """
-    if rule == "weiszfeld":
-        return weiszfeld_px(points, principal_px, stretch=stretch)
-    if rule == "median":
-        return median_px(points, principal_px, stretch)
-    return robust_px(points, confidence, principal_px, stretch)
-
-
 def weiszfeld_px(
-    points: Float[np.ndarray, "h w 3"],
-    principal_px: tuple[float, float] | None = None,
-    bounds: tuple[float, float] = (0.0, np.inf),
-    stretch: float = 1.0,
+    points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None = None
 ) -> float:
-    """Minimise sum |p - f q| over all pixels alike: ten reweighted steps (Wang et al. 2024, section 3.3).
+    """The paper's rule: minimise sum |p - f q| over all pixels alike (Wang et al. 2024, section 3.3).
 
     Args:
         points: Pointmap (H, W, 3) in the frame of its own camera.
         principal_px: Column and row; None is the middle (W/2, H/2).
-        bounds: Least and greatest result in units of max(H, W) / (2 tan 30 degrees).
-        stretch: fx / fy.
     """
-    p, q = _pixels_and_slopes(points, principal_px, stretch)
+    p, q = _pixels_and_slopes(points, principal_px, 1.0)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
     focal = pq.mean() / qq.mean()
     for _ in range(_STEPS):
         weight = 1 / np.maximum(np.linalg.norm(p - focal * q, axis=1), _TINY_PX)
         focal = (weight * pq).mean() / (weight * qq).mean()
-    unit = max(points.shape[:2]) / (2 * np.tan(np.deg2rad(30)))
-    return float(np.clip(focal, bounds[0] * unit, bounds[1] * unit))
-
-
-def median_px(
-    points: Float[np.ndarray, "h w 3"],
-    principal_px: tuple[float, float] | None = None,
-    stretch: float = 1.0,
-) -> float:
-    """Median of the votes u z/x and v z/y of all pixels; of an even number the lower middle one."""
-    grid = _grid(points.shape[0], points.shape[1], principal_px, stretch)
-    flat = points.reshape(-1, 3).astype(np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        votes = (grid * flat[:, 2:] / flat[:, :2]).ravel()
-    votes = np.sort(votes[~np.isnan(votes)])
-    return float(votes[(len(votes) - 1) // 2])
+    return float(focal)
 
 
 def robust_px(
@@ -160,7 +106,7 @@ def robust_px(
 
     Args:
         points: Pointmap (H, W, 3) in the frame of its own camera.
-        confidence: At least 1 (H, W); None weighs all alike.
+        confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
         principal_px: Column and row; None is the middle (W/2, H/2).
         stretch: fx / fy.
 
@@ -191,12 +137,7 @@ def _pixels_and_slopes(
     flat = points.reshape(-1, 3).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.nan_to_num(flat[:, :2] / flat[:, 2:], nan=0.0, posinf=0.0, neginf=0.0)
-    return _grid(points.shape[0], points.shape[1], principal_px, stretch), slopes
-
-
-def _grid(
-    height: int, width: int, principal_px: tuple[float, float] | None, stretch: float
-) -> Float[np.ndarray, "p 2"]:
+    height, width = points.shape[:2]
     cx, cy = (width / 2, height / 2) if principal_px is None else principal_px
     columns, rows = np.meshgrid(np.arange(width) - cx, stretch * (np.arange(height) - cy))
-    return np.stack([columns.ravel(), rows.ravel()], axis=1)
+    return np.stack([columns.ravel(), rows.ravel()], axis=1), slopes

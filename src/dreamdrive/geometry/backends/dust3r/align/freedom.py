@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, State
@@ -29,38 +30,19 @@ class Freedom:
         Image 0 stays where it is. The scales of the pairs keep their geometric mean, or the loss would be
         least where everything shrinks to a point.
         """
-        rows: list[int] = []
-        columns: list[int] = []
-        values: list[float] = []
-        count = 0
-
-        def add(row: int, column: int, value: float = 1.0) -> None:
-            rows.append(row)
-            columns.append(column)
-            values.append(value)
-
         images, edges = len(state.centre), len(state.edge_scale)
+        first, last = PER_IMAGE * images, PER_IMAGE * images + PER_EDGE * edges - 1
         if self.poses:
-            for row in range(PER_IMAGE, PER_IMAGE * images):
-                if row % PER_IMAGE != _FOCAL:
-                    add(row, count)
-                    count += 1
+            unknowns = [[(row, 1.0)] for row in range(PER_IMAGE, first) if row % PER_IMAGE != _FOCAL]
         else:
-            for image in range(images):
-                for axis in range(3):
-                    add(PER_IMAGE * image + 3 + axis, count, float(state.centre[image, axis]))
-            count += 1
+            shifts = [[PER_IMAGE * image + 3 + axis for axis in range(3)] for image in range(images)]
+            unknowns = [list(zip(np.ravel(shifts).tolist(), state.centre.ravel().tolist(), strict=True))]
+        focals = [(PER_IMAGE * image + _FOCAL, 1.0) for image in range(images)]
         if self.focal is not None:
-            for image in range(images):
-                add(PER_IMAGE * image + _FOCAL, count + (image if self.focal == "each" else 0))
-            count += images if self.focal == "each" else 1
-        first = PER_IMAGE * images
-        for edge in range(edges):
-            for part in range(PER_EDGE - 1):
-                add(first + PER_EDGE * edge + part, count)
-                count += 1
-        for edge in range(edges - 1):
-            add(first + PER_EDGE * edge + PER_EDGE - 1, count)
-            add(first + PER_EDGE * edges - 1, count, -1.0)
-            count += 1
-        return coo_array((values, (rows, columns)), shape=(first + PER_EDGE * edges, count)).tocsr()
+            unknowns += [focals] if self.focal == "shared" else [[focal] for focal in focals]
+        starts = range(first, last, PER_EDGE)
+        unknowns += [[(start + part, 1.0)] for start in starts for part in range(PER_EDGE - 1)]
+        unknowns += [[(start + PER_EDGE - 1, 1.0), (last, -1.0)] for start in starts[:-1]]
+        rows, values = zip(*(each for moved in unknowns for each in moved), strict=True)
+        columns = np.repeat(np.arange(len(unknowns)), [len(moved) for moved in unknowns])
+        return coo_array((values, (rows, columns)), shape=(last + 1, len(unknowns))).tocsr()

@@ -46,27 +46,16 @@ class ImageSamples:
         return RayMisses.of(self.rays(state), placed, self.weight)
 
 
-@dataclass(frozen=True)
-class Normal:
-    """Hessian and gradient of one image's cost over its own 7 steps and then 7 of each of its edges.
-
-    Attributes:
-        hessian: (Q, Q), Q = 7 + 7 K.
-        gradient: (Q,).
-    """
-
-    hessian: Float[Tensor, "q q"]
-    gradient: Float[Tensor, " q"]
-
-
 def normal_equations(
     samples: ImageSamples,
     state: State,
     depth: Float[Tensor, " p"],
     penalty: Penalty,
     bend: float = 0.0,
-) -> Normal:
-    """Gauss-Newton with the weights of the touching quadratic, depth eliminated by its Schur complement.
+) -> tuple[Float[Tensor, "q q"], Float[Tensor, " q"]]:
+    """Hessian and gradient of one image's cost over its own 7 steps and then 7 of each of its K edges.
+
+    Gauss-Newton with the weights of the touching quadratic, depth eliminated by its Schur complement.
 
     A miss is r = X - Y, X = c + R x d with the ray x, Y = T + s R P. With W the 3x3 weight of a miss,
     J = dr/d(step) and D = dX/d(depth) = R x, each pixel adds J'WJ - (D'WJ)'(D'WJ) / (D'WD). Where W tells the
@@ -111,13 +100,13 @@ def normal_equations(
         by_pixel = axis.transpose(0, 1)
         metric = metric + by_pixel.mT @ (by_pixel * (bent * weight).T[..., None])
     pull = _weighed(miss[..., None], weight, straight, slack, axis)[..., 0]
-    result = _assembled(own, theirs, weighed, metric, pull, world_rays)
+    hessian, gradient = _assembled(own, theirs, weighed, metric, pull, world_rays)
     if slack:
         bends = -(flat - axis[0] * (axis[0] * flat).sum(dim=-1, keepdim=True)) / misses.length[:, None]
         along = weight * (axis * miss).sum(dim=-1)
-        result.gradient[:3] -= torch.linalg.cross(miss, pull).sum(dim=(0, 1))
-        result.gradient[6] += slack * (along * (bends * miss).sum(dim=-1)).sum()
-    return result
+        gradient[:3] -= torch.linalg.cross(miss, pull).sum(dim=(0, 1))
+        gradient[6] += slack * (along * (bends * miss).sum(dim=-1)).sum()
+    return hessian, gradient
 
 
 def _assembled(
@@ -127,7 +116,7 @@ def _assembled(
     metric: Float[Tensor, "p 3 3"],
     pull: Float[Tensor, "k p 3"],
     ray: Float[Tensor, "p 3"],
-) -> Normal:
+) -> tuple[Float[Tensor, "q q"], Float[Tensor, " q"]]:
     """Sums over pixels, and the Schur complement of the depths."""
     count, pixels = theirs.shape[:2]
     size = PER_IMAGE + PER_EDGE * count
@@ -150,7 +139,7 @@ def _assembled(
     scaled = coupling * torch.where(stiffness > 0, 1 / stiffness.clamp_min(_TINY), 0.0)[:, None]
     hessian -= coupling.T @ scaled
     gradient -= scaled.T @ (ray * total).sum(dim=1)
-    return Normal(hessian, gradient)
+    return hessian, gradient
 
 
 def _columns(

@@ -20,10 +20,8 @@ class Distance:
 
     floor: float
 
-    @property
-    def across(self) -> float:
-        """Weight of the miss across the ray in units of that along it: the same in all directions."""
-        return 1.0
+    across = 1.0
+    """Weight of the miss across the ray in units of that along it."""
 
     def __call__(
         self,
@@ -60,7 +58,7 @@ class Cauchy:
 
     @property
     def across(self) -> float:
-        """More than along the ray."""
+        """As of :class:`Distance`."""
         return self.sharper**2
 
     def __call__(

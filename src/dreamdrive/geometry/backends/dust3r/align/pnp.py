@@ -13,8 +13,8 @@ def pose_by_pnp(
     usable: Bool[np.ndarray, "h w"],
     focal_px: float | None,
     iterations: int,
-    principal_px: tuple[float, float] | None = None,
-    stretch: float = 1.0,
+    principal_px: tuple[float, float],
+    stretch: float,
 ) -> tuple[float, Float[np.ndarray, "4 4"]] | None:
     """Pose of the camera whose pixel grid sees the points: SQPNP in RANSAC, 5 px.
 
@@ -24,7 +24,7 @@ def pose_by_pnp(
         focal_px: None tries 21 focal lengths from S/2 to 3 S, S the longer side, and keeps that of most
             inliers.
         iterations: Of RANSAC.
-        principal_px: Column and row; None is the middle (W/2, H/2).
+        principal_px: Column and row.
         stretch: fx / fy.
 
     Returns:
@@ -37,7 +37,7 @@ def pose_by_pnp(
     rows, columns = np.nonzero(usable)
     pixels = np.stack([columns, rows], axis=1).astype(np.float32)
     longer = max(height, width)
-    cx, cy = (width / 2, height / 2) if principal_px is None else principal_px
+    cx, cy = principal_px
     focals = [focal_px] if focal_px is not None else np.geomspace(longer / 2, longer * 3, _FOCALS).tolist()
     best: tuple[int, float, np.ndarray] | None = None
     for focal in focals:

@@ -1,12 +1,9 @@
 """The pixels that the solver looks at, and the pass over all pixels at its end."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from dreamdrive.geometry.backends.dust3r.align.areas import Normalisation, half_areas
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.backends.dust3r.align.penalty import Penalty
@@ -18,11 +15,14 @@ _CHUNK = 8192  # pixels at a time, so that their arrays stay in the cache
 _FULL_STEPS = 12
 
 
-def draw_samples(
-    maps: PairMaps, graph: Graph, per_image: int, normalisation: Normalisation, seed: int
-) -> list[ImageSamples]:
+def _areas(maps: PairMaps) -> Float[np.ndarray, "2"]:
+    """What the paper's loss divides by: the pixels of all edges' first, and second, images."""
+    return np.array([[side.size for side in pair] for pair in maps.confidence], np.float64).sum(axis=0)
+
+
+def draw_samples(maps: PairMaps, graph: Graph, per_image: int, seed: int) -> list[ImageSamples]:
     """Up to ``per_image`` pixels of each image that weigh anything, one at random in each stretch of them."""
-    areas, random = half_areas(maps, normalisation), np.random.default_rng(seed)
+    areas, random = _areas(maps), np.random.default_rng(seed)
     drawn: list[ImageSamples] = []
     for image, halves in enumerate(graph.halves):
         counts = np.any([maps.confidence[half.edge][half.side].ravel() > 1 for half in halves], axis=0)
@@ -32,7 +32,7 @@ def draw_samples(
         weight = np.zeros((len(halves), len(some)))
         for k, half in enumerate(halves):
             trust = np.log(maps.confidence[half.edge][half.side].ravel()[some], dtype=np.float64)
-            weight[k] = stands_for * trust / areas[half.edge, half.side]
+            weight[k] = stands_for * trust / areas[half.side]
             xyz = graph.shaped(half.edge, maps.points[half.edge][half.side].reshape(-1, 3)[some])
             points[k] = np.where(trust[:, None] > 0, xyz, 0)
         edges = tuple(half.edge for half in halves)
@@ -47,27 +47,15 @@ def _stretches(which: Int[np.ndarray, " n"], most: int, random: np.random.Genera
     return which[((np.arange(most) + random.random(most)) * (len(which) / most)).astype(np.intp)]
 
 
-@dataclass(frozen=True)
-class Dense:
-    """All pixels at a state.
-
-    Attributes:
-        depth: Depth along z (H, W) of each image, positive, float32.
-        loss: Cost summed over all pixels.
-    """
-
-    depth: tuple[Float[np.ndarray, "_ _"], ...]
-    loss: float
-
-
 def solve_depth(
-    maps: PairMaps, graph: Graph, state: State, penalty: Penalty, normalisation: Normalisation
-) -> Dense:
-    """The best depth of every pixel given all else, a chunk of pixels at a time; none is copied for longer.
+    maps: PairMaps, graph: Graph, state: State, penalty: Penalty
+) -> tuple[tuple[Float[np.ndarray, "_ _"], ...], float]:
+    """The best depth along z (H, W) of each image given all else, and the cost summed over all pixels.
 
-    A pixel that no edge weighs gets the weighted median of its image, since nothing is known of it.
+    Depth is positive, float32; a pixel that no edge weighs gets the median of its image, since nothing is
+    known of it. A chunk of pixels is solved at a time; none is copied for longer.
     """
-    areas = half_areas(maps, normalisation)
+    areas = _areas(maps)
     depths: list[np.ndarray] = []
     loss = 0.0
     for image, halves in enumerate(graph.halves):
@@ -80,7 +68,7 @@ def solve_depth(
             (
                 maps.points[h.edge][h.side].reshape(-1, 3),
                 maps.confidence[h.edge][h.side].ravel(),
-                areas[h.edge, h.side],
+                areas[h.side],
             )
             for h in halves
         ]
@@ -102,4 +90,4 @@ def solve_depth(
             loss += float(misses.cost(depth[some], penalty, middle)[0].sum(dtype=torch.float64))
         depth[~known] = depth[known].median()
         depths.append(depth.numpy().reshape(size))
-    return Dense(tuple(depths), loss)
+    return tuple(depths), loss

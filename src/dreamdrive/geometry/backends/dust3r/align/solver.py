@@ -20,19 +20,6 @@ _DEPTH_STEPS = 3
 
 
 @dataclass(frozen=True)
-class Solved:
-    """Where the solver stopped.
-
-    Attributes:
-        state: Cameras and pairs.
-        losses: Loss over the samples before each step and at the end.
-    """
-
-    state: State
-    losses: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class _Point:
     state: State
     depth: list[Tensor]
@@ -48,18 +35,19 @@ def solve(
     steps: int = 60,
     tolerance: float = 5e-5,
     bend: float = 0.5,
-) -> Solved:
+) -> tuple[State, tuple[float, ...]]:
     """Lower the loss over the samples until a step gains less than ``tolerance`` of it.
 
     Each step solves the depth of every sampled pixel along its ray, then for cameras and pairs the damped
     normal equations in which those depths follow along. A step that does not lower the loss is taken back.
+    The state comes back, and the losses before each step and at the end.
     """
     depth = [each.misses(state).middle() for each in samples]
     here = _at(samples, state, depth, penalty, 2 * _DEPTH_STEPS)
     losses, damping = [here.loss], _DAMPING
-    basis = freedom.basis(here.state)
-    hessian, gradient = _equations(samples, here, penalty, basis, bend)
     for _ in range(steps):
+        basis = freedom.basis(here.state)
+        hessian, gradient = _equations(samples, here, penalty, basis, bend)
         there: _Point | None = None
         while there is None and damping < _MOST:
             unknowns = _damped(hessian, gradient, damping)
@@ -73,11 +61,9 @@ def solve(
         slow = there.loss > (1 - tolerance) * here.loss
         here = _at(samples, there.state, there.depth, penalty, 1)
         losses.append(here.loss)
-        basis = freedom.basis(here.state)
-        hessian, gradient = _equations(samples, here, penalty, basis, bend)
         if slow:
             break
-    return Solved(here.state, tuple(losses))
+    return here.state, tuple(losses)
 
 
 def _at(
@@ -100,11 +86,11 @@ def _equations(
     size = images + PER_EDGE * len(here.state.edge_scale)
     hessian, gradient = np.zeros((size, size)), np.zeros(size)
     for each, depth in zip(samples, here.depth, strict=True):
-        part = normal_equations(each, here.state, depth, penalty, bend)
+        own_hessian, own_gradient = normal_equations(each, here.state, depth, penalty, bend)
         starts = [PER_IMAGE * each.image, *(images + PER_EDGE * edge for edge in each.edges)]
         at = np.concatenate([np.arange(start, start + 7) for start in starts])
-        hessian[np.ix_(at, at)] += part.hessian.numpy()
-        gradient[at] += part.gradient.numpy()
+        hessian[np.ix_(at, at)] += own_hessian.numpy()
+        gradient[at] += own_gradient.numpy()
     return basis.T @ (basis.T @ hessian).T, basis.T @ gradient
 
 

@@ -1,13 +1,13 @@
 """A first guess of all cameras: pairs are joined along the tree of the most trusted ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_px, focal_votes
+from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes, weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
@@ -15,10 +15,11 @@ from dreamdrive.geometry.cameras import register
 from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
-PNP_CONFIDENCE = 3.0
+_PNP_CONFIDENCE = 3.0  # above which the authors' program uses a pixel
 _PNP_STEPS = 10
 _ROBUST_STEPS = 5
 _REGISTERED = 2_000  # pixels of a pair that are registered
+_STANDING = 1e-9  # spread of a path that has no length of its own
 _NEAREST = 0.01  # quantile of the valid depths that replaces those behind the camera
 
 
@@ -31,14 +32,12 @@ class Start:
         focals_px: Focal length (N,) of each image.
         depth: Depth along z (H, W) of each image, positive.
         pairs: Similarity of each edge from its first camera's frame to the world.
-        unsure: Images whose pose has only that of another image to go by.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focals_px: Float[np.ndarray, " n"]
     depth: tuple[Float[np.ndarray, "_ _"], ...]
     pairs: tuple[Similarity, ...]
-    unsure: tuple[int, ...] = ()
 
 
 def spanning_tree(
@@ -91,7 +90,6 @@ class _Tree:
         self.points: dict[int, np.ndarray] = {}
         self.poses: dict[int, np.ndarray] = {}
         self.focals: dict[int, float] = {}
-        self.unsure: list[int] = []
 
     def _scores(self) -> np.ndarray:
         if self.upstream:
@@ -134,7 +132,7 @@ class _Tree:
             before = edge
 
     def _focal(self, edge: int) -> float:
-        return focal_px(self.maps.points[edge][0], rule="weiszfeld")
+        return weiszfeld_px(self.maps.points[edge][0])
 
     def _register(self, edge: int, side: int, target: np.ndarray) -> Similarity:
         points, trust = self.maps.points[edge][side], self.maps.confidence[edge][side]
@@ -155,7 +153,7 @@ class _Tree:
         """Focal lengths of all images."""
         count = len(self.graph)
         if not self.upstream:
-            votes = self.votes or focal_votes(self.maps, graph=self.graph)
+            votes = self.votes or focal_votes(self.maps, self.graph)
             self.focals = dict(enumerate(votes.per_image_px(count).tolist()))
             return
         for edge in self._by_strength():
@@ -177,7 +175,7 @@ class _Tree:
     def _pose_by_pnp(self, image: int) -> np.ndarray:
         trusts = [self.maps.confidence[half.edge][half.side] for half in self.graph.halves[image]]
         trust = np.max(trusts, axis=0)
-        threshold = PNP_CONFIDENCE if self.upstream else 1.0
+        threshold = _PNP_CONFIDENCE if self.upstream else 1.0
         cx, cy = self.graph.principal_px[image].tolist()
         stretch = float(self.graph.stretch[image])
         focal = self.focals.get(image)
@@ -185,7 +183,6 @@ class _Tree:
         if found is not None:
             self.focals[image], pose = found
             return pose
-        self.unsure.append(image)
         if self.upstream:
             return np.eye(4)
         partner = next(int(i) for i, j in self.maps.edges if j == image)
@@ -203,7 +200,6 @@ class _Tree:
             focals_px=np.array([self.focals[image] for image in range(len(self.graph))]),
             depth=tuple(self._depth(xyz, pose) for xyz, pose in zip(points, poses, strict=True)),
             pairs=tuple(Similarity(scale * p.scale, p.rotation, scale * p.translation) for p in pairs),
-            unsure=tuple(self.unsure),
         )
 
     def _depth(self, points: Float[np.ndarray, "h w 3"], pose: np.ndarray) -> Float[np.ndarray, "h w"]:
@@ -221,3 +217,39 @@ def _rigid(similarity: Similarity) -> Float[np.ndarray, "4 4"]:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = similarity.rotation, similarity.translation
     return pose
+
+
+def onto_known(
+    start: Start, world_from_camera: Float[np.ndarray, "n 4 4"]
+) -> tuple[Start, Float[np.ndarray, "n 4 4"]]:
+    """The start in the known world, and the known poses in the unit in which the pairs' scales average 0.5.
+
+    The unit is not that of the known poses: were the scales of pairs free, the loss could fall while the
+    clouds shrink. One factor between the two is left for the solver.
+    """
+    similarity = register(
+        _marks(start.world_from_camera), _marks(world_from_camera), np.ones(4 * len(world_from_camera))
+    )
+    scales = np.array([similarity.scale * pair.scale for pair in start.pairs])
+    unit = float(BASE_SCALE / np.exp(np.log(scales).mean()))
+    pairs = tuple(
+        Similarity(
+            unit * similarity.scale * pair.scale,
+            similarity.rotation @ pair.rotation,
+            unit * similarity(pair.translation),
+        )
+        for pair in start.pairs
+    )
+    poses = world_from_camera.astype(np.float64)
+    poses[:, :3, 3] *= unit
+    depth = tuple((unit * similarity.scale * each).astype(each.dtype) for each in start.depth)
+    return replace(start, world_from_camera=poses, pairs=pairs, depth=depth), poses
+
+
+def _marks(poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "m 3"]:
+    """Centres, and points along all axes as far out as these spread: a straight path alone leaves a roll."""
+    centres = poses[:, :3, 3]
+    spread = float(np.sqrt(np.square(centres - centres.mean(axis=0)).sum(axis=1).mean()))
+    reach = spread if spread > _STANDING else 1.0
+    axes = [centres + reach * poses[:, :3, axis] for axis in range(3)]
+    return np.concatenate([centres, *axes])

@@ -17,6 +17,7 @@ matters are errors across these rays.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -61,8 +62,7 @@ class TurnedFocal:
         return self.spread <= _SURE
 
 
-@dataclass(frozen=True)
-class _Views:
+class _Views(NamedTuple):
     """Second pointmaps of E pairs, P points of each; what is not there weighs 0.
 
     Attributes:
@@ -81,13 +81,8 @@ class _Views:
     weight: Float[np.ndarray, "e p"]
     patches: Float[np.ndarray, " e"]
 
-    def of(self, some: slice) -> "_Views":
-        """Those of some pairs."""
-        return _Views(*(getattr(self, name)[some] for name in self.__dataclass_fields__))
 
-
-@dataclass(frozen=True)
-class _Poses:
+class _Poses(NamedTuple):
     """From the frames of E pairs to their second cameras.
 
     Attributes:
@@ -99,8 +94,7 @@ class _Poses:
     shift: Float[np.ndarray, "e 3"]
 
 
-@dataclass(frozen=True)
-class _Reduced:
+class _Reduced(NamedTuple):
     """Normal equations of E pairs in the log focal length alone, their poses eliminated.
 
     Attributes:
@@ -198,25 +192,22 @@ def _together(found: list[tuple[_Views, _Poses]]) -> tuple[_Views, _Poses]:
     """All pairs, those of smaller images filled up with points that weigh 0."""
     most = max(view.weight.shape[1] for view, _ in found)
 
-    def joined(name: str) -> np.ndarray:
-        arrays = [getattr(view, name) for view, _ in found]
-        if arrays[0].ndim == 1:
-            return np.concatenate(arrays)
-        return np.concatenate([np.pad(a, [(0, 0), (0, most - a.shape[1]), (0, 0)][: a.ndim]) for a in arrays])
+    def filled(array: np.ndarray) -> np.ndarray:
+        missing = most - array.shape[1] if array.ndim > 1 else 0
+        return np.pad(array, [(0, 0), (0, missing), (0, 0)][: array.ndim])
 
-    views = _Views(**{name: joined(name) for name in _Views.__dataclass_fields__})
-    turn = np.concatenate([pose.turn for _, pose in found])
-    return views, _Poses(turn, np.concatenate([pose.shift for _, pose in found]))
+    views = zip(*(map(filled, view) for view, _ in found), strict=True)
+    poses = zip(*(pose for _, pose in found), strict=True)
+    return _Views(*map(np.concatenate, views)), _Poses(*map(np.concatenate, poses))
 
 
 def _reduced(views: _Views, poses: _Poses, focal_px: float) -> _Reduced:
-    parts = [
-        _reduced_chunk(views.of(some), _Poses(poses.turn[some], poses.shift[some]), focal_px)
-        for some in (slice(k, k + _CHUNK) for k in range(0, len(views.image), _CHUNK))
-    ]
-    return _Reduced(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in _Reduced.__dataclass_fields__)
-    )
+    parts: list[_Reduced] = []
+    for start in range(0, len(views.image), _CHUNK):
+        some = slice(start, start + _CHUNK)
+        chunk = _Views(*(each[some] for each in views)), _Poses(*(each[some] for each in poses))
+        parts.append(_reduced_chunk(*chunk, focal_px))
+    return _Reduced(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _reduced_chunk(views: _Views, poses: _Poses, focal_px: float) -> _Reduced:

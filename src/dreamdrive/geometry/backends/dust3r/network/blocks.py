@@ -94,20 +94,16 @@ class EncoderBlock(nn.Module):
         return x + self.mlp(self.norm2(x))
 
 
-class DecoderBlock(nn.Module):
+class DecoderBlock(EncoderBlock):
     """An encoder block with attention to the other image between its two parts."""
 
     def __init__(self, dim: int, heads: int, hidden: int) -> None:
-        super().__init__()
-        self.norm1 = nn.LayerNorm(dim, eps=NORM_EPS)
-        self.attn = Attention(dim, heads)
+        super().__init__(dim, heads, hidden)
         self.norm_y = nn.LayerNorm(dim, eps=NORM_EPS)
-        self.norm2 = nn.LayerNorm(dim, eps=NORM_EPS)
         self.cross_attn = CrossAttention(dim, heads)
         self.norm3 = nn.LayerNorm(dim, eps=NORM_EPS)
-        self.mlp = Mlp(dim, hidden)
 
-    def forward(
+    def forward(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, x: Float[Tensor, "b n d"], y: Float[Tensor, "b m d"], by_x: Rotation, by_y: Rotation
     ) -> Float[Tensor, "b n d"]:
         """Apply to own tokens x (B, N, D), beside tokens y (B, M, D) of the other image."""

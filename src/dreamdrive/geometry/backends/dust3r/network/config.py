@@ -8,9 +8,9 @@ import ast
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from dreamdrive.errors import InputError
 
@@ -23,24 +23,6 @@ CLASS = "AsymmetricCroCo3DStereo"
 HEAD_DIM = 64
 """Channels of a head in all published models; only needed where nothing states the number of heads."""
 
-# What the authors' constructor takes for keywords that are not given.
-_DEFAULTS: dict[str, Any] = {
-    "img_size": 224,
-    "patch_size": 16,
-    "enc_embed_dim": 768,
-    "enc_depth": 12,
-    "enc_num_heads": 12,
-    "dec_embed_dim": 512,
-    "dec_depth": 8,
-    "dec_num_heads": 16,
-    "mlp_ratio": 4,
-    "norm_im2_in_dec": True,
-    "pos_embed": "cosine",
-    "output_mode": "pts3d",
-    "head_type": "linear",
-    "depth_mode": ("exp", -math.inf, math.inf),
-    "conf_mode": ("exp", 1, math.inf),
-}
 _LARGEST_PX, _LARGEST_RATIO = 4096, 64.0
 _FROM_SHAPES = ("enc_dim", "enc_depth", "dec_dim", "dec_depth", "patch", "head")
 
@@ -136,7 +118,7 @@ def config_from_call(text: str, source: str) -> NetworkConfig:
         raise InputError(f"{source}: the model {_short(text)} is no constructor call") from None
     if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id != CLASS:
         raise InputError(f"{source}: the model {_short(text)} is another one; expected {CLASS}(...)")
-    known = {word.arg: word.value for word in call.keywords if word.arg in _DEFAULTS}
+    known = {word.arg: word.value for word in call.keywords if word.arg in _KEYWORDS}
     values = {str(name): _value(node, str(name), source) for name, node in known.items()}
     return config_from_keywords(values, source)
 
@@ -163,31 +145,31 @@ def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig
     Raises:
         InputError: A value is of a wrong kind or names something that this network does not do.
     """
-    values = _DEFAULTS | {key: value for key, value in given.items() if key in _DEFAULTS}
-    _only(values, "output_mode", "pts3d", source)
-    _only(values, "norm_im2_in_dec", True, source)
-    depth_mode, depth_range = _mode(values, "depth_mode", get_args(DepthMode), source)
-    if depth_range != (-math.inf, math.inf):
+    values: dict[str, Any] = {}
+    for name, (default, fits, expected) in _KEYWORDS.items():
+        values[name] = value = given.get(name, default)
+        if not fits(value):
+            raise InputError(f"{source}: {name} {_short(value)}{expected}")
+    depth_mode, *depth_range = values["depth_mode"]
+    if depth_range != [-math.inf, math.inf]:
         raise InputError(f"{source}: depth_mode with bounds {depth_range} is not supported; expected none")
-    conf_mode, conf_range = _mode(values, "conf_mode", get_args(ConfidenceMode), source)
-    if values["head_type"] not in get_args(HeadKind):
-        raise InputError(f"{source}: head_type {_short(values['head_type'])}; expected 'dpt' or 'linear'")
+    conf_mode, least, most = values["conf_mode"]
     return _make(
         source,
-        enc_dim=_integer(values, "enc_embed_dim", source),
-        enc_depth=_integer(values, "enc_depth", source),
-        enc_heads=_integer(values, "enc_num_heads", source),
-        dec_dim=_integer(values, "dec_embed_dim", source),
-        dec_depth=_integer(values, "dec_depth", source),
-        dec_heads=_integer(values, "dec_num_heads", source),
-        patch=_integer(values, "patch_size", source),
-        mlp_ratio=_ratio(values, source),
+        enc_dim=values["enc_embed_dim"],
+        enc_depth=values["enc_depth"],
+        enc_heads=values["enc_num_heads"],
+        dec_dim=values["dec_embed_dim"],
+        dec_depth=values["dec_depth"],
+        dec_heads=values["dec_num_heads"],
+        patch=values["patch_size"],
+        mlp_ratio=float(values["mlp_ratio"]),
         head=values["head_type"],
         depth_mode=depth_mode,
         conf_mode=conf_mode,
-        conf_range=conf_range,
-        rope_base=_rope_base(values["pos_embed"], source),
-        image_size=_image_size(values["img_size"], source),
+        conf_range=(float(least), float(most)),
+        rope_base=_rope_base(values["pos_embed"]),
+        image_size=max(_sides(values["img_size"])),
     )
 
 
@@ -283,60 +265,63 @@ def _value(node: ast.expr, name: str, source: str) -> Any:
     raise InputError(f"{source}: {name}={_short(ast.unparse(node))} is no plain value")
 
 
-def _only(values: Mapping[str, Any], name: str, supported: object, source: str) -> None:
-    if values[name] != supported:
-        raise InputError(f"{source}: {name} {_short(values[name])} is not supported; expected {supported!r}")
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
 
 
-def _mode(
-    values: Mapping[str, Any], name: str, kinds: tuple[str, ...], source: str
-) -> tuple[str, tuple[float, float]]:
-    value = values[name]
-    if not isinstance(value, tuple | list) or len(value) != 3 or value[0] not in kinds:
-        raise InputError(
-            f"{source}: {name} {_short(value)}; expected a kind of {', '.join(kinds)} and two bounds"
-        )
-    return value[0], (_number(value[1], name, source), _number(value[2], name, source))
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _rope_base(value: object, source: str) -> float:
+def _mode(kinds: tuple[str, ...]) -> tuple[Callable[[Any], bool], str]:
+    def fits(value: Any) -> bool:
+        listed = isinstance(value, tuple | list) and len(cast("Sequence[Any]", value)) == 3
+        return listed and value[0] in kinds and all(map(_is_number, value[1:]))
+
+    return fits, f"; expected a kind of {', '.join(kinds)} and two bounds"
+
+
+def _rope_base(value: object) -> float:
+    """The base in a name such as RoPE100; NaN where it names another embedding."""
     match = re.fullmatch(r"RoPE(\d+(?:\.\d+)?)", str(value))
-    if match is None or not 0 < float(match.group(1)) < math.inf:
-        raise InputError(
-            f"{source}: pos_embed {_short(value)} is not supported; expected RoPE100 or the like"
-        )
-    return float(match.group(1))
+    return float(match.group(1)) if match else math.nan
 
 
-def _image_size(value: Any, source: str) -> int:
-    sides: Sequence[Any] = value if isinstance(value, tuple | list) else (value,)
-    if not sides or not all(isinstance(side, int) and 0 < side <= _LARGEST_PX for side in sides):
-        raise InputError(
-            f"{source}: img_size {_short(value)}; expected one or two positive numbers up to {_LARGEST_PX}"
-        )
-    return max(sides)
+def _sides(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, tuple | list) else (value,)
 
 
-def _integer(values: Mapping[str, Any], name: str, source: str) -> int:
-    value = values[name]
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise InputError(f"{source}: {name} {_short(value)}; expected a whole number")
-    return value
-
-
-def _ratio(values: Mapping[str, Any], source: str) -> float:
-    ratio = _number(values["mlp_ratio"], "mlp_ratio", source)
-    if not 0 < ratio <= _LARGEST_RATIO:
-        raise InputError(
-            f"{source}: mlp_ratio {ratio:g}; expected more than 0 and at most {_LARGEST_RATIO:g}"
-        )
-    return ratio
-
-
-def _number(value: object, name: str, source: str) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
-        raise InputError(f"{source}: {name} holds {_short(value)}; expected a number")
-    return float(value)
+_WHOLE = (_is_whole, "; expected a whole number")
+_KEYWORDS: dict[str, tuple[Any, Callable[[Any], bool], str]] = {
+    "img_size": (
+        224,
+        lambda v: len(_sides(v)) > 0 and all(_is_whole(s) and 0 < s <= _LARGEST_PX for s in _sides(v)),
+        f"; expected one or two positive numbers up to {_LARGEST_PX}",
+    ),
+    "patch_size": (16, *_WHOLE),
+    "enc_embed_dim": (768, *_WHOLE),
+    "enc_depth": (12, *_WHOLE),
+    "enc_num_heads": (12, *_WHOLE),
+    "dec_embed_dim": (512, *_WHOLE),
+    "dec_depth": (8, *_WHOLE),
+    "dec_num_heads": (16, *_WHOLE),
+    "mlp_ratio": (
+        4,
+        lambda v: _is_number(v) and 0 < v <= _LARGEST_RATIO,
+        f"; expected more than 0 and at most {_LARGEST_RATIO:g}",
+    ),
+    "norm_im2_in_dec": (True, lambda v: v is True, " is not supported; expected True"),
+    "pos_embed": (
+        "cosine",
+        lambda v: 0 < _rope_base(v) < math.inf,
+        " is not supported; expected RoPE100 or the like",
+    ),
+    "output_mode": ("pts3d", lambda v: v == "pts3d", " is not supported; expected 'pts3d'"),
+    "head_type": ("linear", lambda v: v in get_args(HeadKind), "; expected 'dpt' or 'linear'"),
+    "depth_mode": (("exp", -math.inf, math.inf), *_mode(get_args(DepthMode))),
+    "conf_mode": (("exp", 1, math.inf), *_mode(get_args(ConfidenceMode))),
+}
+"""Keywords of the authors' constructor: what it takes where none is given, what fits, what was expected."""
 
 
 def _short(value: object) -> str:

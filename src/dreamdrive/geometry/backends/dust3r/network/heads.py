@@ -69,7 +69,7 @@ class Dpt(nn.Module):
         self.scratch = Scratch(sizes.layer_dims, sizes.feature_dim)
         self.head = nn.Sequential(
             nn.Conv2d(sizes.feature_dim, sizes.last_dim, 3, padding=1),
-            Double(),
+            nn.Upsample(scale_factor=2, mode="bilinear", align_corners=True),
             nn.Conv2d(sizes.last_dim, sizes.last_dim, 3, padding=1),
             nn.ReLU(inplace=True),
             nn.Conv2d(sizes.last_dim, _CHANNELS, 1),
@@ -132,7 +132,8 @@ class Fusion(nn.Module):
         """Apply to (B, C, H, W) and an image of the same shape."""
         if finer is not None:
             x = x + self.resConfUnit1(finer)
-        return self.out_conv(_double(self.resConfUnit2(x)))
+        x = self.resConfUnit2(x)
+        return self.out_conv(functional.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True))
 
 
 class ResidualUnit(nn.Module):
@@ -146,14 +147,6 @@ class ResidualUnit(nn.Module):
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
         """Apply to (B, C, H, W)."""
         return x + self.conv2(functional.relu(self.conv1(functional.relu(x))))
-
-
-class Double(nn.Module):
-    """Twice the resolution."""
-
-    def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c _ _"]:
-        """Apply to (B, C, H, W)."""
-        return _double(x)
 
 
 def make_head(config: NetworkConfig) -> LinearHead | DptHead:
@@ -188,7 +181,3 @@ def _confidence(
 
 def _as_image(x: Float[Tensor, "b n d"], rows: int, columns: int) -> Float[Tensor, "b d {rows} {columns}"]:
     return x.transpose(1, 2).unflatten(-1, (rows, columns))
-
-
-def _double(x: Tensor) -> Tensor:
-    return functional.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True)

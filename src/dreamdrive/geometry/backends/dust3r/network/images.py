@@ -49,7 +49,11 @@ def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = F
     long_side = round(SQUARE_SIZE * longest / shortest) if size == SQUARE_SIZE else size
     resized = (round(width_px * long_side / longest), round(height_px * long_side / longest))
     middle = (resized[0] // 2, resized[1] // 2)
-    half = _half_square(middle) if size == SQUARE_SIZE else _half_sides(resized, square_ok)
+    half = [min(middle)] * 2
+    if size != SQUARE_SIZE:
+        half = [side // 2 * 2 // _MULTIPLE * (_MULTIPLE // 2) for side in resized]
+        if resized[0] == resized[1] and not square_ok:
+            half[1] = 3 * half[0] // 4
     return Fitting(
         (width_px, height_px),
         resized,
@@ -58,17 +62,6 @@ def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = F
         (2 * half[0], 2 * half[1]),
         shrinks=longest > long_side,
     )
-
-
-def _half_square(middle: tuple[int, int]) -> tuple[int, int]:
-    return min(middle), min(middle)
-
-
-def _half_sides(resized: tuple[int, int], square_ok: bool) -> tuple[int, int]:
-    half_width, half_height = (side // 2 * 2 // _MULTIPLE * (_MULTIPLE // 2) for side in resized)
-    if resized[0] == resized[1] and not square_ok:
-        half_height = 3 * half_width // 4
-    return half_width, half_height
 
 
 def as_input(pictures: Sequence[UInt8[np.ndarray, "h w 3"]]) -> Float[Tensor, "n 3 h w"]:

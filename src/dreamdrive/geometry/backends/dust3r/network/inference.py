@@ -3,6 +3,7 @@
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -51,36 +52,25 @@ def infer(
     used = sorted({int(i) for i in edges.flatten()})
     # A warning, since less is not shown and it may be all of what the machine has.
     _log.warning("DUSt3R on %d pairs of %d frames takes %s", len(edges), len(used), plan)
-    count = _Count(len(used) + len(edges), progress)
+    done, total = 0, len(used) + len(edges)
     encoded: dict[int, Tokens] = {}
     for batch in _batches([sizes[i] for i in used], plan.images_at_once):
         frames = [used[k] for k in batch]
         encoded |= zip(frames, _encode(network, [pictures[i] for i in frames]), strict=True)
-        count.add(len(batch))
+        progress(done := done + len(batch), total)
     maps: dict[int, tuple[_Maps, _Maps]] = {}
     for batch in _batches([(sizes[i], sizes[j]) for i, j in edges.tolist()], plan.pairs_at_once):
         first, second = ([encoded[i] for i in edges[batch, side].tolist()] for side in (0, 1))
         decoded = network.decode(_joined(first), _joined(second))
         for k, a, b in zip(batch, *(_separate(part) for part in decoded), strict=True):
             maps[k] = (a, b)
-        count.add(len(batch))
+        progress(done := done + len(batch), total)
     ordered = [maps[k] for k in range(len(edges))]
     return PairMaps(
         edges=edges,
         points=tuple((a[0], b[0]) for a, b in ordered),
         confidence=tuple((a[1], b[1]) for a, b in ordered),
     )
-
-
-class _Count:
-    """Steps done, told to whoever wants to know."""
-
-    def __init__(self, total: int, progress: Progress) -> None:
-        self._done, self._total, self._progress = 0, total, progress
-
-    def add(self, steps: int) -> None:
-        self._done += steps
-        self._progress(self._done, self._total)
 
 
 def _batches(kinds: Sequence[Size | tuple[Size, Size]], most: int) -> Iterator[list[int]]:
@@ -96,12 +86,11 @@ def _batches(kinds: Sequence[Size | tuple[Size, Size]], most: int) -> Iterator[l
 def _encode(network: Dust3r, pictures: list[UInt8[np.ndarray, "_ _ 3"]]) -> list[Tokens]:
     device = network.enc_norm.weight.device
     tokens = network.encode(as_input(pictures).to(device))
-    return [Tokens(values, tokens.rows, tokens.columns) for values in tokens.values.split(1)]
+    return [replace(tokens, values=values) for values in tokens.values.split(1)]
 
 
 def _joined(tokens: list[Tokens]) -> Tokens:
-    values = torch.cat([each.values for each in tokens])
-    return Tokens(values, tokens[0].rows, tokens[0].columns)
+    return replace(tokens[0], values=torch.cat([each.values for each in tokens]))
 
 
 def _separate(maps: Pointmap) -> list[_Maps]:

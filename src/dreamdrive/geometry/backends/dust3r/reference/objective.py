@@ -6,6 +6,7 @@ points P of an edge, its similarity T and w = ln confidence (Wang et al. 2024, e
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
@@ -13,11 +14,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Normalisation, Start, half_areas
+from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Start
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
 _FOCAL_BREAK = 20.0
+Normalisation = Literal["pooled", "modular"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,18 @@ def raw_parameters(start: Start) -> Raw:
     poses = [[*_quaternion(pose[:3, :3]), *_signed_log1p(pose[:3, 3])] for pose in start.world_from_camera]
     arrays = (pairs, poses, _FOCAL_BREAK * np.log(start.focals_px)[:, None], np.stack(depth))
     return Raw(*(torch.tensor(np.asarray(a), dtype=torch.float32, requires_grad=True) for a in arrays))
+
+
+def half_areas(maps: PairMaps, normalisation: Normalisation) -> Float[np.ndarray, "e 2"]:
+    """The divisor A (E, 2) of each edge's first and second image.
+
+    ``pooled`` is the number of pixels of all first images, or of all second images; ``modular`` the mean over
+    edges of the means over pixels. They are the same where all images are of one size.
+    """
+    areas = np.array([[side.size for side in pair] for pair in maps.confidence], dtype=np.float64)
+    if normalisation == "modular":
+        return len(areas) * areas
+    return np.broadcast_to(areas.sum(axis=0), areas.shape).copy()
 
 
 class Objective:
