@@ -83,11 +83,10 @@ def _refine(
     """Give pixels that differ from a neighbour the mean over further rays, in place."""
     seen = _encoded(colour).T.mean(axis=0).reshape(shape)
     uneven = np.zeros(shape, dtype=bool)
-    for axis in (0, 1):
-        step = np.abs(np.diff(seen, axis=axis)) > _CONTRAST
-        first, second = (slice(None, -1), slice(1, None))
-        uneven[(first, slice(None)) if axis == 0 else (slice(None), first)] |= step
-        uneven[(second, slice(None)) if axis == 0 else (slice(None), second)] |= step
+    for view, grey in ((uneven, seen), (uneven.T, seen.T)):
+        step = np.abs(np.diff(grey, axis=0)) > _CONTRAST
+        view[:-1] |= step
+        view[1:] |= step
     chosen = np.flatnonzero(uneven.ravel())
     across = (columns[chosen] + _RAYS[:, :1]).ravel()
     down = (rows[chosen] + _RAYS[:, 1:]).ravel()
