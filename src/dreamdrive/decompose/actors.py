@@ -86,14 +86,9 @@ def cast(
     grouping: Grouping,
     options: ActorOptions | None = None,
 ) -> Cast:
-    """Track every dynamic cluster and merge its copies.
+    """Track every dynamic cluster and merge its copies, each where its source frame saw it.
 
-    Args:
-        clip: Frames and times; held-out frames are not read.
-        geometry: Cameras.
-        gaussians: As seeded: each dynamic one lies where its source frame saw it.
-        grouping: Labels and clusters.
-        options: Constants.
+    Held-out frames are not read.
     """
     options = options or ActorOptions()
     index = np.flatnonzero(grouping.dynamic.numpy())

@@ -49,14 +49,10 @@ def lives(
     span_s: tuple[float, float],
     deviation_s: float,
 ) -> Float[np.ndarray, "n 2"]:
-    """Centre and standard deviation of each copy's life in seconds (N, 2).
+    """Centre and standard deviation of each copy's life in seconds, by its canonical place in the world.
 
-    Args:
-        places: Canonical places in the world.
-        source: Which of the glimpses each copy is from.
-        glimpses: In the order of time.
-        span_s: First and last time of the clip.
-        deviation_s: Standard deviation of the life of a copy that its neighbours in time replace.
+    ``source`` tells which of the glimpses, in the order of time, each copy is from; ``span_s`` is the clip's;
+    ``deviation_s`` that of a copy that its neighbours in time replace.
     """
     unseen = np.stack([_unseen(places, glimpse) for glimpse in glimpses])
     times = np.array([glimpse.time_s for glimpse in glimpses])

@@ -128,18 +128,11 @@ def distance_m(path: Trajectory, recorded: Trajectory) -> float:
 
 
 def share_seen(scene: Scene, path: Trajectory) -> float:
-    """How much of the scene another drive sees, over what the recorded one sees.
+    """How much of the scene another drive sees, over what the recorded one sees; 0 where nothing is near.
 
     Small pictures are spread evenly over both drives. A pixel counts as far as Gaussians cover it, and beyond
     the median depth of the recorded views by the square of that depth over its own: hills far away and the
     sky's panorama look the same from anywhere.
-
-    Args:
-        scene: What to see.
-        path: The other drive.
-
-    Returns:
-        0 where nothing of the scene is near, 1 where as much is as on the recorded drive.
     """
     recorded, other = _probed(scene, scene.trajectory), _probed(scene, path)
     depths_m = recorded[0][recorded[0] > 0]

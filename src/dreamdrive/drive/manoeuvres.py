@@ -112,13 +112,7 @@ MANOEUVRES: dict[str, Callable[[Trajectory, Up], Trajectory]] = {
 
 
 def manoeuvre(name: str, recorded: Trajectory, up: Up, shift_m: float = 2.0) -> Trajectory:
-    """The drive of a name in :data:`MANOEUVRES`.
-
-    Args:
-        name: One of the names.
-        recorded: The recorded drive.
-        up: Unit vector (3,) away from the ground, in the world.
-        shift_m: How far ``shift`` goes to the right.
+    """The drive of a name in :data:`MANOEUVRES`; ``up`` points away from the ground, in the world.
 
     Raises:
         InputError: There is no such manoeuvre.

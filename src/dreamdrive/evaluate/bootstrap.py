@@ -75,19 +75,12 @@ def distance_with_interval(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> DistanceFigure:
-    """A distance of two sets of clips with its floor and its interval.
+    """A distance of the features of two sets of clips with its floor and its interval.
 
     Clips are drawn with replacement, because the frames of one clip are not independent. Duplicates raise a
     distance: the quantiles are therefore shifted by what the resamples exceed the value by on average, and
-    the interval tells how much the value would scatter for other clips, of the same number.
-
-    Args:
-        real: Features (samples, d) of each real clip.
-        fake: The same of each fake clip.
-        distance: Of two arrays of features.
-        paired: Clip i of both sets shows the same place: they are drawn together.
-        seed: Of halves and resamples.
-        resamples: How many; 0 leaves the interval out.
+    the interval tells how much the value would scatter for other clips, of the same number. Clip i of paired
+    sets shows the same place: they are drawn together. Without resamples there is no interval.
 
     Raises:
         InputError: Too few samples, or paired sets of different length.
@@ -139,16 +132,6 @@ def half_distances(
     """Mean distances of a random half of the real samples to the other half, and to a half of each fake set.
 
     Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
-
-    Args:
-        real: Real feature vectors (N, d).
-        fakes: The fake sets (M, d).
-        distance: Of two arrays of features.
-        rng: Draws the halves.
-        splits: How many halvings.
-
-    Returns:
-        The floor, and the distance of each fake set.
 
     Raises:
         InputError: A set is too small to be halved.

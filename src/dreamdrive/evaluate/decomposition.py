@@ -70,14 +70,10 @@ class Decomposition:
 
 
 def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
-    """Measure how well a scene tells static from moving.
+    """Measure how well a scene tells static from moving, against the truth of the same frames, one by one.
 
-    The scene may be of any representation, size and metric scale: the similarity that brings its cameras
-    onto the true ones is taken out.
-
-    Args:
-        scene: What to judge.
-        truth: What is known of the same frames, one by one.
+    The scene may be of any representation, size and metric scale: the similarity that brings its cameras onto
+    the true ones is taken out.
 
     Raises:
         InputError: The scene has another number of frames, or frames of another shape.

@@ -122,11 +122,7 @@ class GeometryFigures:
 
 
 def evaluate_geometry(estimate: Estimate, truth: GeometryTruth) -> GeometryFigures:
-    """Measure how good cameras and depth are.
-
-    Args:
-        estimate: What to judge.
-        truth: What is known of the same frames, one by one, on the same pixels.
+    """Measure how good cameras and depth are, against the truth of the same frames on the same pixels.
 
     Raises:
         InputError: The numbers of frames or their sizes differ.

@@ -39,10 +39,6 @@ def warp_error(clip: Clip, gap: int) -> WarpError:
     ``generated``, where this leaves 7.4 and 10.0. Only pixels count whose flow comes back to within half a
     pixel; what is hidden in one of the frames, or cannot be followed, is left out.
 
-    Args:
-        clip: Frames, and where they hold a picture.
-        gap: Frames from one of a pair to the other.
-
     Raises:
         ValueError: The clip has no two frames that far apart.
     """

@@ -67,17 +67,11 @@ def densify(
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
-    as given in ``clip.known.depth_m``, else from the plane sweep, else (standing camera, or poses from the
-    fallback) from the road plane and a backdrop at 40 m, little trusted. What moves is found against the
-    parallax of a moving camera or against the temporal median of a standing one; from fallback poses no such
-    evidence is drawn.
-
-    Args:
-        clip: The frames.
-        posed: Their cameras.
-        measured: Depth to take in place of the plane sweep's, such as a network's.
-        tell: Called for each frame of each pass, of which there are ``PASSES`` at most.
-        keep: Keeps the depth that was swept.
+    as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
+    which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
+    m, little trusted. What moves is found against the parallax of a moving camera or against the temporal
+    median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for each frame
+    of at most ``PASSES``.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
     given = clip.known.depth_m is not None

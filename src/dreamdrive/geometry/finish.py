@@ -24,15 +24,8 @@ def finish(
     """Bring what was measured to metres and find road, sky and what moves, as for any clip.
 
     The metre comes from the unit where that is one, else from known depth in metres, else from the height of
-    the camera above the road. Of a clip that stands still the measured path is noise: all frames get one
-    pose, or the known ones where these are in metres.
-
-    Args:
-        clip: The frames.
-        measured: Their cameras and depth.
-        evidence: The first look at them.
-        camera_height_m: Height of the camera above the road; None assumes 1.5 m.
-        seed: Seed of everything random.
+    the camera above the road, by default 1.5 m. Of a clip that stands still the measured path is noise: all
+    frames get one pose, or the known ones where these are in metres.
     """
     still = stands(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)

@@ -17,11 +17,7 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
     """Reconstruct the first camera, then the others from where it tells that they were.
 
     The path of the first camera and the mountings of the rig give the poses of all others, unless poses are
-    known; metres and the road are those of the first camera.
-
-    Args:
-        clip: Frames of several cameras, with the mountings in ``rig``.
-        reconstruct: The way of getting geometry from frames of one camera.
+    known; metres and the road are those of the first camera. ``reconstruct`` takes frames of one camera.
 
     Raises:
         InputError: Neither poses nor mountings are known; or see ``reconstruct``.

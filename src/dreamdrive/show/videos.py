@@ -52,14 +52,8 @@ def write_videos(
 ) -> None:
     """Write ``drive.mp4``, ``shift.mp4``, ``recorded_beside_rendered.mp4`` and ``panels.mp4``.
 
-    All show the rig's first camera; of several, ``surround.mp4`` shows what each of them sees.
-
-    Args:
-        folder: Where to.
-        scene: What to show.
-        recorded: The frames of that camera as recorded (F, H, W, 3), in the source's distortion.
-        scored: Dynamic scores; without them their panel is black.
-        progress: Called with frames done and frames in all.
+    All show the rig's first camera, with its frames as recorded, in the source's distortion; of several,
+    ``surround.mp4`` shows what each of them sees. Without scores their panel is black.
     """
     rate = frame_rate(scene.trajectory)
     drive = smooth(scene.trajectory)
@@ -92,11 +86,7 @@ def write_videos(
 def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
     """Write the view of each withheld frame as ``NNNN.png``, in the source's distortion.
 
-    Args:
-        folder: Where to.
-        scene: What to render.
-        source_index: Index of each frame of the scene in the source: the number in the name. Of several
-            cameras, those after the first add ``_cameraK``.
+    The number is the frame's index in the source. Of several cameras, those after the first add ``_cameraK``.
     """
     lens = lens_of(scene)
     for i in np.flatnonzero(scene.held_out).tolist():

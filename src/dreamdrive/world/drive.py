@@ -164,17 +164,10 @@ def drive(
     antialiased: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Drive:
-    """Drive through the street of a layout.
+    """Drive through the street of a layout, or of its world if that is made already.
 
-    Args:
-        layout: The street.
-        frames: Number of frames.
-        fps: Frames a second.
-        size: Width and height in pixels; the horizontal field of view is 64 degrees.
-        world: The same street, if it is made already.
-        mount: Which camera of the car.
-        antialiased: Whether edges take more than one ray a pixel.
-        progress: Called with frames done and frames in all.
+    The size is width and height in pixels; the horizontal field of view is 64 degrees. ``progress`` is called
+    with frames done and frames in all.
     """
     if frames < 1 or fps <= 0 or min(size) < 2:
         raise ValueError(f"world: cannot drive {frames} frames of {size} at {fps}/s")

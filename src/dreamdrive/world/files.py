@@ -102,11 +102,7 @@ def write_world(
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:
-    """Read one camera's drive from a world folder.
-
-    Args:
-        path: The folder that :func:`write_world` wrote.
-        camera: Which of several cameras; a folder of one camera holds that one alone.
+    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone.
 
     Raises:
         InputError: It is no world folder, or a part of it is missing, damaged or of another size.

@@ -37,12 +37,7 @@ _SHIFT = 4
 
 
 def draw_layout(layout: Layout, seconds: float) -> UInt8[np.ndarray, "h w 3"]:
-    """RGB picture (H, W, 3), east to the right: map, houses, boxes at time 0 with their ways, the car's path.
-
-    Args:
-        layout: What to draw.
-        seconds: How far the ways lead.
-    """
+    """RGB picture, east to the right: map, houses, boxes at time 0, their ways for ``seconds``, the car's."""
     return _Sheet(layout, seconds).draw()
 
 

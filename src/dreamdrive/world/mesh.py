@@ -88,13 +88,9 @@ def frustum(
     z_m: tuple[float, float],
     materials: Sequence[int | None],
 ) -> Mesh:
-    """A body between two rectangles (x0, x1, y0, y1).
+    """A body between a lower and an upper rectangle (x0, x1, y0, y1) at two heights.
 
-    Args:
-        low: The lower rectangle.
-        high: The upper one.
-        z_m: Their heights.
-        materials: Of the faces left, right, back, front, top and bottom; None leaves one out.
+    Materials are those of the faces left, right, back, front, top and bottom; None leaves one out.
     """
     points = [
         [x, y, z]

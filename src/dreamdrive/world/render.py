@@ -49,14 +49,9 @@ class WorldView:
 def look(
     world: World, moment: Moment, camera: Camera, following: tuple[float, Camera], *, antialiased: bool = True
 ) -> WorldView:
-    """The picture of a camera in the map frame.
+    """The picture of a camera in the map frame, and the flow to where another time and camera see the same.
 
-    Args:
-        world: The street.
-        moment: The street at the time of the picture.
-        camera: Where the picture is taken.
-        following: When and where the flow leads to.
-        antialiased: Whether pixels that differ from their neighbours take four further rays.
+    Antialiased, pixels that differ from their neighbours take four further rays.
     """
     shape = camera.height_px, camera.width_px
     eye = _Eye(world, moment, camera)

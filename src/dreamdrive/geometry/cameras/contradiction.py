@@ -50,10 +50,6 @@ class Explained:
 def check(clip: Clip, evidence: Evidence) -> None:
     """Refuse known poses that contradict the frames, where there are any and the user gave them.
 
-    Args:
-        clip: The frames.
-        evidence: The first look at them.
-
     Raises:
         InputError: The frames clearly show another motion.
     """
@@ -82,17 +78,11 @@ def explain(
     camera: Camera,
     world_from_camera: Float[np.ndarray, "f 4 4"],
 ) -> Explained:
-    """How much of the flow between frames the given poses explain.
+    """How much of the flow between frames the given poses, in any unit, explain; frames are 320 px wide.
 
     A track is explained if it ends within 2 px of its epipolar line, on the side of points before the camera:
     poses that were inverted, or have other axes, drive backwards. Pairs between which either nothing moves or
     the given camera stands tell nothing.
-
-    Args:
-        grey: Frames at 320 px width.
-        usable: Pixels that belong to the street.
-        camera: Pinhole of that size.
-        world_from_camera: Poses to be checked, in any unit.
     """
     path = path_length(world_from_camera)
     given, own = [], []

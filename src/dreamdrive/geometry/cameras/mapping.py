@@ -55,16 +55,8 @@ def reconstruct(
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
     Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
-    before incremental mapping.
-
-    Args:
-        grey: Frames at the working size.
-        usable: Pixels in which features may lie.
-        camera: Pinhole of the working size.
-        moving: Steps in which the picture moves.
-        calibrated: Whether the focal length is known.
-        seed: Seed of everything random.
-        tell: Called after features, after matches, and with the model.
+    before incremental mapping. Frames and pinhole are of the working size; ``moving`` are steps in which the
+    picture moves. ``tell`` is called after features, after matches, and with the model.
     """
     if len(grey) < MIN_FRAMES:
         return _refused(f"{len(grey)} frames are too few for structure from motion", "few")

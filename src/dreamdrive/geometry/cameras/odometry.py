@@ -46,12 +46,7 @@ def drive(
 ) -> Odometry:
     """Rotation and direction from the essential matrix of tracked corners, step length from the road.
 
-    Args:
-        grey: Frames at 320 px width.
-        usable: Pixels that belong to the street.
-        camera: Pinhole at that size.
-        times_s: Times of the frames.
-        height_m: Height of the camera above a level road.
+    Frames and pinhole are 320 px wide; the camera is ``height_m`` above a level road.
     """
     count = len(grey)
     turns, directions = np.tile(np.eye(3), (count - 1, 1, 1)), np.zeros((count - 1, 3))

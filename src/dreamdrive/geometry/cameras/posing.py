@@ -60,17 +60,12 @@ class Posed:
 def pose_clip(
     clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, tell: Tell = unheard
 ) -> Posed:
-    """Pose every frame of a clip.
+    """Pose every frame of a clip of one camera.
 
     Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
     motion, which would register it on whatever drives through the picture. Else structure from motion is
-    tried and judged, and frame-to-frame odometry takes over when it is refused.
-
-    Args:
-        clip: Frames of one camera.
-        camera_height_m: Height of the camera above the road, when the user gave it; None assumes 1.5 m.
-        seed: Seed of everything random; the same seed gives the same poses.
-        tell: Called for each step: the first look, and those of ``reconstruct.STEPS``.
+    tried and judged, and frame-to-frame odometry takes over when it is refused. Without a camera height 1.5 m
+    is assumed. ``tell`` is called for the first look, and for the steps of ``reconstruct.STEPS``.
 
     Raises:
         InputError: Without frames; for a camera height that is not positive; for known poses that contradict
@@ -259,15 +254,8 @@ def as_posed(
 ) -> Posed:
     """The cameras of all frames, and what was noticed before and by posing them.
 
-    Args:
-        clip: The frames.
-        evidence: The first look at them.
-        poses: World-from-camera (F, 4, 4) in metres, the first the identity.
-        camera: Pinhole of the clip's size.
-        metric: Scale and road.
-        observed: Whether the focal length was seen or given.
-        notes: What posing them showed, a sentence each.
-        details: Figures of the method.
+    Poses are in metres, the first the identity; the pinhole has the clip's size; the focal length is observed
+    where it was seen or given.
     """
     cameras = tuple(camera.at(pose) for pose in poses)
     figures = {

@@ -22,10 +22,6 @@ def refined(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
     Poses of a positioning system are true over a street and wrong between two frames: 0.1 degrees move what
     is far away by a pixel. On PandaSet its own poses give 27.8 dB on withheld frames, refined 28.8 dB.
 
-    Args:
-        clip: Frames with known poses.
-        reconstruct: The way of getting geometry.
-
     Raises:
         InputError: No poses are known, or not in metres; or the path that the frames show is another one.
     """

@@ -51,11 +51,7 @@ class Model:
 def match(database: Path, features: Sequence[Features], camera: Camera, seed: int) -> None:
     """Write features, pair matches and two-view geometries into a new COLMAP database.
 
-    Args:
-        database: File to create.
-        features: One entry a frame, in order of time.
-        camera: Pinhole of the working size that the pairs are verified with.
-        seed: Seed of RANSAC.
+    Features are in order of time; pairs are verified with the pinhole of the working size.
     """
     with pycolmap.Database.open(str(database)) as store:
         native = _native_camera(camera, camera_id=1)
@@ -87,13 +83,7 @@ def rematch(database: Path, camera: Camera, seed: int) -> None:
 def map_globally(database: Path, count: int, seed: int) -> Model | None:
     """Global mapping (GLOMAP, Pan et al. 2024) at a fixed focal length, then robust bundle adjustment.
 
-    Args:
-        database: What ``match`` wrote.
-        count: Number of frames.
-        seed: Seed of the random starting positions.
-
-    Returns:
-        The largest model, or None when no model comes out.
+    It starts at random positions of the seed. The largest model, or None when no model comes out.
     """
     options = pycolmap.GlobalPipelineOptions()
     options.num_threads = 1

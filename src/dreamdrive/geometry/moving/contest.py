@@ -48,14 +48,9 @@ class Verdict:
 def judge(
     view: View, frame: int, flows: Sequence[PairFlow], inverse_depth: Float[np.ndarray, "h w"], known: bool
 ) -> Verdict:
-    """Judge one frame against its neighbours.
+    """Judge one frame against its neighbours by its flows and its static depth in 1/m.
 
-    Args:
-        view: The posed frames.
-        frame: Index of the frame.
-        flows: Its flows.
-        inverse_depth: Static depth of the frame in 1/m.
-        known: Whether that depth was given, and so is exact on moving things too.
+    Depth that is known was given, and so is exact on moving things too.
     """
     shape = inverse_depth.shape
     correlation = Correlation(view.grey[frame], _WINDOW_PX)
