@@ -1,8 +1,7 @@
 """How well a scene tells what moves from what does not, against the truth of a simulated world."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -63,10 +62,6 @@ class Decomposition:
     labels: Retrieval
     fake: FakeMotion | None
     actors: ActorError
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values, with the names of the attributes; what has no meaning is null."""
-        return asdict(self)
 
 
 def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:

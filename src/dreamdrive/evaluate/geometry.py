@@ -1,7 +1,6 @@
 """How good the cameras and the depth of a scene are, against known poses and lidar or exact depth."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -115,10 +114,6 @@ class GeometryFigures:
     pinhole: PinholeError | None
     depth: DepthFigures | None
     notes: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values, with the names of the attributes; what has no meaning is null."""
-        return asdict(self)
 
 
 def evaluate_geometry(estimate: Estimate, truth: GeometryTruth) -> GeometryFigures:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
-from dreamdrive.geometry.dense import Dense, StaticDepth, densify
+from dreamdrive.geometry.dense import Dense, densify
 from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
@@ -49,7 +49,7 @@ def finish(
     posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
-    dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
+    dense = densify(known, posed, (depth_m, measured.confidence))
     return assemble(clip, posed, dense)
 
 
@@ -173,9 +173,5 @@ def _by_median_depth() -> Metric:
     """The rough factor, where the path is none and no road was seen."""
     problem = "no road plane was found, and the path shows no speed"
     words = f"a median depth of {_MEDIAN_DEPTH_M:.0f} m is assumed"
-    return Metric(
-        1.0,
-        None,
-        Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD, basis="usual depth"),
-        (f"{problem}: {words}",),
-    )
+    scale = Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD, basis="usual depth")
+    return Metric(1.0, None, scale, (f"{problem}: {words}",))

@@ -1,6 +1,6 @@
 """The focal length: kept, or found when the drive shows it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,9 +82,7 @@ def _with_radial(model: Model) -> Settled:
 def _remap(
     database: Path, camera: Camera, lens: Float[np.ndarray, "5"], count: int, seed: int
 ) -> Model | None:
-    focal = float(lens[0])
-    changed = Camera(focal, focal, camera.cx_px, camera.cy_px, camera.width_px, camera.height_px)
-    sfm.rematch(database, changed, seed)
+    sfm.rematch(database, replace(camera, fx_px=float(lens[0]), fy_px=float(lens[0])), seed)
     return sfm.map_globally(database, count, seed)
 
 

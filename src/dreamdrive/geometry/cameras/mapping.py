@@ -1,7 +1,7 @@
 """Structure from motion of a clip with its gate: a believable model, or why there is none."""
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -114,13 +114,7 @@ def _wobbling(model: Model) -> str:
 def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[Features]]:
     """Stretch y so that both focal lengths agree: COLMAP's radial model has only one."""
     stretch = camera.fx_px / camera.fy_px
-    square = Camera(
-        camera.fx_px,
-        camera.fx_px,
-        camera.cx_px,
-        camera.cy_px * stretch,
-        camera.width_px,
-        max(1, round(camera.height_px * stretch)),
-    )
+    height_px = max(1, round(camera.height_px * stretch))
+    square = replace(camera, fy_px=camera.fx_px, cy_px=camera.cy_px * stretch, height_px=height_px)
     factor = np.array([1.0, stretch], np.float32)
     return square, [Features(entry.keypoints_px * factor, entry.descriptors) for entry in found]

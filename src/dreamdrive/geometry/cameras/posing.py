@@ -167,15 +167,8 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    return Street(
-        evidence.grey,
-        evidence.street,
-        evidence.small,
-        poses,
-        points,
-        clip.times_s,
-        scale.asked_m_s(clip),
-    )
+    asked_m_s = scale.asked_m_s(clip)
+    return Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s, asked_m_s)
 
 
 def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
@@ -197,15 +190,12 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     points = depth_points(clip)
     camera = clip.rig[0]
     street = Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
-    plane = None
-    if len(points):
-        plane, _ = scale.find_ground(street, 0)
+    plane = scale.find_ground(street, 0)[0] if len(points) else None
     metric = _level_road(height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
-        metric = replace(
-            metric, ground=ground, scale=Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
-        )
+        of_depth = Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
+        metric = replace(metric, ground=ground, scale=of_depth)
     posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
     return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
@@ -232,14 +222,9 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
 
 
 def _level_road(height_m: float | None, spread: float) -> Metric:
-    wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
+    ground = Ground(np.array([0.0, -1.0, 0.0]), scale.USUAL_HEIGHT_M if height_m is None else height_m)
     source = f"level road assumed, {scale.height_words(height_m)}"
-    return Metric(
-        1.0,
-        Ground(np.array([0.0, -1.0, 0.0]), wanted),
-        Scale(source, spread, basis=scale.height_basis(height_m)),
-        (),
-    )
+    return Metric(1.0, ground, Scale(source, spread, basis=scale.height_basis(height_m)), ())
 
 
 def as_posed(

@@ -54,7 +54,7 @@ def match(database: Path, features: Sequence[Features], camera: Camera, seed: in
     Features are in order of time; pairs are verified with the pinhole of the working size.
     """
     with pycolmap.Database.open(str(database)) as store:
-        native = _native_camera(camera, camera_id=1)
+        native = _native_camera(camera)
         store.write_camera(native, use_camera_id=True)
         rig = pycolmap.Rig(rig_id=1)
         rig.add_ref_sensor(native.sensor_id)
@@ -75,7 +75,7 @@ def match(database: Path, features: Sequence[Features], camera: Camera, seed: in
 def rematch(database: Path, camera: Camera, seed: int) -> None:
     """Verify the stored pair matches again with another camera."""
     with pycolmap.Database.open(str(database)) as store:
-        store.update_camera(_native_camera(camera, camera_id=1))
+        store.update_camera(_native_camera(camera))
         store.clear_two_view_geometries()
     _verify_pairs(database, camera, seed)
 
@@ -162,13 +162,13 @@ def adjust(
     return _read(native, len(model.world_from_camera))
 
 
-def _native_camera(camera: Camera, camera_id: int) -> Any:
+def _native_camera(camera: Camera) -> Any:
     native = pycolmap.Camera(
         model="PINHOLE",
         width=camera.width_px,
         height=camera.height_px,
         params=[camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px],
-        camera_id=camera_id,
+        camera_id=1,
     )
     native.has_prior_focal_length = True
     return native
@@ -266,15 +266,8 @@ def _read(native: Any, count: int) -> Model:
 
 def _lens(camera: Any) -> np.ndarray:
     radial = camera.params[3] if camera.model == pycolmap.CameraModelId.SIMPLE_RADIAL else 0.0
-    return np.array(
-        [
-            camera.focal_length_x,
-            camera.focal_length_y,
-            camera.principal_point_x,
-            camera.principal_point_y,
-            radial,
-        ]
-    )
+    focal = camera.focal_length_x, camera.focal_length_y
+    return np.array([*focal, camera.principal_point_x, camera.principal_point_y, radial])
 
 
 def _errors_px(poses: np.ndarray, points: np.ndarray, pixels: np.ndarray, lens: np.ndarray) -> np.ndarray:

@@ -94,18 +94,13 @@ def from_ground(street: Street, height_m: float | None, focal_spread: float, see
     factor = wanted / plane.height
     speed = median_speed(street) * factor
     if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
-        return _from_speed(
-            street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
-        )
+        problem = f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
+        return _from_speed(street, problem)
     return _by_plane(plane, how, factor, height_m, focal_spread)
 
 
 def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_spread: float) -> Metric:
-    terms = (
-        plane.spread,
-        USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
-        focal_spread,
-    )
+    terms = plane.spread, USUAL_SPREAD if height_m is None else GIVEN_SPREAD, focal_spread
     source = f"ground plane ({how}), {height_words(height_m)}"
     found = Scale(source, float(np.linalg.norm(terms)), basis=height_basis(height_m))
     return Metric(factor, Ground(plane.normal, plane.offset * factor), found, ())
@@ -174,16 +169,12 @@ def as_given(
 
 
 def _from_speed(street: Street, problem: str) -> Metric:
-    speed = ASSUMED_SPEED_M_S if street.asked_m_s is None else street.asked_m_s
+    speed, word, rest = street.asked_m_s, "taken as asked for", "the speed that was asked for"
+    basis: Basis = "asked speed"
+    if speed is None:
+        speed, word, rest, basis = ASSUMED_SPEED_M_S, "assumed", "an assumed speed", "usual speed"
+    found = Scale(f"none: {problem}; a speed of {speed:.3g} m/s is {word}", SPEED_SPREAD, basis=basis)
     factor = speed / max(median_speed(street), 1e-9)
-    word, rest = (
-        ("assumed", "an assumed speed")
-        if street.asked_m_s is None
-        else ("taken as asked for", "the speed that was asked for")
-    )
-    words = f"none: {problem}; a speed of {speed:.3g} m/s is {word}"
-    basis: Basis = "usual speed" if street.asked_m_s is None else "asked speed"
-    found = Scale(words, SPEED_SPREAD, basis=basis)
     return Metric(factor, None, found, (f"{problem}: distances rest on {rest}",))
 
 
