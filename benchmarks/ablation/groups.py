@@ -12,8 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from dreamdrive.decompose import GroupOptions
-from dreamdrive.decompose.covered import covered
-from dreamdrive.decompose.group import Grouping, elected, source_pixels
+from dreamdrive.decompose.group import Grouping, elected
 from dreamdrive.options import Quality
 from street.case import Start
 
@@ -109,13 +108,10 @@ def space_time(
 
 
 def _grouped(begin: Start, scores: torch.Tensor, quality: Quality, labels: Labels) -> Grouping:
-    clip, geometry, seeds, options = begin.clip, begin.geometry, begin.seeds, quality.group
+    seeds, options = begin.seeds, quality.group
     value = scores.detach().numpy()
     index = np.flatnonzero(value > options.candidate)
     found = labels(space_time(begin, value, index))
     cluster = np.full(len(seeds), -1, dtype=np.int64)
     cluster[index] = majority(found, value[index], options)
-    dynamic = torch.from_numpy(cluster >= 0)
-    pixels = source_pixels(geometry, seeds, np.arange(len(seeds)))
-    hidden = covered(clip, geometry, seeds, dynamic, pixels, math.ceil(options.reach_px / 1.5))
-    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from ablation.errors import by_frame, dssim_errors, feature_errors
 from ablation.groups import by_density, by_density_and_features, by_voxels
-from dreamdrive.fit import Representation
+from dreamdrive.motion import RepresentationName
 from dreamdrive.options import Quality
 from street.fit import Errors, Vote, own_errors, own_vote, with_steps
 from street.jobs import QUALITY
@@ -29,7 +29,7 @@ class Variant:
     about: str
     change: Callable[[Quality], Quality] = lambda quality: quality
     features: Literal["all", "evidence", "appearance", "none", "efficientnet"] = "all"
-    representation: Representation = "hybrid"
+    representation: RepresentationName = "hybrid"
     vote: Vote = own_vote
     errors: Errors = own_errors
 
@@ -79,7 +79,7 @@ def untracked(lifespan_frames: float) -> Callable[[Quality], Quality]:
 
 def ungrouped(quality: Quality) -> Quality:
     """No clusters, hence no things that could have tracks; copies live as long as those of things do."""
-    return grouped(clustering=False)(untracked(quality.cast.lifespan_frames)(quality))
+    return grouped(clusters="none")(untracked(quality.cast.lifespan_frames)(quality))
 
 
 VARIANTS = {

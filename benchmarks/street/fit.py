@@ -15,7 +15,8 @@ from common.workers import threads
 from dreamdrive import __version__
 from dreamdrive.decompose import cast, error_maps, group, score
 from dreamdrive.decompose.group import Grouping
-from dreamdrive.fit import Parts, Representation, fit
+from dreamdrive.fit import Parts, fit
+from dreamdrive.motion import RepresentationName
 from dreamdrive.options import Quality
 from dreamdrive.run.stages import stage_seed
 from dreamdrive.scene.folder import load_scene, save_scene
@@ -78,7 +79,7 @@ def own_errors(begin: Start, quality: Quality) -> np.ndarray:
 
 def fit_case(
     begin: Start,
-    representation: Representation,
+    representation: RepresentationName,
     quality: Quality,
     vote: Vote = own_vote,
     errors: Errors = own_errors,
@@ -104,7 +105,7 @@ def fit_case(
 
 
 def _parts(
-    begin: Start, representation: Representation, quality: Quality, vote: Vote, errors: Errors
+    begin: Start, representation: RepresentationName, quality: Quality, vote: Vote, errors: Errors
 ) -> Parts:
     fitted, nothing = begin.static.gaussians, torch.zeros(0, dtype=torch.int64)
     if representation == "static":
@@ -119,7 +120,7 @@ def _parts(
     return Parts(fitted.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)
 
 
-def equal_time(begin: Start, representation: Representation, quality: Quality) -> dict[str, Any]:
+def equal_time(begin: Start, representation: RepresentationName, quality: Quality) -> dict[str, Any]:
     """Steps of a representation in the time of hybrid, both timed now, one after the other.
 
     A fit of ``PROBE_STEPS`` steps passes through all phases of a long one; what is done once, such as the
@@ -134,7 +135,7 @@ def equal_time(begin: Start, representation: Representation, quality: Quality) -
     return {"steps": fit_case(begin, representation, short).cost.steps_in(hybrid_s), "hybrid_s": hybrid_s}
 
 
-def options_of(quality: Quality, representation: Representation) -> dict[str, Any]:
+def options_of(quality: Quality, representation: RepresentationName) -> dict[str, Any]:
     """All options that a fit of a representation depends on, for a digest."""
     names = ["static", "fit", "seeds", "densify"]
     names += ["score", "group", "cast"] if representation == "hybrid" else []

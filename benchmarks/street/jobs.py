@@ -8,7 +8,6 @@ from typing import Any
 
 from common.keep import kept, save
 from dreamdrive.evaluate.extractors import Toolbox
-from dreamdrive.fit import Representation
 from dreamdrive.options import QUALITIES
 from dreamdrive.run.stages import digest
 from street.case import Case, Poses, References, case_digest, start
@@ -19,7 +18,7 @@ from street.recording import Recorded, recording
 from street.views import views_digest
 
 SEEDS = tuple(range(8))
-REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
+REPRESENTATIONS: tuple[str, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
 BUDGETS = ("equal_steps", "equal_time", "five_times")
 QUALITY = QUALITIES["draft"]
 TIMES = 5
@@ -42,7 +41,7 @@ class Job(FitTask):
     """One fit, and the folder of all of them."""
 
     case: Case
-    representation: Representation
+    representation: str
     budget: str
     runs: Path
 

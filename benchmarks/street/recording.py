@@ -9,7 +9,7 @@ import numpy as np
 from common.keep import save
 from common.pandaset_truth import Movers, moving_masks
 from common.places import DATA
-from dreamdrive.fit import Representation
+from dreamdrive.motion import RepresentationName
 from dreamdrive.options import Quality
 from dreamdrive.prior import choose_prior
 from dreamdrive.run.held_out import score_scene
@@ -29,7 +29,7 @@ ABOUT: list[object] = [CLIP, CAMERA, FRAMES, RATE_HZ, SIZE, HOLD_OUT]
 class Recorded(FitTask):
     """One fit of the recording, and the folder of all fits."""
 
-    representation: Representation
+    representation: RepresentationName
     runs: Path
 
     @property

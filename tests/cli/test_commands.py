@@ -118,9 +118,9 @@ def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_doctor_says_whether_a_gpu_can_be_used(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: "there is no nvcc: install it")
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: "there is no nvcc: install it")
     assert re.search(r"GPU\s+not needed; there is no nvcc: install it", run("doctor").out)
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: None)
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: None)
     result = run("doctor")
     assert result.code == 0
     assert re.search(r"GPU\s+backend gsplat can be used; not needed", result.out)

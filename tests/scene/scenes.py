@@ -5,16 +5,24 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from dreamdrive.motion import (
+    Bounds,
+    DeformationConfig,
+    DeformationField,
+    Domain,
+    HexPlaneConfig,
+    HexPlaneField,
+    Motion,
+    Tracks,
+    Vibration,
+    VibrationConfig,
+)
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.hexplane import Bounds, HexPlaneConfig, HexPlaneField
-from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.vibration import Vibration, VibrationConfig
 
 
 def gaussians(count: int, seed: int, **more: torch.Tensor) -> Gaussians:

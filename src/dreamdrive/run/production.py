@@ -119,8 +119,9 @@ def start(
     planned = plan(request.control, request.prior)
     if planned is not None:
         check_memory(planned, free_bytes())
-        for sentence in announcement(planned, request.options, available_cores()):
-            say(sentence)
+        if request.options.device == "cpu":  # where the times were measured
+            for sentence in announcement(planned, request.options, available_cores()):
+                say(sentence)
     return Production(
         workspace.stages,
         recompute_from,

@@ -7,8 +7,8 @@ import pytest
 import torch
 from tests.scene.scenes import gaussians
 
+from dreamdrive.motion import Vibration, VibrationConfig
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.vibration import Vibration, VibrationConfig
 
 CONFIG = VibrationConfig(interval_s=0.2, cycle_frames=8.0)
 CYCLE_S = 1.6

@@ -1,7 +1,7 @@
 """The deformation field: identity at the start, rigid tracks, life spans, gradients."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -9,16 +9,15 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dreamdrive.scene.compiled_deformation import network_residual
-from dreamdrive.scene.deformation import (
+from dreamdrive.motion import (
     DeformationConfig,
     DeformationField,
     Domain,
     Tracks,
     encode,
-    faded,
     multiply_quaternions,
 )
+from dreamdrive.motion.compiled_deformation import network_residual
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import set_threads, threads
 
@@ -132,7 +131,7 @@ def test_fading_multiplies_the_opacity(
 ) -> None:
     one = gaussians(1, dtype, lifespan=torch.tensor([[1.0, deviation_s]], dtype=dtype))
     one = Gaussians(**{**one.tensors(), "logit_opacities": torch.tensor([logit], dtype=dtype)})
-    after = faded(one, 1.0 + away_s)
+    after = one.faded_at(1.0 + away_s)
     expected = opacity(one) * math.exp(-(away_s**2) / (2 * deviation_s**2))
     torch.testing.assert_close(opacity(after), expected, atol=2e-6, rtol=2e-5)
     assert after.lifespan is None
@@ -142,11 +141,11 @@ def test_fading_is_finite_at_extremes_with_finite_gradients() -> None:
     logits = torch.tensor([-200.0, -80, 0, 80, 200], requires_grad=True)
     for away_s in (0.0, 1e-4, 0.1, 5.0, 1000.0):
         one = gaussians(5, lifespan=torch.tensor([[0.0, 0.01]] * 5))
-        after = faded(Gaussians(**{**one.tensors(), "logit_opacities": logits}), away_s)
+        after = replace(one, logit_opacities=logits).faded_at(away_s)
         assert torch.isfinite(after.logit_opacities).all()
         (gradient,) = torch.autograd.grad(opacity(after).sum(), logits)
         assert torch.isfinite(gradient).all()
-    at_peak = faded(Gaussians(**{**one.tensors(), "logit_opacities": logits[:4].repeat(2)[:5]}), 0.0)
+    at_peak = replace(one, logit_opacities=logits[:4].repeat(2)[:5]).faded_at(0.0)
     torch.testing.assert_close(at_peak.logit_opacities[:4], logits[:4].detach())
 
 

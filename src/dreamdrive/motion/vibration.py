@@ -7,13 +7,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dreamdrive.scene.deformation import faded
+from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 
 
 @dataclass(frozen=True)
-class VibrationConfig:
+class VibrationConfig(MotionConfig):
     """What all Gaussians share. PVG counts time so that a frame of its drives at 10 Hz takes 0.02.
 
     Attributes:
@@ -53,11 +52,31 @@ class Vibration(Motion):
     """
 
     kind = "vibration"
+    config_type = VibrationConfig
     config: VibrationConfig
 
     def __init__(self, config: VibrationConfig) -> None:
         super().__init__()
         self.config = config
+
+    @classmethod
+    def start(cls, config: VibrationConfig, given: Start) -> tuple["Vibration", Gaussians]:
+        """Gaussians at rest that are seen best in the frame they come from, as in PVG from LiDAR points."""
+        given.refuse_tracks(cls.kind)
+        dynamic, config = given.dynamic, replace(config, interval_s=given.clip.interval_s)
+        peak_s = torch.from_numpy(given.clip.times_s)[dynamic.source_frame].to(torch.float32)
+        span_s = torch.full_like(peak_s, config.span_frames * config.interval_s)
+        life = torch.stack([peak_s, span_s], dim=1)
+        return cls(config), replace(dynamic, velocity=torch.zeros_like(dynamic.means), lifespan=life)
+
+    @classmethod
+    def blank(cls, config: VibrationConfig) -> "Vibration":
+        """One of this shape; it holds no numbers of its own."""
+        return cls(config)
+
+    def check(self, gaussians: Gaussians) -> None:
+        """Raise ``ValueError`` where they have no velocities or no life spans."""
+        _moving(gaussians)
 
     def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         """The Gaussians as they are at ``t_s``: moved and faded; differentiable.
@@ -74,7 +93,7 @@ class Vibration(Motion):
         to agree on where things go.
         """
         c = self.config
-        draw, place = torch.rand(2, generator=generator).tolist()
+        draw, place = torch.rand(2, generator=generator, device=generator.device).tolist()
         shift_s = (2 * place - 1) * c.shift_frames * c.interval_s if draw < c.shift_share else 0.0
         return self._shifted_at(gaussians, t_s, shift_s)
 
@@ -100,7 +119,7 @@ class Vibration(Motion):
         means = gaussians.means + swing_s * velocity
         if shift_s:
             means = means + shift_s * self.mean_velocity(gaussians)
-        return faded(replace(gaussians, means=means, velocity=None), t_s - shift_s)
+        return replace(gaussians, means=means, velocity=None).faded_at(t_s - shift_s)
 
 
 def _moving(gaussians: Gaussians) -> tuple[Float[Tensor, "n 3"], Float[Tensor, "n 2"]]:

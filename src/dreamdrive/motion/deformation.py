@@ -1,6 +1,5 @@
 """Where the dynamic Gaussians are at a given time: rigid actor tracks plus a learned residual (eq. 11-12)."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,13 +7,15 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from dreamdrive.scene.compiled_deformation import network_residual, posed
+from dreamdrive.device import in_core
+from dreamdrive.motion.compiled_deformation import network_residual, posed
+from dreamdrive.motion.protocol import Motion, MotionConfig, Start
+from dreamdrive.motion.tracks import Tracks, key_weights, multiply_quaternions, rotate
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 
 
 @dataclass(frozen=True)
-class DeformationConfig:
+class DeformationConfig(MotionConfig):
     """Shape of a deformation field; everything that is not learned or measured, so that JSON can rebuild it.
 
     Attributes:
@@ -68,27 +69,6 @@ class Domain:
 
 
 @dataclass(frozen=True)
-class Tracks:
-    """Rigid motion of the actors: key frames to start from, refined by the fit.
-
-    Attributes:
-        times_s: Times of the key frames (T,), strictly increasing.
-        translation_m: Offset of each actor from its canonical place (A, T, 3).
-        yaw_rad: Rotation about the up axis from the canonical attitude (A, T), right-handed.
-        pivot_m: Point each actor turns about (A, 3), in the world, in its canonical place.
-    """
-
-    times_s: Float[np.ndarray, " t"]
-    translation_m: Float[np.ndarray, "a t 3"]
-    yaw_rad: Float[np.ndarray, "a t"]
-    pivot_m: Float[np.ndarray, "a 3"]
-
-    def __post_init__(self) -> None:
-        if len(self.times_s) == 0 or len(self.pivot_m) == 0 or (np.diff(self.times_s) <= 0).any():
-            raise ValueError("tracks: expected at least one actor and strictly increasing key times")
-
-
-@dataclass(frozen=True)
 class Offsets:
     """What is added to each Gaussian at a time (eq. 12).
 
@@ -110,46 +90,6 @@ def encode(values: Float[Tensor, "*n d"], frequencies: int) -> Float[Tensor, "*n
     return torch.cat([values, angles.sin(), angles.cos()], dim=-1)
 
 
-def multiply_quaternions(a: Float[Tensor, "*n 4"], b: Float[Tensor, "*n 4"]) -> Float[Tensor, "*n 4"]:
-    """Hamilton product of wxyz quaternions: the rotation b, then a."""
-    aw, ax, ay, az = a.unbind(-1)
-    bw, bx, by, bz = b.unbind(-1)
-    return torch.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        dim=-1,
-    )
-
-
-def faded(gaussians: Gaussians, t_s: float) -> Gaussians:
-    """The Gaussians with their life spans turned into opacity at ``t_s``; the result has no life spans.
-
-    opacity' = opacity * exp(-e), e = (t - centre)^2 / (2 deviation^2), on logits without forming 1 - opacity:
-    logit' = logit - e - log(1 + exp(logit) (1 - exp(-e))).
-    """
-    if gaussians.lifespan is None:
-        return gaussians
-    centre_s, deviation_s = gaussians.lifespan.unbind(-1)
-    exponent = 0.5 * ((t_s - centre_s) / deviation_s.clamp(min=1e-6)) ** 2
-    # exp(80) still fits float32; an opacity of logit 80 is 1 to the last bit.
-    logit = gaussians.logit_opacities.clamp(max=80.0)
-    logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
-    return replace(gaussians, logit_opacities=logit, lifespan=None)
-
-
-def alive_at(gaussians: Gaussians, t_s: float) -> Int[Tensor, " m"]:
-    """Rows that a life span leaves at least 1/255 of their opacity at ``t_s``: no other can be seen."""
-    if gaussians.lifespan is None:
-        return torch.arange(len(gaussians))
-    centre_s, deviation_s = gaussians.lifespan.unbind(-1)
-    reach = math.sqrt(2 * math.log(255.0))
-    return torch.nonzero((t_s - centre_s).abs() <= reach * deviation_s).squeeze(1)
-
-
 class DeformationField(Motion):
     """F_deform(x, t): offsets of mean, rotation and scale (eq. 11-12).
 
@@ -169,6 +109,7 @@ class DeformationField(Motion):
     """
 
     kind = "network"
+    config_type = DeformationConfig
     config: DeformationConfig
     centre_m: Tensor
     radius_m: Tensor
@@ -202,6 +143,34 @@ class DeformationField(Motion):
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self._build_network()
+
+    @classmethod
+    def start(cls, config: DeformationConfig, given: Start) -> tuple["DeformationField", Gaussians]:
+        """F_deform over the space of the dynamic Gaussians and the time of the clip."""
+        means = given.dynamic.means.numpy().astype(np.float64)
+        tracks, ground = given.tracks, given.geometry.ground
+        centre = np.median(means, axis=0)
+        radius = float(np.quantile(np.linalg.norm(means - centre, axis=1), 0.95))
+        up = ground.normal_world if ground is not None else np.array([0.0, -1.0, 0.0])
+        start_s, end_s = (float(given.clip.times_s[i]) for i in (0, -1))
+        domain = Domain(centre, max(radius, 1e-3), start_s, end_s, up)
+        if tracks is not None:
+            config = replace(config, actors=len(tracks.pivot_m), track_times=len(tracks.times_s))
+        return cls(config, domain, tracks, given.seed), given.dynamic
+
+    @classmethod
+    def blank(cls, config: DeformationConfig) -> "DeformationField":
+        """One of this shape with any valid numbers in it."""
+        actors, times = config.actors, config.track_times
+        moves, turns = np.zeros((actors, times, 3)), np.zeros((actors, times))
+        tracks = Tracks(np.arange(float(times)), moves, turns, np.zeros((actors, 3))) if actors else None
+        return cls(config, Domain(np.zeros(3), 1.0, 0.0, 1.0, np.array([0.0, -1.0, 0.0])), tracks)
+
+    def check(self, gaussians: Gaussians) -> None:
+        """Raise ``ValueError`` where Gaussians belong to actors without a track."""
+        actor, actors = gaussians.actor, self.config.actors
+        if actors and actor is not None and not -1 <= int(actor.min()) <= int(actor.max()) < actors:
+            raise ValueError(f"Gaussians belong to actors beyond the {actors} with a track")
 
     def _build_network(self) -> None:
         c = self.config
@@ -244,7 +213,7 @@ class DeformationField(Motion):
         key frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off.
         Before the first and after the last key frame the velocity there continues.
         """
-        weights = self.track_yaw_rad.new_tensor(_key_weights(self.track_times_s.tolist(), t_s))
+        weights = self.track_yaw_rad.new_tensor(key_weights(self.track_times_s.tolist(), t_s))
         translation = torch.einsum("atk,t->ak", self.track_translation, weights)
         return translation, self.track_yaw_rad @ weights
 
@@ -270,7 +239,7 @@ class DeformationField(Motion):
         index = actor.clamp(min=0)
         translation, yaw_rad = self.pose(t_s)
         arm = means - self.track_pivot_m[index]
-        moved = _rotate(arm, self.up, yaw_rad[index]) - arm + translation[index]
+        moved = rotate(arm, self.up, yaw_rad[index]) - arm + translation[index]
         unit = nn.functional.normalize(quaternions, dim=-1)
         turn = torch.cat([(0.5 * yaw_rad).cos()[:, None], (0.5 * yaw_rad).sin()[:, None] * self.up], dim=-1)[
             index
@@ -288,8 +257,8 @@ class DeformationField(Motion):
         through plain torch.
         """
         if len(gaussians) == 0:
-            return faded(gaussians, t_s)
-        if gaussians.means.dtype == torch.float32 and gaussians.means.is_cpu:
+            return gaussians.faded_at(t_s)
+        if in_core(gaussians.means):
             return self._compiled_at(gaussians, t_s)
         offsets = self(gaussians.means, gaussians.quaternions, gaussians.actor, t_s)
         moved = replace(
@@ -298,7 +267,7 @@ class DeformationField(Motion):
             quaternions=nn.functional.normalize(gaussians.quaternions, dim=-1) + offsets.quaternion,
             log_scales=gaussians.log_scales + offsets.log_scale,
         )
-        return faded(moved, t_s)
+        return moved.faded_at(t_s)
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""
@@ -345,39 +314,3 @@ class DeformationField(Motion):
 
 def _tensor(values: np.ndarray | float) -> Tensor:
     return torch.tensor(values, dtype=torch.float32)
-
-
-def _key_weights(times: list[float], t_s: float) -> list[float]:
-    """What each key frame contributes at ``t_s``: a spline is linear in its key frames."""
-    if len(times) < 2:
-        return [1.0] * len(times)
-    i = min(max(int(np.searchsorted(times, t_s, side="right")) - 1, 0), len(times) - 2)
-    step = times[i + 1] - times[i]
-    u = (t_s - times[i]) / step
-    start, end = np.eye(len(times))[i : i + 2]
-    slope, next_slope = (_slope_weights(times, k) * step for k in (i, i + 1))
-    if u < 0:
-        at = start + u * slope
-    elif u > 1:
-        at = end + (u - 1) * next_slope
-    else:
-        bend = 2 * (start - end) + slope + next_slope
-        at = start + u * (slope + u * (end - start - slope - bend + u * bend))
-    return at.tolist()
-
-
-def _slope_weights(times: list[float], k: int) -> Float[np.ndarray, " t"]:
-    """Velocity at key frame ``k``, of the parabola through it and its neighbours; one-sided at the ends."""
-    keys = np.eye(len(times))
-    before, after = min(k, len(times) - 2), max(k, 1)
-    ahead = (keys[before + 1] - keys[before]) / (times[before + 1] - times[before])
-    behind = (keys[after] - keys[after - 1]) / (times[after] - times[after - 1])
-    share = (times[after] - times[after - 1]) / (times[before + 1] - times[after - 1])
-    return behind + share * (ahead - behind)
-
-
-def _rotate(vectors: Tensor, axis: Tensor, angle_rad: Tensor) -> Tensor:
-    """Rodrigues' formula: vectors (N, 3) about one unit axis (3,) by (N,) angles."""
-    cosine, sine = angle_rad.cos()[:, None], angle_rad.sin()[:, None]
-    along = (vectors @ axis)[:, None] * axis
-    return along + (vectors - along) * cosine + torch.linalg.cross(axis.expand_as(vectors), vectors) * sine

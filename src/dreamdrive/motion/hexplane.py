@@ -12,16 +12,20 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from dreamdrive.scene.compiled_hexplane import dense_network, plane_features, steepness
+from dreamdrive.device import in_core
+from dreamdrive.motion.compiled_hexplane import dense_network, plane_features, steepness
+from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 
 # Axes of the planes without time: xy, xz, yz; those with it are xt, yt, zt.
 _SPACE = ((0, 1), (0, 2), (1, 2))
+# Share of the Gaussians beyond each side of a fit's box: a few are at the far end of the street, and nodes
+# that reach out to them are missing nearby.
+OUTSIDE = 0.01
 
 
 @dataclass(frozen=True)
-class HexPlaneConfig:
+class HexPlaneConfig(MotionConfig):
     """Shape of a field and weights of its penalties; everything that is not learned or measured.
 
     Attributes:
@@ -97,6 +101,7 @@ class HexPlaneField(Motion):
     """
 
     kind = "hexplane"
+    config_type = HexPlaneConfig
     config: HexPlaneConfig
     low_m: Tensor
     high_m: Tensor
@@ -115,6 +120,26 @@ class HexPlaneField(Motion):
             torch.manual_seed(seed)
             self._build()
 
+    @classmethod
+    def start(cls, config: HexPlaneConfig, given: Start) -> tuple["HexPlaneField", Gaussians]:
+        """Planes over the box that holds nearly all Gaussians and over the time of the clip."""
+        given.refuse_tracks(cls.kind)
+        clip, means = given.clip, given.dynamic.means.numpy().astype(np.float64)
+        low, high = np.quantile(means, [OUTSIDE, 1 - OUTSIDE], axis=0)
+        bounds = Bounds(low, np.maximum(high, low + 1e-3), float(clip.times_s[0]), float(clip.times_s[-1]))
+        config = replace(config, times=max(2, len(clip) // 2), coefficients=given.dynamic.sh.shape[1])
+        return cls(config, bounds, given.seed), given.dynamic
+
+    @classmethod
+    def blank(cls, config: HexPlaneConfig) -> "HexPlaneField":
+        """One of this shape with any valid numbers in it."""
+        return cls(config, Bounds(np.zeros(3), np.ones(3), 0.0, 1.0))
+
+    def check(self, gaussians: Gaussians) -> None:
+        """Raise ``ValueError`` where they have another number of colour coefficients than the field."""
+        if gaussians.sh.shape[1] != self.config.coefficients:
+            raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
+
     def _build(self) -> None:
         c = self.config
         sizes = [c.resolution * 2**level for level in range(c.levels)]
@@ -126,7 +151,7 @@ class HexPlaneField(Motion):
 
     def features(self, means: Float[Tensor, "n 3"], t_s: float) -> Float[Tensor, "n f"]:
         """Features (N, features * levels) of canonical means in metres at a time."""
-        if _compiled(means):
+        if in_core(means):
             lines = [self._slice(time, t_s)[:, :, 0] for time in self.time]
             return plane_features(means, self.low_m, self.high_m, list(self.space), lines)
         place = 2 * (means.detach() - self.low_m) / (self.high_m - self.low_m) - 1
@@ -157,8 +182,7 @@ class HexPlaneField(Motion):
         """
         if len(gaussians) == 0:
             return gaussians
-        if gaussians.sh.shape[1] != self.config.coefficients:
-            raise ValueError(f"sh: {gaussians.sh.shape[1]} coefficients a channel for {self.config}")
+        self.check(gaussians)
         offsets = self._decoded(self.features(gaussians.means, t_s))
         by_mean, by_sh = offsets.split([3, offsets.shape[1] - 3], dim=1)
         return replace(
@@ -169,7 +193,7 @@ class HexPlaneField(Motion):
 
     def _decoded(self, features: Float[Tensor, "n f"]) -> Float[Tensor, "n o"]:
         """Offsets of mean and colour of N features, side by side."""
-        if not _compiled(features):
+        if not in_core(features):
             hidden = self.trunk(features)
             return torch.cat([self.head_mean(hidden), self.head_sh(hidden)], dim=1)
         (middle, middle_bias, mean, mean_bias), (other, other_bias, sh, sh_bias) = (
@@ -202,11 +226,6 @@ class HexPlaneField(Motion):
         return torch.stack(terms).sum()
 
 
-def _compiled(values: Tensor) -> bool:
-    """Whether the compiled core takes them; all else goes through plain torch."""
-    return values.dtype == torch.float32 and values.is_cpu
-
-
 def _head(width: int, outputs: int) -> nn.Sequential:
     last = nn.Linear(width, outputs)
     nn.init.zeros_(last.weight)
@@ -222,6 +241,6 @@ def _sample(planes: Float[Tensor, "3 c h w"], places: Float[Tensor, "3 n 2"]) ->
 
 def _steepness(planes: Float[Tensor, "3 c r r"], weight: float) -> Float[Tensor, ""]:
     """Weighted mean squares of the differences between neighbours along each axis."""
-    if _compiled(planes):
+    if in_core(planes):
         return steepness(planes, weight)
     return weight * (planes.diff(dim=2).square().mean() + planes.diff(dim=3).square().mean())

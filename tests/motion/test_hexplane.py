@@ -6,9 +6,9 @@ import torch
 from tests.scene.scenes import gaussians
 
 from dreamdrive import _native
-from dreamdrive.scene.compiled_hexplane import steepness
+from dreamdrive.motion import Bounds, HexPlaneConfig, HexPlaneField
+from dreamdrive.motion.compiled_hexplane import steepness
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.hexplane import Bounds, HexPlaneConfig, HexPlaneField
 from dreamdrive.splat import set_threads, threads
 
 BOUNDS = Bounds(np.array([-2.0, -1.0, 0.0]), np.array([2.0, 1.0, 10.0]), 1.0, 3.0)

@@ -9,10 +9,16 @@ import torch
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
-from dreamdrive.fit.motion import start_motion
-from dreamdrive.scene.deformation import DeformationConfig, Tracks
-from dreamdrive.scene.hexplane import HexPlaneConfig, HexPlaneField
-from dreamdrive.scene.vibration import Vibration, VibrationConfig
+from dreamdrive.motion import (
+    DeformationConfig,
+    HexPlaneConfig,
+    HexPlaneField,
+    Start,
+    Tracks,
+    Vibration,
+    VibrationConfig,
+    start_motion,
+)
 from dreamdrive.splat.scene_view import render_scene
 
 PLANES = HexPlaneConfig(width=32, features=8, resolution=32, levels=2)
@@ -95,7 +101,7 @@ def test_a_fit_depends_on_its_seed_alone(stages, config: Any) -> None:
 
 def test_planes_cover_nearly_all_gaussians_and_the_clip(stages) -> None:
     clip, geometry, start = stages
-    motion, dynamic = start_motion(clip, geometry, start.gaussians, None, PLANES, 0)
+    motion, dynamic = start_motion(PLANES, Start(clip, geometry, start.gaussians, None, 0))
     assert isinstance(motion, HexPlaneField)
     assert dynamic is start.gaussians
     inside = ((dynamic.means >= motion.low_m) & (dynamic.means <= motion.high_m)).float().mean(0)
@@ -108,7 +114,7 @@ def test_planes_cover_nearly_all_gaussians_and_the_clip(stages) -> None:
 def test_vibration_starts_at_rest_where_and_when_a_frame_saw_it(stages) -> None:
     clip, geometry, start = stages
     late = replace(clip, times_s=clip.times_s * 3)
-    motion, dynamic = start_motion(late, geometry, start.gaussians, None, VibrationConfig(), 0)
+    motion, dynamic = start_motion(VibrationConfig(), Start(late, geometry, start.gaussians, None, 0))
     assert isinstance(motion, Vibration)
     interval_s = float(late.times_s[1] - late.times_s[0])
     assert motion.config.cycle_s == pytest.approx(10 * interval_s)
@@ -121,4 +127,4 @@ def test_tracks_are_for_deformation_fields(stages) -> None:
     clip, geometry, start = stages
     tracks = Tracks(np.zeros(1), np.zeros((1, 1, 3)), np.zeros((1, 1)), np.zeros((1, 3)))
     with pytest.raises(ValueError, match="knows no tracks"):
-        start_motion(clip, geometry, start.gaussians, tracks, VibrationConfig(), 0)
+        start_motion(VibrationConfig(), Start(clip, geometry, start.gaussians, tracks, 0))
