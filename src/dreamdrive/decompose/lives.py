@@ -25,14 +25,9 @@ _WIDTH = (
 
 @dataclass(frozen=True)
 class Glimpse:
-    """What one training frame saw of an actor.
+    """What one training frame saw of an actor that is ``offset_m`` from its canonical place, in the world.
 
-    Attributes:
-        time_s: When.
-        camera: From where.
-        offset_m: How far the actor was from its canonical place (3,), in the world.
-        copies: Column, row and depth along z of the copies it left (M, 3).
-        depth_m: Depth of all that it saw (H, W); 0 where that is unknown.
+    It left copies (column, row, depth along z); ``depth_m`` is of all that it saw, 0 where that is unknown.
     """
 
     time_s: float

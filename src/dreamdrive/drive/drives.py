@@ -35,12 +35,7 @@ _log = logging.getLogger("dreamdrive")
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive to render.
-
-    Attributes:
-        name: What its results are called.
-        path: Its poses and times.
-    """
+    """A drive to render, and what its results are called."""
 
     name: str
     path: Trajectory
@@ -61,11 +56,7 @@ def check_numbers(shift_m: float, fps: float | None) -> None:
 def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | None) -> list[Drive]:
     """The drives that ``--trajectory`` names, each of which the scene has seen enough of.
 
-    Args:
-        scene: Where to drive.
-        wanted: Names of manoeuvres, which run at the smooth rate of ``generate``, or files.
-        shift_m: How far ``shift`` goes to the right.
-        fps: Rate to bring all of them to; without it a file keeps its own.
+    Manoeuvres run at the smooth rate of ``generate``; without a rate a file keeps its own.
 
     Raises:
         InputError: There is no such drive, two have one name, or the scene shows next to nothing along it.

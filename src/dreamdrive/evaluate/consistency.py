@@ -22,13 +22,7 @@ GAPS = (1, 4, 8)
 
 @dataclass(frozen=True)
 class GapFigures:
-    """What pairs of frames show that lie ``gap`` frames apart.
-
-    Attributes:
-        gap: Frames from one to the other.
-        epipolar: Matches near the epipolar lines of the poses; None where there are no poses or no such pair.
-        warp: Change of colour along the optical flow; None where there is no such pair.
-    """
+    """What pairs of frames show that lie ``gap`` frames apart; None without such a pair, or without poses."""
 
     gap: int
     epipolar: EpipolarShare | None

@@ -17,12 +17,7 @@ _MIN_BASELINE = 1e-3
 
 @dataclass(frozen=True)
 class EpipolarShare:
-    """Matches of all pairs of frames that lie a number of frames apart.
-
-    Attributes:
-        matches: Number of matches that were judged.
-        share: Share of them within 2 px of the epipolar line, in both frames; None without matches.
-    """
+    """Number of matches that were judged, and the share within 2 px of the epipolar line in both frames."""
 
     matches: int
     share: float | None

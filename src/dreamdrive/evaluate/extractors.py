@@ -32,14 +32,9 @@ Frames = UInt8[Tensor, "t h w 3"]
 
 @dataclass(frozen=True)
 class WeightFiles:
-    """Files of weights that the user has; figures without theirs are left out.
+    """Files of weights that the user has, see ``FILE`` of each network; figures without theirs are left out.
 
-    Attributes:
-        inception: Inception-v3 of FID (``inception.FILE``).
-        i3d: I3D of FVD (``i3d.FILE``).
-        lpips_trunk: VGG16 or AlexNet (``lpips.TRUNK_FILE``).
-        lpips_heads: The heads of LPIPS that belong to it (``lpips.HEADS_FILE``).
-        transnet: TransNetV2; without it that of the installed package.
+    Without TransNetV2's that of the installed package is taken.
     """
 
     inception: Path | None = None

@@ -23,10 +23,7 @@ _HEIGHT_M = 1.5
 class Recovered:
     """A path found in the frames, in an arbitrary unit.
 
-    Attributes:
-        world_from_camera: Poses (F, 4, 4).
-        camera: The pinhole at the clip's size; a focal length that was not calibrated is refined if it shows.
-        method: What found it.
+    The pinhole has the clip's size; a focal length that was not calibrated is refined if it shows.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"]

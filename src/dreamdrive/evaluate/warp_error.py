@@ -19,12 +19,7 @@ _STEPS_KEPT = 64  # more than two threads need at once; a long clip's flows woul
 
 @dataclass(frozen=True)
 class WarpError:
-    """Change of colour over a number of frames, all pairs together.
-
-    Attributes:
-        grey_levels: Mean absolute difference of colours, 0 to 255; None where no pixel could be followed.
-        share: Share of the pixels that could be followed there and back.
-    """
+    """Mean absolute change of colour, 0 to 255, over the share of the pixels that could be followed."""
 
     grey_levels: float | None
     share: float

@@ -30,12 +30,9 @@ SHIFT_M = 2.0
 
 @dataclass(frozen=True)
 class Scored:
-    """Gaussians of the static fit with their dynamic scores, for the panel that shows them.
+    """Gaussians of the static fit with their dynamic scores in [0, 1], for the panel that shows them.
 
-    Attributes:
-        gaussians: N Gaussians.
-        scores: Scores (N,) in [0, 1].
-        threshold: Score above which a Gaussian votes for moving (eq. 9).
+    Above the threshold a Gaussian votes for moving (eq. 9).
     """
 
     gaussians: Gaussians
@@ -137,7 +134,7 @@ def _beside(
     scene: Scene, recorded: UInt8[np.ndarray, "f h w 3"], lens: Lens | None
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     for frame, rendered in zip(recorded, drive_frames(scene, scene.trajectory, lens), strict=True):
-        yield panels.beside(frame, rendered)
+        yield panels.grid({"recorded": frame, "rendered": rendered})
 
 
 def _surround(scene: Scene, camera: Int[np.ndarray, " f"]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
@@ -166,12 +163,13 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
         score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near[frame])
-        yield panels.parts(
-            panels.to_bytes(still.numpy()),
-            panels.to_bytes(moving.numpy()),
-            panels.score_colours(score.numpy()),
-            panels.depth_colours(whole.depth_m.numpy()),
-        )
+        images = {
+            "static": panels.to_bytes(still.numpy()),
+            "dynamic": panels.to_bytes(moving.numpy()),
+            "score": panels.score_colours(score.numpy()),
+            "depth": panels.depth_colours(whole.depth_m.numpy()),
+        }
+        yield panels.grid(images)
 
 
 @torch.no_grad()

@@ -24,11 +24,7 @@ _MOST_TRIES = 400
 
 
 class Traffic:
-    """Boxes, each kept clear of all before it.
-
-    Attributes:
-        boxes: Those that found a place.
-    """
+    """Boxes that found a place, each kept clear of all before it."""
 
     def __init__(
         self, rng: np.random.Generator, net: RoadNet, ego: Ego, speed_m_s: float, seconds: float

@@ -53,13 +53,7 @@ class Mover:
 
 @dataclass(frozen=True)
 class Moment:
-    """A world at a time.
-
-    Attributes:
-        time_s: The time.
-        moving: The movers' triangles.
-        poses: ``map_from_part`` (P, 4, 4) of each part; triangles say which is theirs.
-    """
+    """A world at a time: its movers' triangles, whose owner is a part, and ``map_from_part`` of each part."""
 
     time_s: float
     moving: Solid

@@ -21,13 +21,10 @@ FIELD = (0.35, 3.5)
 
 @dataclass(frozen=True)
 class Settled:
-    """A model with its focal length settled.
+    """A model with its focal length calibrated, found from the clip (observed) or assumed.
 
-    Attributes:
-        model: The adjusted model.
-        observed: Whether the focal length is calibrated or was found from the clip.
-        ladder: Mean robust cost at each multiple of the prior that was tried, relative to the prior's.
-        note: What happened, in words, or None when nothing worth a word did.
+    The ladder is the mean robust cost at each multiple of the prior that was tried, relative to the prior's.
+    The note says what happened, or None when nothing worth a word did.
     """
 
     model: Model

@@ -26,14 +26,10 @@ STARTS = 6
 
 @dataclass(frozen=True)
 class Outcome:
-    """What structure from motion gave.
+    """What structure from motion gave: an accepted model, or why and in what kind there is none.
 
-    Attributes:
-        settled: The accepted model, or None.
-        reasons: Why there is none, in words.
-        notes: What else was noticed, a sentence each.
-        figures: Figures of the gate and the focal test, as JSON values.
-        refusal: The kind of those reasons; None with a model.
+    Notes are sentences on what else was noticed; figures those of the gate and the focal test, as JSON
+    values.
     """
 
     settled: Settled | None

@@ -24,12 +24,9 @@ MIN_CLEAR = 0.03
 
 @dataclass(frozen=True)
 class Odometry:
-    """A path without a map.
+    """Poses and steps in metres, the first pose the identity: a path without a map.
 
-    Attributes:
-        world_from_camera: Poses (F, 4, 4) in metres; the first is the identity.
-        step_m: Length of each step (F - 1,).
-        measured: Whether the lengths were read off the road; False when a constant speed was assumed.
+    The lengths were measured on the road, or else a constant speed was assumed.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"]

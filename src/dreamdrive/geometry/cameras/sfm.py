@@ -133,15 +133,11 @@ def adjust(
     free_radial: bool = False,
     drop_outliers: bool = True,
 ) -> Model:
-    """Robust bundle adjustment of a copy of the model.
+    """Robust bundle adjustment of a copy of the model, from another focal length if one is given.
 
-    Args:
-        model: Where to start from.
-        focal_px: Focal length to start from, one for both axes; None keeps the model's.
-        free_focal: Whether the focal length is adjusted.
-        free_radial: Whether a radial term k (x (1 + k r^2)) is adjusted.
-        drop_outliers: Adjust twice and drop poor observations after each; otherwise once, briefly, and keep
-            all, so that costs can be compared.
+    The focal length and a radial term k (x (1 + k r^2)) are adjusted where free. Dropping outliers adjusts
+    twice and drops poor observations after each; otherwise it is done once, briefly, and all are kept, so
+    that costs can be compared.
     """
     native = pycolmap.Reconstruction(model.native)
     lens = model.lens.copy()

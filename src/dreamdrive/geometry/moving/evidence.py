@@ -47,10 +47,11 @@ def moving_evidence(
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
 
     verdicts = by_frame(view, judged)
-    likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
+    likely = {f: _beyond(v, _EXCESS_PX, _GAIN).astype(np.float32) for f, v in verdicts.items()}
 
     def decided(frame: int) -> np.ndarray:
-        return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
+        sure = _beyond(verdicts[frame], _SURE_EXCESS_PX, _SURE_GAIN)
+        return decide(_vote(likely, frame, flows[frame]), sure, view.usable[frame])
 
     found = by_frame(view, decided)
     coming: dict[int, np.ndarray] = {}
@@ -91,13 +92,8 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
     return evidence
 
 
-def _likely(verdict: contest.Verdict) -> Float[np.ndarray, "h w"]:
-    beyond = (verdict.excess_px > _EXCESS_PX) & (verdict.gain > _GAIN)
-    return (beyond | verdict.off_line).astype(np.float32)
-
-
-def _sure(verdict: contest.Verdict) -> Bool[np.ndarray, "h w"]:
-    return ((verdict.excess_px > _SURE_EXCESS_PX) & (verdict.gain > _SURE_GAIN)) | verdict.off_line
+def _beyond(verdict: contest.Verdict, excess_px: float, gain: float) -> Bool[np.ndarray, "h w"]:
+    return ((verdict.excess_px > excess_px) & (verdict.gain > gain)) | verdict.off_line
 
 
 def _vote(
