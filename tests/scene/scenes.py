@@ -21,7 +21,7 @@ from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.sky import Sky
 
 
@@ -62,7 +62,7 @@ def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
         cameras=tuple(Camera(50.0, 51.0, 16.5, 12.0, 33, 24) for _ in range(3)),
         times_s=np.array([0.0, 0.1, 0.2]) + 1 / 3,
         held_out=np.array([False, True, False]),
-        provenance={"seed": 1, "per_frame": {10: "a", 2: "b"}},
+        provenance=Provenance(input="a.mp4", up=(0.0, -1.0, 0.0)),
     )
 
 

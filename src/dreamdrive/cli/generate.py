@@ -74,11 +74,11 @@ def generate(
     """Make a 4D scene and its videos from a recording or a layout.
 
     Args:
-        input: A video, a folder of images or of several cameras (docs/surround.md), a layout as JSON, or a
-            photo for a video model; --prior street-world needs none.
+        input: A video, a folder of images or of several cameras (docs/guides/surround.md), a layout as JSON,
+            or a photo for a video model; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
-            others are video models, see docs/priors.md. Without it the input decides.
+            others are video models, see docs/guides/priors.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
@@ -92,7 +92,8 @@ def generate(
         intrinsics: Calibration of the camera: JSON for the size of the input, COLMAP model, transforms.json.
         poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
         geometry_files: Known cameras, poses and depth, a file or its folder: COLMAP model, nerfstudio's
-            transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see docs/geometry_files.md.
+            transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see
+            docs/guides/geometry_files.md.
         refine_poses: Let given poses tell only how long the path is, and the frames how it runs: for poses of
             a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.

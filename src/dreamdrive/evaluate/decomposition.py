@@ -39,7 +39,7 @@ class FakeMotion:
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Figures of one scene; see docs/decomposition.md for what they tell.
+    """Figures of one scene; see docs/reference/evaluate_decomposition.md for what they tell.
 
     Attributes:
         frames: Number of frames.

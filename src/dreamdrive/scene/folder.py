@@ -24,7 +24,7 @@ from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
+from dreamdrive.scene.stored_index import MAX_PIXELS, StoredIndex, increasing
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -55,7 +55,7 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
         "format": FORMAT,
         "version": _version(scene),
         "conventions": CONVENTIONS,
-        "provenance": scene.provenance,
+        "provenance": asdict(scene.provenance),
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
         "parts": {name: hashlib.sha256(data).hexdigest() for name, data in parts.items()},
         **_values(scene),
@@ -79,7 +79,6 @@ def load_scene(path: Path) -> Scene:
     """
     index = _read_index(path)
     stored = of_type(index, StoredIndex, str(path / _INDEX))
-    of_type(stored.provenance, About, f"{path / _INDEX}: provenance")
     parts = {name: _read_part(path, name, digest) for name, digest in stored.parts.items()}
 
     def part(name: str) -> dict[str, Tensor] | None:
@@ -240,7 +239,7 @@ def _check(scene: Scene) -> None:
             raise ValueError(f"Gaussians lie more than {FARTHEST_M:g} m away")
     if scene.deformation is not None and len(scene.dynamic):
         scene.deformation.check(scene.dynamic)
-    source, up = scene.provenance.get("source_index"), scene.provenance.get("up")
+    source, up = scene.provenance.source_index, scene.provenance.up
     if source is not None and len(source) != count:
         raise ValueError(f"source_index names {len(source)} frames of {count}")
     if up is not None and abs(float(np.linalg.norm(up)) - 1) > 1e-3:

@@ -42,6 +42,25 @@ class SceneMotion(Protocol):
 
 
 @dataclass(frozen=True)
+class Provenance:
+    """What a scene was made from; each may be unknown.
+
+    Attributes:
+        input: Name of the recording.
+        source_index: Index of each view in it, in file or decode order.
+        lens: Distortion of its camera, as ``data.lens.Lens`` writes it.
+        up: Unit vector away from the road, in the world.
+        scale: What metres rest on, in words.
+    """
+
+    input: str | None = None
+    source_index: tuple[int, ...] | None = None
+    lens: dict[str, Any] | None = None
+    up: tuple[float, float, float] | None = None
+    scale: str | None = None
+
+
+@dataclass(frozen=True)
 class Scene:
     """Static and dynamic Gaussians with everything needed to render any view at any time.
 
@@ -57,7 +76,7 @@ class Scene:
         cameras: The recorded views (F,).
         times_s: Their times (F,).
         held_out: Which of them no fit has seen (F,).
-        provenance: What the scene was made from, as JSON values.
+        provenance: What the scene was made from.
         camera: Which camera of a rig each view is of (F,), the first one's being the drive; None where there
             is one camera only.
     """
@@ -71,7 +90,7 @@ class Scene:
     cameras: tuple[Camera, ...]
     times_s: Float[np.ndarray, " f"]
     held_out: Bool[np.ndarray, " f"]
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: Provenance = field(default_factory=Provenance)
     camera: Int[np.ndarray, " f"] | None = None
 
     def __post_init__(self) -> None:
