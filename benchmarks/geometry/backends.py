@@ -102,7 +102,7 @@ class BackendRun(Measurement):
         figures = evaluate_geometry(estimate, truth_of(given.truth, estimate))
         size = f"{clip.size[0]}x{clip.size[1]}"
         told = {"size": size, "calibrated": attached.known.intrinsics, "seconds": seconds}
-        return {**told, **figures.to_json()}
+        return {**told, **asdict(figures)}
 
     def _recorded(self) -> "_Given":
         how = RECORDINGS[self.clip]

@@ -90,7 +90,7 @@ def test_short_drives_turn_and_change_lanes_only_as_far_as_a_car_can(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     drive = recorded(2.0)
-    path = m.lane_left(drive, UP)
+    path = m.manoeuvre("lane-left", drive, UP)
     assert 0.1 < -path.positions_m[-1, 0] < 0.6
     assert heading_error_rad(path) < np.deg2rad(0.6)
     turned = m.turn_left(drive, UP).world_from_camera[-1, :3, 2]

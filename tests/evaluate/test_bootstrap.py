@@ -1,12 +1,13 @@
 """Floors, intervals and ratios of distances between sets of clips."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pytest
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.bootstrap import frechet_with_interval, mean_with_interval
+from dreamdrive.evaluate.bootstrap import distance_with_interval, mean_with_interval
 from dreamdrive.evaluate.frechet import frechet_distance
 
 Clips = Sequence[np.ndarray]
@@ -25,7 +26,7 @@ def disturbed(clips: Clips, amount: float, seed: int = 0) -> list[np.ndarray]:
 
 def test_the_value_is_the_plain_distance_and_inside_its_interval() -> None:
     real, fake = places(0), places(1, clips=9)
-    figure = frechet_with_interval(real, fake, covariance="population")
+    figure = distance_with_interval(real, fake, partial(frechet_distance, covariance="population"))
     assert figure.value == frechet_distance(np.concatenate(real), np.concatenate(fake), "population")
     assert figure.low is not None
     assert figure.high is not None
@@ -36,16 +37,18 @@ def test_the_value_is_the_plain_distance_and_inside_its_interval() -> None:
 
 def test_one_seed_gives_one_figure() -> None:
     real, fake = places(0), places(1)
-    first, again = (frechet_with_interval(real, fake, resamples=20, seed=3) for _ in range(2))
+    first, again = (
+        distance_with_interval(real, fake, frechet_distance, resamples=20, seed=3) for _ in range(2)
+    )
     assert first == again
-    assert first.low != frechet_with_interval(real, fake, resamples=20, seed=4).low
+    assert first.low != distance_with_interval(real, fake, frechet_distance, resamples=20, seed=4).low
 
 
 def test_the_interval_is_as_wide_as_the_scatter_over_other_clips() -> None:
     values = [
         frechet_distance(np.concatenate(places(2 * i)), np.concatenate(places(2 * i + 1))) for i in range(60)
     ]
-    figures = [frechet_with_interval(places(2 * i), places(2 * i + 1)) for i in range(5)]
+    figures = [distance_with_interval(places(2 * i), places(2 * i + 1), frechet_distance) for i in range(5)]
     widths = [f.high - f.low for f in figures if f.high is not None and f.low is not None]
     assert 0.5 < np.mean(widths) / (np.quantile(values, 0.975) - np.quantile(values, 0.025)) < 2
 
@@ -53,15 +56,15 @@ def test_the_interval_is_as_wide_as_the_scatter_over_other_clips() -> None:
 def test_pairs_are_known_better_than_strangers() -> None:
     real = places(0)
     fake = disturbed(real, 0.2)
-    paired = frechet_with_interval(real, fake, paired=True)
-    alone = frechet_with_interval(real, fake)
+    paired = distance_with_interval(real, fake, frechet_distance, paired=True)
+    alone = distance_with_interval(real, fake, frechet_distance)
     assert paired.value == alone.value
     assert paired.high - paired.low < 0.5 * (alone.high - alone.low)  # type: ignore[operator]
 
 
 def test_the_floor_is_what_a_perfect_set_gets() -> None:
     pool = np.random.default_rng(0).normal(size=(400, 8))
-    figure = frechet_with_interval([pool[:200]], [pool[200:]])
+    figure = distance_with_interval([pool[:200]], [pool[200:]], frechet_distance)
     assert figure.half == pytest.approx(figure.floor, rel=0.25)
     assert figure.value < figure.floor  # more samples, less distance
     assert (figure.low, figure.high) == (None, None)
@@ -69,13 +72,13 @@ def test_the_floor_is_what_a_perfect_set_gets() -> None:
 
 def test_sets_too_small_for_a_floor() -> None:
     with pytest.raises(InputError, match="a set has 3 samples"):
-        frechet_with_interval([np.eye(5)], [np.eye(3, 5)])
+        distance_with_interval([np.eye(5)], [np.eye(3, 5)], frechet_distance)
 
 
 def test_sets_that_do_not_pair() -> None:
     real = places(0)
     with pytest.raises(InputError, match="got 12 real and 11 fake"):
-        frechet_with_interval(real, real[:11], paired=True)
+        distance_with_interval(real, real[:11], frechet_distance, paired=True)
 
 
 def test_a_mean_is_over_frames_and_its_interval_over_clips() -> None:

@@ -1,6 +1,7 @@
 """A true video scores better than a corrupted one, and a wrong path is measured at its size."""
 
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -109,7 +110,7 @@ def test_few_frames_leave_out_what_they_cannot_show(street: Drive) -> None:
     assert [gap.warp is None for gap in found.gaps] == [False, True, True]
     assert [gap.epipolar is None for gap in found.gaps] == [False, True, True]
     assert "3 frames are too few for pairs 4 and 8 frames apart." in found.notes
-    text = json.dumps(found.to_json(), allow_nan=False)
+    text = json.dumps(asdict(found), allow_nan=False)
     assert json.loads(text)["gaps"][2] == {"gap": 8, "epipolar": None, "warp": None}
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -100,7 +100,7 @@ def test_the_truth_is_right(figures: Decomposition) -> None:
     assert figures.actors.found == figures.actors.boxes
     assert figures.actors.offset_median_m < 0.3  # type: ignore[operator]
     assert figures.actors.displacement_90_m < 0.3  # type: ignore[operator]
-    assert json.loads(json.dumps(figures.to_json(), allow_nan=False))["labels"]["iou"] == figures.labels.iou
+    assert json.loads(json.dumps(asdict(figures), allow_nan=False))["labels"]["iou"] == figures.labels.iou
 
 
 def test_labels_the_wrong_way_round_are_wrong(

@@ -1,4 +1,6 @@
-"""Numbers of other shapes in the format of the golden ones: ``PYTHONPATH=benchmarks python -m tests.golden.make TO --seed 1``.
+"""Numbers of other shapes in the format of the golden ones.
+
+``PYTHONPATH=benchmarks python -m tests.golden.make TO --seed 1`` writes them.
 
 They are made by the code that is tested, so they prove nothing of it. They prove that the tests take all
 sizes from the files: each seed has other heads, widths, depths, clips, frames, steps, cameras and pictures.

@@ -17,7 +17,7 @@ from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_se
 from dreamdrive.prior.magicdrive.embed import MapEncoder, fourier
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet
 from dreamdrive.prior.magicdrive.sample import Conditions, sample, unipc
-from dreamdrive.world.world import upright
+from dreamdrive.world.mesh import upright
 
 SCHEDULER = {"num_train_timesteps": 1000, "beta_start": 0.00085, "beta_end": 0.012}
 Networks = tuple[Any, BevControlNet]

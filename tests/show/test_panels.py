@@ -9,7 +9,7 @@ def image(value: int) -> np.ndarray:
 
 
 def test_beside_keeps_both_pictures_apart_from_the_labels() -> None:
-    both = panels.beside(image(10), image(200))
+    both = panels.grid({"recorded": image(10), "rendered": image(200)})
     assert both.shape == (90, 320, 3)
     assert (both[40:, :160] == 10).all()
     assert (both[40:, 160:] == 200).all()
@@ -17,7 +17,7 @@ def test_beside_keeps_both_pictures_apart_from_the_labels() -> None:
 
 
 def test_parts_and_grid_fill_rows_and_leave_the_rest_black() -> None:
-    assert panels.parts(*(image(v) for v in (1, 2, 3, 4))).shape == (180, 320, 3)
+    assert panels.grid({name: image(value) for value, name in enumerate("abcd", 1)}).shape == (180, 320, 3)
     three = panels.grid({"a": image(9), "b": image(9), "c": image(9)}, columns=2)
     assert (three[90:, 160:] == 0).all()
 

@@ -13,7 +13,7 @@ from embreex.rtcore import EmbreeDevice
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dreamdrive.world.mesh import Mesh, ball, box, cylinder, frustum, place
+from dreamdrive.world.mesh import Mesh, ball, box, cylinder, frustum, upright
 from dreamdrive.world.solid import Solid
 
 DEVICE = EmbreeDevice()
@@ -78,7 +78,7 @@ def test_texture_places_follow_the_triangle() -> None:
 
 
 def test_what_lies_between_hides_the_sun() -> None:
-    made = solid(box((0, 0, 5), (1, 1, 1), 0).moved(place((1, 0))))
+    made = solid(box((0, 0, 5), (1, 1, 1), 0).moved(upright((1, 0, 0))))
     points = np.array([[1.0, 0, 0], [3, 0, 0]], dtype=np.float32)
     assert made.hidden(points, np.array([0.0, 0, 1])).tolist() == [True, False]
 

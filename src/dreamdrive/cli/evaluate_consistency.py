@@ -1,5 +1,6 @@
 """``dreamdrive evaluate consistency``: whether a video keeps to its path and shows one and the same world."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,7 +48,7 @@ def consistency(
     for note in figures.notes:
         console.print(note, soft_wrap=True, highlight=False)
     if json is not None:
-        write_json(json, figures.to_json())
+        write_json(json, asdict(figures))
         console.print(f"{json}", soft_wrap=True)
 
 

@@ -1,5 +1,6 @@
 """``dreamdrive evaluate decomposition``: how well a scene tells what moves, against the world it is of."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +40,7 @@ def decomposition(
     title = f"{figures.frames} frames, {figures.width_px} px wide"
     print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     if json is not None:
-        write_json(json, figures.to_json())
+        write_json(json, asdict(figures))
         console.print(f"{json}", soft_wrap=True)
 
 

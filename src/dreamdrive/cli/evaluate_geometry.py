@@ -1,5 +1,6 @@
 """``dreamdrive evaluate geometry``: how good cameras and depth are, against known poses and depth."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,7 +45,7 @@ def geometry(
     for note in (*missing, *figures.notes):
         console.print(note, soft_wrap=True, highlight=False)
     if json is not None:
-        write_json(json, {**figures.to_json(), "notes": [*missing, *figures.notes]})
+        write_json(json, {**asdict(figures), "notes": [*missing, *figures.notes]})
         console.print(f"{json}", soft_wrap=True)
     if picture is not None:
         median = figures.depth and figures.depth.median_scale

@@ -6,7 +6,9 @@ spans let the copies nearest in time speak loudest, see ``lives``.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any
 
 import cv2
@@ -88,14 +90,9 @@ def cast(
     grouping: Grouping,
     options: ActorOptions | None = None,
 ) -> Cast:
-    """Track every dynamic cluster and merge its copies.
+    """Track every dynamic cluster and merge its copies, each where its source frame saw it.
 
-    Args:
-        clip: Frames and times; held-out frames are not read.
-        geometry: Cameras.
-        gaussians: As seeded: each dynamic one lies where its source frame saw it.
-        grouping: Labels and clusters.
-        options: Constants.
+    Held-out frames are not read.
     """
     options = options or ActorOptions()
     index = np.flatnonzero(grouping.dynamic.numpy())
@@ -109,28 +106,15 @@ def cast(
     pixels = source_pixels(geometry, gaussians, index)
     cluster = grouping.cluster.numpy()[index]
     frames = chosen.source_frame.numpy()
-    flows = _Flows(clip)
+    flows = cache(partial(neighbour_flow, clip))
     paths = [
         _path(flows, pixels, frames, np.flatnonzero(cluster == c), options) for c in range(cluster.max() + 1)
     ]
     return _merge(clip, geometry, chosen, pixels, cluster, paths, options)
 
 
-class _Flows:
-    """Flow between training frames, computed once a pair."""
-
-    def __init__(self, clip: Clip) -> None:
-        self._clip = clip
-        self._cache: dict[tuple[int, int], np.ndarray] = {}
-
-    def between(self, frame: int, other: int) -> Float[np.ndarray, "h w 2"]:
-        if (frame, other) not in self._cache:
-            self._cache[frame, other] = neighbour_flow(self._clip, frame, other)
-        return self._cache[frame, other]
-
-
 def _path(
-    flows: _Flows,
+    flow_to: Callable[[int, int], Float[np.ndarray, "h w 2"]],
     pixels: Float[np.ndarray, "m 3"],
     frames: Int[np.ndarray, " m"],
     rows: Int[np.ndarray, " k"],
@@ -149,7 +133,7 @@ def _path(
     log_ratio, trust = np.zeros(max(len(seen) - 1, 0)), np.zeros(max(len(seen) - 1, 0))
     for k in range(len(seen) - 1):
         members = rows[frames[rows] == seen[k]]
-        flow = flows.between(int(seen[k]), int(seen[k + 1]))
+        flow = flow_to(int(seen[k]), int(seen[k + 1]))
         similarity = _similarity(flow, pixels[members, :2], options)
         if similarity is None:
             continue

@@ -31,7 +31,7 @@ def density_labels(
     chosen = values[::step]
     if len(chosen) < 2 * smallest:
         return np.full(len(values), -1, dtype=np.int64)
-    labels = HDBSCAN(min_cluster_size=max(2, smallest // step)).fit_predict(chosen)
+    labels = HDBSCAN(min_cluster_size=max(2, smallest // step), copy=True).fit_predict(chosen)  # pyright: ignore[reportArgumentType]
     nearest = KDTree(chosen).query(values)[1]
     return labels[nearest].astype(np.int64)
 

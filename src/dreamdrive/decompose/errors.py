@@ -16,14 +16,9 @@ from dreamdrive.splat import one_torch_thread, render
 def error_maps(
     clip: Clip, geometry: Geometry, gaussians: Gaussians, sky: Sky, exposure: Exposure
 ) -> Float[np.ndarray, "f h w"]:
-    """|I_static - I_ref| (eq. 6), mean over colour, in [0, 1].
+    """|I_static - I_ref| (eq. 6), mean over colour, in [0, 1], of the static fit (eq. 5).
 
-    Args:
-        clip: The references; held-out frames get 0 and are not read.
-        geometry: Cameras; pixels that are invalid or fixed to the camera get 0.
-        gaussians: The static fit (eq. 5).
-        sky: Its background.
-        exposure: Its colour over time.
+    Held-out frames get 0 and are not read; so do pixels that are invalid or fixed to the camera.
     """
     errors = np.zeros(clip.frames.shape[:3], dtype=np.float32)
     for i in np.flatnonzero(~clip.held_out).tolist():

@@ -90,14 +90,8 @@ def group(
     """Cluster in space and time, then let the majority of each cluster decide for all of it.
 
     Within one source frame neighbours in the image at like depth belong together; from frame to frame optical
-    flow carries labels on, so that a thing keeps its cluster while it moves.
-
-    Args:
-        clip: Frames for the flow; held-out frames are not read.
-        geometry: Cameras.
-        gaussians: As seeded, with the frame each came from.
-        scores: Dynamic scores (N,) in [0, 1].
-        options: Constants.
+    flow carries labels on, so that a thing keeps its cluster while it moves. Held-out frames are not read;
+    scores are in [0, 1].
     """
     value = scores.detach().numpy()
     votes = value > options.threshold

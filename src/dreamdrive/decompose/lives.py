@@ -25,14 +25,9 @@ _WIDTH = (
 
 @dataclass(frozen=True)
 class Glimpse:
-    """What one training frame saw of an actor.
+    """What one training frame saw of an actor that is ``offset_m`` from its canonical place, in the world.
 
-    Attributes:
-        time_s: When.
-        camera: From where.
-        offset_m: How far the actor was from its canonical place (3,), in the world.
-        copies: Column, row and depth along z of the copies it left (M, 3).
-        depth_m: Depth of all that it saw (H, W); 0 where that is unknown.
+    It left copies (column, row, depth along z); ``depth_m`` is of all that it saw, 0 where that is unknown.
     """
 
     time_s: float
@@ -49,14 +44,10 @@ def lives(
     span_s: tuple[float, float],
     deviation_s: float,
 ) -> Float[np.ndarray, "n 2"]:
-    """Centre and standard deviation of each copy's life in seconds (N, 2).
+    """Centre and standard deviation of each copy's life in seconds, by its canonical place in the world.
 
-    Args:
-        places: Canonical places in the world.
-        source: Which of the glimpses each copy is from.
-        glimpses: In the order of time.
-        span_s: First and last time of the clip.
-        deviation_s: Standard deviation of the life of a copy that its neighbours in time replace.
+    ``source`` tells which of the glimpses, in the order of time, each copy is from; ``span_s`` is the clip's;
+    ``deviation_s`` that of a copy that its neighbours in time replace.
     """
     unseen = np.stack([_unseen(places, glimpse) for glimpse in glimpses])
     times = np.array([glimpse.time_s for glimpse in glimpses])

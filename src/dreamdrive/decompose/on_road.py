@@ -11,17 +11,12 @@ def on_road(
     labels: Int[np.ndarray, " m"],
     low: Bool[np.ndarray, " m"],
 ) -> Bool[np.ndarray, " m"]:
-    """Which points (M,) are road, though they are in a cluster with things that move.
+    """Which points are road, though they are in a cluster with things that move.
 
-    A shadow moves with its car, but what carries it is the road. A low point is road unless it lies within
-    the outline, the convex hull in the image, of the high points of its cluster and frame: there it is a pane
-    or a door whose depth was taken for that of the road seen through or before it.
-
-    Args:
-        pixels: Column and row in the frame a point was seen in.
-        frames: That frame.
-        labels: Cluster of each point, from 0.
-        low: Points in the plane of the road.
+    A shadow moves with its car, but what carries it is the road. A low point, in the plane of the road, is
+    road unless it lies within the outline, the convex hull in the image, of the high points of its cluster
+    and frame: there it is a pane or a door whose depth was taken for that of the road seen through or before
+    it. Pixels are column and row in the frame a point was seen in.
     """
     road = low.copy()
     order = np.lexsort((frames, labels))

@@ -89,17 +89,9 @@ def score(
 ) -> Float[Tensor, " n"]:
     """Train F_score by binary cross-entropy between its splatted scores and the targets (eq. 8).
 
-    Args:
-        clip: Which frames may be seen.
-        geometry: Cameras and moving evidence.
-        gaussians: The seeds G_init, with features.
-        errors: Error maps of the static fit (eq. 6).
-        options: Constants.
-        seed: Initial weights and order of the frames.
-        progress: Called with steps done and steps in all.
-
-    Returns:
-        Scores in (0, 1); eq. 9 compares them with an absolute threshold, ``GroupOptions.threshold``.
+    The Gaussians are the seeds G_init, with features, the errors those of the static fit (eq. 6). Scores are
+    in (0, 1); eq. 9 compares them with an absolute threshold, ``GroupOptions.threshold``. ``progress`` is
+    called with steps done and steps in all.
     """
     if gaussians.features is None:
         raise ValueError("score: the Gaussians carry no features")

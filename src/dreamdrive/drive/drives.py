@@ -35,12 +35,7 @@ _log = logging.getLogger("dreamdrive")
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive to render.
-
-    Attributes:
-        name: What its results are called.
-        path: Its poses and times.
-    """
+    """A drive to render, and what its results are called."""
 
     name: str
     path: Trajectory
@@ -61,11 +56,7 @@ def check_numbers(shift_m: float, fps: float | None) -> None:
 def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | None) -> list[Drive]:
     """The drives that ``--trajectory`` names, each of which the scene has seen enough of.
 
-    Args:
-        scene: Where to drive.
-        wanted: Names of manoeuvres, which run at the smooth rate of ``generate``, or files.
-        shift_m: How far ``shift`` goes to the right.
-        fps: Rate to bring all of them to; without it a file keeps its own.
+    Manoeuvres run at the smooth rate of ``generate``; without a rate a file keeps its own.
 
     Raises:
         InputError: There is no such drive, two have one name, or the scene shows next to nothing along it.
@@ -128,18 +119,11 @@ def distance_m(path: Trajectory, recorded: Trajectory) -> float:
 
 
 def share_seen(scene: Scene, path: Trajectory) -> float:
-    """How much of the scene another drive sees, over what the recorded one sees.
+    """How much of the scene another drive sees, over what the recorded one sees; 0 where nothing is near.
 
     Small pictures are spread evenly over both drives. A pixel counts as far as Gaussians cover it, and beyond
     the median depth of the recorded views by the square of that depth over its own: hills far away and the
     sky's panorama look the same from anywhere.
-
-    Args:
-        scene: What to see.
-        path: The other drive.
-
-    Returns:
-        0 where nothing of the scene is near, 1 where as much is as on the recorded drive.
     """
     recorded, other = _probed(scene, scene.trajectory), _probed(scene, path)
     depths_m = recorded[0][recorded[0] > 0]

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -49,17 +50,10 @@ def turn_left(recorded: Trajectory, up: Up, angle_rad: float = TURN_RAD) -> Traj
     """Steer away to the left by ``angle_rad`` over the drive, at the recorded speed."""
     largest = recorded.length_m / TIGHTEST_M
     if abs(angle_rad) > largest:
-        _log.warning(
-            "the drive is %.1f m long and turns by %.0f of the wanted %.0f degrees",
-            *(recorded.length_m, np.rad2deg(largest), np.rad2deg(abs(angle_rad))),
-        )
+        short = "the drive is %.1f m long and turns by %.0f of the wanted %.0f degrees"
+        _log.warning(short, recorded.length_m, np.rad2deg(largest), np.rad2deg(abs(angle_rad)))
         angle_rad = float(np.clip(angle_rad, -largest, largest))
     return _steered(recorded, up, angle_rad * _smoothstep(_distance_share(recorded)))
-
-
-def turn_right(recorded: Trajectory, up: Up, angle_rad: float = TURN_RAD) -> Trajectory:
-    """Steer away to the right by ``angle_rad`` over the drive, at the recorded speed."""
-    return turn_left(recorded, up, -angle_rad)
 
 
 def shift(recorded: Trajectory, up: Up, right_m: float = 2.0) -> Trajectory:
@@ -75,12 +69,8 @@ def lane_right(recorded: Trajectory, up: Up, right_m: float = LANE_M) -> Traject
     # The steepest slope of smoothstep is 1.5.
     largest = float(np.tan(STEEPEST_RAD)) * change_m / 1.5
     if abs(right_m) > largest:
-        _log.warning(
-            "the drive is %.1f m long and moves %.1f of the wanted %.1f m",
-            recorded.length_m,
-            largest,
-            abs(right_m),
-        )
+        short = "the drive is %.1f m long and moves %.1f of the wanted %.1f m"
+        _log.warning(short, recorded.length_m, largest, abs(right_m))
         right_m = float(np.clip(right_m, -largest, largest))
     if change_m == 0:
         return recorded
@@ -93,17 +83,12 @@ def lane_right(recorded: Trajectory, up: Up, right_m: float = LANE_M) -> Traject
     return Trajectory(poses, recorded.times_s)
 
 
-def lane_left(recorded: Trajectory, up: Up, left_m: float = LANE_M) -> Trajectory:
-    """Change to the lane ``left_m`` to the left; the heading follows the path."""
-    return lane_right(recorded, up, -left_m)
-
-
 MANOEUVRES: dict[str, Callable[[Trajectory, Up], Trajectory]] = {
     "forward": forward,
     "left": turn_left,
-    "right": turn_right,
+    "right": partial(turn_left, angle_rad=-TURN_RAD),
     "stop": stop,
-    "lane-left": lane_left,
+    "lane-left": partial(lane_right, right_m=-LANE_M),
     "lane-right": lane_right,
     "shift": shift,
 }
@@ -111,13 +96,7 @@ MANOEUVRES: dict[str, Callable[[Trajectory, Up], Trajectory]] = {
 
 
 def manoeuvre(name: str, recorded: Trajectory, up: Up, shift_m: float = 2.0) -> Trajectory:
-    """The drive of a name in :data:`MANOEUVRES`.
-
-    Args:
-        name: One of the names.
-        recorded: The recorded drive.
-        up: Unit vector (3,) away from the ground, in the world.
-        shift_m: How far ``shift`` goes to the right.
+    """The drive of a name in :data:`MANOEUVRES`; ``up`` points away from the ground, in the world.
 
     Raises:
         InputError: There is no such manoeuvre.

@@ -58,19 +58,10 @@ def offset_m(
     the true place that of the true surface in the picture. So it matters little which side can be seen. On
     each axis the outer tenths are left out. A moving one's Gaussians are the dynamic ones that fill its
     pixels, or those within a metre beside it, more than others: one that is shown beside its true place, too,
-    is found. What stands has no Gaussians of its own; its are all that fill its pixels more than others.
+    is found. What stands has no Gaussians of its own; its are all that fill its pixels more than others. None
+    where it fills too little of the picture, or less than half of it is shown.
 
-    Args:
-        scene: The scene.
-        camera: Its camera in this frame, at the size of the truth.
-        truth: What is known of the frames.
-        frame: Which of them.
-        instance: Label of the road user.
-        truth_from_scene: Brings the scene onto the truth.
-        moving: Whether it is looked for among the dynamic Gaussians alone.
-
-    Returns:
-        The offset (3,), or None where it fills too little of the picture, or less than half of it is shown.
+    The camera is that of the frame at the size of the truth.
     """
     found = _fills(scene, camera, truth, frame, instance, moving=moving)
     if found is None:
@@ -144,11 +135,7 @@ def actor_error(
 ) -> ActorError:
     """Compare the way of each moving road user with the way of the dynamic Gaussians that show it.
 
-    Args:
-        scene: The scene.
-        views: Its cameras (F,) at the size of the truth.
-        truth: The same frames.
-        truth_from_scene: Brings the scene onto the truth.
+    The views are the scene's cameras at the size of the truth.
     """
     boxes = found = 0
     offsets: list[np.ndarray] = []

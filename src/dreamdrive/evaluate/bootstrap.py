@@ -2,14 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.choices import Covariance
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.frechet import frechet_distance
 
 SPLITS = 10
 """Random halvings that a floor is the mean of."""
@@ -53,20 +50,6 @@ class DistanceFigure:
     fake_clips: int
 
 
-def frechet_with_interval(
-    real: Features,
-    fake: Features,
-    *,
-    covariance: Covariance = "sample",
-    paired: bool = False,
-    seed: int = 0,
-    resamples: int = RESAMPLES,
-) -> DistanceFigure:
-    """Fréchet distance of two sets of clips with floor and interval; see ``distance_with_interval``."""
-    distance = partial(frechet_distance, covariance=covariance)
-    return distance_with_interval(real, fake, distance, paired=paired, seed=seed, resamples=resamples)
-
-
 def distance_with_interval(
     real: Features,
     fake: Features,
@@ -76,25 +59,21 @@ def distance_with_interval(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> DistanceFigure:
-    """A distance of two sets of clips with its floor and its interval.
+    """A distance of the features of two sets of clips with its floor and its interval.
 
     Clips are drawn with replacement, because the frames of one clip are not independent. Duplicates raise a
     distance: the quantiles are therefore shifted by what the resamples exceed the value by on average, and
-    the interval tells how much the value would scatter for other clips, of the same number.
-
-    Args:
-        real: Features (samples, d) of each real clip.
-        fake: The same of each fake clip.
-        distance: Of two arrays of features.
-        paired: Clip i of both sets shows the same place: they are drawn together.
-        seed: Of halves and resamples.
-        resamples: How many; 0 leaves the interval out.
+    the interval tells how much the value would scatter for other clips, of the same number. Clip i of paired
+    sets shows the same place: they are drawn together. Without resamples there is no interval.
 
     Raises:
         InputError: Too few samples, or paired sets of different length.
     """
-    if paired:
-        _check_paired(real, fake)
+    if paired and len(real) != len(fake):
+        raise InputError(
+            f"paired sets need the same clips, got {len(real)} real and {len(fake)} fake ones; give both the "
+            "same, or compare them unpaired"
+        )
     rng = np.random.default_rng(seed)
     all_real, all_fake = np.concatenate(real), np.concatenate(fake)
     value = distance(all_real, all_fake)
@@ -102,7 +81,7 @@ def distance_with_interval(
 
     def resampled(chosen: Int[np.ndarray, " c"]) -> float:
         other = chosen if paired else rng.integers(0, len(fake), len(fake))
-        return distance(_gathered(real, chosen), _gathered(fake, other))
+        return distance(np.concatenate([real[i] for i in chosen]), np.concatenate([fake[i] for i in other]))
 
     enough = min(len(real), len(fake)) > 1
     low, high = _interval(value, len(real) if enough else 1, resampled, rng, resamples)
@@ -141,16 +120,6 @@ def half_distances(
 
     Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
 
-    Args:
-        real: Real feature vectors (N, d).
-        fakes: The fake sets (M, d).
-        distance: Of two arrays of features.
-        rng: Draws the halves.
-        splits: How many halvings.
-
-    Returns:
-        The floor, and the distance of each fake set.
-
     Raises:
         InputError: A set is too small to be halved.
     """
@@ -185,15 +154,3 @@ def _interval(
     values = np.array([statistic(rng.integers(0, clips, clips)) for _ in range(resamples)])
     low, high = np.quantile(values - values.mean(), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(value + low), float(value + high)
-
-
-def _gathered(features: Features, chosen: Int[np.ndarray, " c"]) -> Float[np.ndarray, "n d"]:
-    return np.concatenate([features[clip] for clip in chosen])
-
-
-def _check_paired(real: Features, fake: Features) -> None:
-    if len(real) != len(fake):
-        raise InputError(
-            f"paired sets need the same clips, got {len(real)} real and {len(fake)} fake ones; give both the "
-            "same, or compare them unpaired"
-        )

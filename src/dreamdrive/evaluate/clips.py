@@ -18,10 +18,7 @@ MAX_BYTES = 4_000_000_000
 
 
 def open_clips(path: Path) -> dict[str, Source]:
-    """The clips of a set by name, in natural order.
-
-    Args:
-        path: A folder of sub-folders of images or of video files; or one clip: a folder of images or a video.
+    """The clips of a set by name, in natural order: those in a folder, or one folder of images, or one video.
 
     Raises:
         InputError: There is no clip, or two have one name.

@@ -1,9 +1,8 @@
 """Whether a video keeps to the path it was asked for and shows one and the same world."""
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
@@ -23,13 +22,7 @@ GAPS = (1, 4, 8)
 
 @dataclass(frozen=True)
 class GapFigures:
-    """What pairs of frames show that lie ``gap`` frames apart.
-
-    Attributes:
-        gap: Frames from one to the other.
-        epipolar: Matches near the epipolar lines of the poses; None where there are no poses or no such pair.
-        warp: Change of colour along the optical flow; None where there is no such pair.
-    """
+    """What pairs of frames show that lie ``gap`` frames apart; None without such a pair, or without poses."""
 
     gap: int
     epipolar: EpipolarShare | None
@@ -60,10 +53,6 @@ class Consistency:
     lines_from: Literal["asked", "found"] | None
     gaps: tuple[GapFigures, ...]
     notes: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values, with the names of the attributes; what was not measured is null."""
-        return {**asdict(self), "gaps": [asdict(gap) for gap in self.gaps], "notes": list(self.notes)}
 
 
 def evaluate_consistency(
@@ -139,15 +128,10 @@ def _followed(
     grey, usable = evidence.working_frames(clip, seen)
     street = seen.street
     if moving is not None:
-        usable = usable & ~_resized(moving, usable.shape)
-        street = street & ~_resized(moving, street.shape)
+        usable = usable & ~evidence.resized(moving, usable.shape[:0:-1])
+        street = street & ~evidence.resized(moving, street.shape[:0:-1])
     found = features.extract(grey, usable)
     return found, recover(clip, seen, street, found, seed)
-
-
-def _resized(mask: Bool[np.ndarray, "f _ _"], shape: tuple[int, ...]) -> Bool[np.ndarray, "f h w"]:
-    size = (shape[2], shape[1])
-    return np.stack([cv2.resize(m.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for m in mask])
 
 
 def _poses(path: Trajectory) -> Float[np.ndarray, "f 4 4"]:

@@ -1,8 +1,7 @@
 """How well a scene tells what moves from what does not, against the truth of a simulated world."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -63,20 +62,12 @@ class Decomposition:
     fake: FakeMotion | None
     actors: ActorError
 
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values, with the names of the attributes; what has no meaning is null."""
-        return asdict(self)
-
 
 def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
-    """Measure how well a scene tells static from moving.
+    """Measure how well a scene tells static from moving, against the truth of the same frames, one by one.
 
-    The scene may be of any representation, size and metric scale: the similarity that brings its cameras
-    onto the true ones is taken out.
-
-    Args:
-        scene: What to judge.
-        truth: What is known of the same frames, one by one.
+    The scene may be of any representation, size and metric scale: the similarity that brings its cameras onto
+    the true ones is taken out.
 
     Raises:
         InputError: The scene has another number of frames, or frames of another shape.

@@ -17,12 +17,7 @@ _MIN_BASELINE = 1e-3
 
 @dataclass(frozen=True)
 class EpipolarShare:
-    """Matches of all pairs of frames that lie a number of frames apart.
-
-    Attributes:
-        matches: Number of matches that were judged.
-        share: Share of them within 2 px of the epipolar line, in both frames; None without matches.
-    """
+    """Number of matches that were judged, and the share within 2 px of the epipolar line in both frames."""
 
     matches: int
     share: float | None
@@ -38,14 +33,9 @@ def epipolar_share(
     """Share of feature matches near their epipolar lines; wrong matches count like wrong geometry.
 
     Features are matched by mutual nearest neighbours that pass Lowe's ratio test (0.8), with no look at the
-    geometry. Pairs of frames between which the path stands still are left out.
-
-    Args:
-        found: Features of each frame.
-        camera: Pinhole of the size at which they were found.
-        world_from_camera: Poses that the lines follow from (F, 4, 4), in any unit.
-        gap: How many frames lie between the two of a pair.
-        width_px: Width of the frames, whose pixels the 2 px are.
+    geometry. Pairs of frames ``gap`` apart between which the path stands still are left out. The pinhole is
+    that of the size at which features were found; the 2 px are those of frames ``width_px`` wide. Poses are
+    in any unit.
     """
     positions = world_from_camera[:, :3, 3]
     least = _MIN_BASELINE * float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,14 +29,9 @@ Frames = UInt8[Tensor, "t h w 3"]
 
 @dataclass(frozen=True)
 class WeightFiles:
-    """Files of weights that the user has; figures without theirs are left out.
+    """Files of weights that the user has, see ``FILE`` of each network; figures without theirs are left out.
 
-    Attributes:
-        inception: Inception-v3 of FID (``inception.FILE``).
-        i3d: I3D of FVD (``i3d.FILE``).
-        lpips_trunk: VGG16 or AlexNet (``lpips.TRUNK_FILE``).
-        lpips_heads: The heads of LPIPS that belong to it (``lpips.HEADS_FILE``).
-        transnet: TransNetV2; without it that of the installed package.
+    Without TransNetV2's that of the installed package is taken.
     """
 
     inception: Path | None = None
@@ -79,17 +75,15 @@ class Toolbox:
     missing: dict[str, str] = field(default_factory=dict)
     weights: dict[str, dict[str, str]] = field(default_factory=dict)
 
+    def note(self, figure: str, path: Path) -> None:
+        """Keep which file is behind a figure."""
+        self.weights[figure] = {"file": path.name, "sha256": sha256(path)}
+
 
 def open_toolbox(
     files: WeightFiles, *, resize: Resize = "tf1", windows: bool = True, stlpips_kind: Stlpips = "alex"
 ) -> Toolbox:
-    """Load every network whose weights are there.
-
-    Args:
-        files: Weights that the user has.
-        resize: How images are brought to the size of Inception.
-        windows: Whether figures of video are wanted.
-        stlpips_kind: Which shift-tolerant LPIPS.
+    """Load every network whose weights are there; those of video only if windows are wanted.
 
     Raises:
         InputError: A file that was given is not what it should be.
@@ -97,27 +91,34 @@ def open_toolbox(
     box = Toolbox()
     box.likenesses["psnr"] = lambda a, b: np.array([psnr(*pair) for pair in _scaled(a, b)])
     box.likenesses["ssim"] = lambda a, b: np.array([ssim(*pair) for pair in _scaled(a, b)])
-    _add_inception(box, files.inception, resize)
-    _add_efficientnet(box)
-    if windows:
-        _add_i3d(box, files.i3d)
-        _add_transnet(box, files.transnet)
-    else:
+    wanted: dict[str, Callable[[], None]] = {
+        "fid, kid": lambda: _add_inception(box, files.inception, resize),
+        "frechet_efficientnet_lite0": lambda: _add_efficientnet(box),
+        "fvd, kvd": lambda: _add_i3d(box, files.i3d),
+        "frechet_transnetv2": lambda: _add_transnet(box, files.transnet),
+        "lpips": lambda: _add_lpips(box, files.lpips_trunk, files.lpips_heads),
+    }
+    if not windows:
+        del wanted["fvd, kvd"], wanted["frechet_transnetv2"]
         box.missing["fvd, kvd, frechet_transnetv2"] = "figures of video are left out (--window 0)"
-    _add_lpips(box, files.lpips_trunk, files.lpips_heads)
-    for kind in ("alex", "vgg") if stlpips_kind == "both" else (stlpips_kind,):
-        _add_stlpips(box, kind)
-    for kind in {"alex", "vgg"} - {stlpips_kind} if stlpips_kind != "both" else ():
-        box.missing[f"stlpips_{kind}"] = "left out unless asked for: --stlpips both"
+    for kind in ("alex", "vgg"):
+        if stlpips_kind in (kind, "both"):
+            wanted[f"stlpips_{kind}"] = partial(_add_stlpips, box, kind)
+        else:
+            box.missing[f"stlpips_{kind}"] = "left out unless asked for: --stlpips both"
+    for figures, add in wanted.items():
+        try:
+            add()
+        except MissingWeightsError as error:
+            box.missing[figures] = str(error)
     return box
 
 
 def _add_inception(box: Toolbox, path: Path | None, resize: Resize) -> None:
     if path is None:
-        box.missing["fid, kid"] = f"no weights: --inception FILE, {inception.FILE}"
-        return
+        raise MissingWeightsError(f"no weights: --inception FILE, {inception.FILE}")
     network = inception.load_inception(path)
-    _note(box, "fid", path)
+    box.note("fid", path)
     box.extractors.append(
         Extractor("fid", "kid", False, lambda f: inception.inception_features(network, f, resize).numpy())
     )
@@ -125,75 +126,53 @@ def _add_inception(box: Toolbox, path: Path | None, resize: Resize) -> None:
 
 def _add_i3d(box: Toolbox, path: Path | None) -> None:
     if path is None:
-        box.missing["fvd, kvd"] = f"no weights: --i3d FILE, {i3d.FILE}"
-        return
+        raise MissingWeightsError(f"no weights: --i3d FILE, {i3d.FILE}")
     network = i3d.load_i3d(path)
-    _note(box, "fvd", path)
+    box.note("fvd", path)
     box.extractors.append(Extractor("fvd", "kvd", True, lambda f: i3d.i3d_features(network, f).numpy()[None]))
 
 
 def _add_efficientnet(box: Toolbox) -> None:
-    name = "efficientnet_lite0"
-    try:
-        network = efficientnet_lite.load_efficientnet_lite0()
-    except MissingWeightsError as error:
-        box.missing[f"frechet_{name}"] = str(error)
-        return
-    _note(box, f"frechet_{name}", efficientnet_lite.FILE.locate())
-    box.extractors.append(
-        Extractor(
-            f"frechet_{name}",
-            f"kernel_{name}",
-            False,
-            lambda f: efficientnet_lite.efficientnet_lite0_features(network, f).numpy(),
-        )
-    )
+    name, network = "efficientnet_lite0", efficientnet_lite.load_efficientnet_lite0()
+    box.note(f"frechet_{name}", efficientnet_lite.FILE.locate())
+
+    def features(frames: Frames) -> Float[np.ndarray, "_ _"]:
+        return efficientnet_lite.efficientnet_lite0_features(network, frames).numpy()
+
+    box.extractors.append(Extractor(f"frechet_{name}", f"kernel_{name}", False, features))
 
 
 def _add_transnet(box: Toolbox, path: Path | None) -> None:
     try:
         network = transnet.load_transnet(path)
     except MissingWeightsError as error:
-        box.missing["frechet_transnetv2"] = f"{error}; or --transnet FILE"
-        return
-    _note(box, "frechet_transnetv2", path or transnet.FILE.locate())
-    box.extractors.append(
-        Extractor(
-            "frechet_transnetv2",
-            "kernel_transnetv2",
-            True,
-            lambda f: transnet.transnet_features(network, f).numpy()[None],
-        )
-    )
+        raise MissingWeightsError(f"{error}; or --transnet FILE") from None
+    box.note("frechet_transnetv2", path or transnet.FILE.locate())
+
+    def features(frames: Frames) -> Float[np.ndarray, "_ _"]:
+        return transnet.transnet_features(network, frames).numpy()[None]
+
+    box.extractors.append(Extractor("frechet_transnetv2", "kernel_transnetv2", True, features))
 
 
 def _add_lpips(box: Toolbox, trunk: Path | None, heads: Path | None) -> None:
     if trunk is None or heads is None:
         if trunk or heads:
             raise InputError("LPIPS needs both files: give --lpips-trunk and --lpips-heads")
-        box.missing["lpips"] = "no weights: --lpips-trunk FILE --lpips-heads FILE"
-        return
+        raise MissingWeightsError("no weights: --lpips-trunk FILE --lpips-heads FILE")
     distance = lpips.load_lpips(trunk, heads)
     name = f"lpips_{distance.kind}"
-    _note(box, name, trunk)
-    _note(box, f"{name}_heads", heads)
+    box.note(name, trunk)
+    box.note(f"{name}_heads", heads)
     box.likenesses[name] = lambda a, b: distance(_planes(a) * 2 - 1, _planes(b) * 2 - 1).numpy()
     # 3DGS and its relatives hand in [0, 1]; their tables can only be compared with this one.
     box.likenesses[f"{name}_3dgs"] = lambda a, b: distance(_planes(a), _planes(b)).numpy()
 
 
 def _add_stlpips(box: Toolbox, kind: str) -> None:
-    try:
-        distance = stlpips.load_stlpips(kind)
-    except MissingWeightsError as error:
-        box.missing[f"stlpips_{kind}"] = str(error)
-        return
-    _note(box, f"stlpips_{kind}", stlpips.FILES[kind].locate())
+    distance = stlpips.load_stlpips(kind)
+    box.note(f"stlpips_{kind}", stlpips.FILES[kind].locate())
     box.likenesses[f"stlpips_{kind}"] = lambda a, b: distance(_planes(a) * 2 - 1, _planes(b) * 2 - 1).numpy()
-
-
-def _note(box: Toolbox, figure: str, path: Path) -> None:
-    box.weights[figure] = {"file": path.name, "sha256": sha256(path)}
 
 
 def _scaled(a: Frames, b: Frames) -> list[tuple[Tensor, Tensor]]:

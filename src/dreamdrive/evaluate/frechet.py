@@ -20,13 +20,9 @@ def frechet_distance(
 ) -> float:
     """Squared Fréchet distance of the Gaussians with the moments of two sets (Heusel et al. 2017, eq. 6).
 
-    Exact for rank-deficient covariances and never complex. Depends strongly on the number of samples: only
-    distances of equal counts may be compared. Identical sets give 0 up to rounding, which may be negative.
-
-    Args:
-        real: One feature vector a row; at least two rows.
-        fake: The same of the other set.
-        covariance: The normaliser.
+    Exact for rank-deficient covariances and never complex. Depends strongly on the number of samples, a row
+    each: only distances of equal counts may be compared. Identical sets give 0 up to rounding, which may be
+    negative.
 
     Raises:
         InputError: Fewer than two samples, or features that are not finite.
@@ -63,18 +59,11 @@ def polynomial_mmd(
     offset: float = 1.0,
     unbiased: bool = True,
 ) -> float:
-    """Squared maximum mean discrepancy under the kernel (x.y / d + offset)^degree.
+    """Squared maximum mean discrepancy of samples, a row each, under the kernel (x.y / d + offset)^degree.
 
-    The defaults are those of KID (Binkowski et al. 2018); its expectation does not depend on the number of
-    samples, and it may be slightly negative. ``degree=2, offset=0, unbiased=False`` is that of JEDi (Luo et
-    al. 2024), without its factor of 100.
-
-    Args:
-        real: One feature vector a row; at least two rows.
-        fake: The same of the other set.
-        degree: Of the polynomial.
-        offset: Of the polynomial.
-        unbiased: Leave out the similarity of each sample to itself.
+    The defaults are those of KID (Binkowski et al. 2018); unbiased, without the similarity of each sample to
+    itself, its expectation does not depend on the number of samples, and it may be slightly negative.
+    ``degree=2, offset=0, unbiased=False`` is that of JEDi (Luo et al. 2024), without its factor of 100.
 
     Raises:
         InputError: Fewer than two samples, or features that are not finite.
@@ -97,12 +86,7 @@ def polynomial_mmd(
 def kernel_distance(
     real: Float[np.ndarray, "n d"], fake: Float[np.ndarray, "m d"], *, seed: int = 0
 ) -> float:
-    """KID or KVD: ``polynomial_mmd`` of all samples, or beyond 1000 its mean over 100 subsets of 1000.
-
-    Args:
-        real: One feature vector a row; at least two rows.
-        fake: The same of the other set.
-        seed: Of the choice of subsets.
+    """KID or KVD: ``polynomial_mmd`` of all samples, or beyond 1000 its mean over 100 random subsets of 1000.
 
     Raises:
         InputError: Fewer than two samples, or features that are not finite.

@@ -1,7 +1,6 @@
 """How good the cameras and the depth of a scene are, against known poses and lidar or exact depth."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,7 +10,6 @@ from dreamdrive.evaluate.depth_errors import DepthErrors, Trust, depth_errors, m
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.geometry_truth import GeometryTruth
 from dreamdrive.evaluate.paths import PathError, compare_paths
-from dreamdrive.scene.camera import Camera
 
 BANDS_M = ((0.0, 10.0), (10.0, 20.0), (20.0, 40.0), (40.0, 80.0))
 """Bands of true depth; the far end belongs to a band, the near end does not. Nothing beyond counts."""
@@ -116,17 +114,9 @@ class GeometryFigures:
     depth: DepthFigures | None
     notes: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values, with the names of the attributes; what has no meaning is null."""
-        return asdict(self)
-
 
 def evaluate_geometry(estimate: Estimate, truth: GeometryTruth) -> GeometryFigures:
-    """Measure how good cameras and depth are.
-
-    Args:
-        estimate: What to judge.
-        truth: What is known of the same frames, one by one, on the same pixels.
+    """Measure how good cameras and depth are, against the truth of the same frames on the same pixels.
 
     Raises:
         InputError: The numbers of frames or their sizes differ.
@@ -171,17 +161,11 @@ def _stands(poses: Float[np.ndarray, "f 4 4"]) -> bool:
 
 def _pinhole(estimate: Estimate, truth: GeometryTruth) -> PinholeError:
     """Means over the frames, which as a rule share one pinhole."""
-    focal_px, true_px = (float(np.mean([_focal(c) for c in x.cameras])) for x in (estimate, truth))
-    apart = [
-        np.hypot(a.cx_px - b.cx_px, a.cy_px - b.cy_px)
-        for a, b in zip(estimate.cameras, truth.cameras, strict=True)
-    ]
-    percent = 100 * focal_px / true_px - 100
-    return PinholeError(focal_px, true_px, percent, float(np.mean(apart)), estimate.focal_observed)
-
-
-def _focal(camera: Camera) -> float:
-    return float(np.sqrt(camera.fx_px * camera.fy_px))
+    focals = (np.mean([np.sqrt(c.fx_px * c.fy_px) for c in x.cameras]) for x in (estimate, truth))
+    pairs = zip(estimate.cameras, truth.cameras, strict=True)
+    apart = float(np.mean([np.hypot(a.cx_px - b.cx_px, a.cy_px - b.cy_px) for a, b in pairs]))
+    focal_px, true_px = map(float, focals)
+    return PinholeError(focal_px, true_px, 100 * focal_px / true_px - 100, apart, estimate.focal_observed)
 
 
 def _depth(estimate: Estimate, truth: GeometryTruth, scale: ScaleError | None) -> DepthFigures | None:

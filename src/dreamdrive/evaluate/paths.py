@@ -32,18 +32,12 @@ class PathError:
 
 
 def compare_paths(found: Float[np.ndarray, "t 4 4"], asked: Float[np.ndarray, "t 4 4"]) -> PathError | None:
-    """Compare pose by pose a path that was found, in any world and of any scale, with the one asked for.
+    """Compare pose by pose a path that was found, in any world and unit, with the one asked for, in metres.
 
     The absolute error follows Sturm et al. 2012 (ATE, aligned by Umeyama 1991), the relative one the odometry
     benchmark of KITTI (Geiger et al. 2012): from each pose over each stretch of the path, here of eighths of
     its length. A path that stays where it is has scale 1 and, on a straight road, 100 % of translation error.
-
-    Args:
-        found: World-from-camera poses (T, 4, 4), in any unit.
-        asked: The same in metres.
-
-    Returns:
-        The differences, or None when the path asked for stands still: over its length they have no meaning.
+    None when the path asked for stands still: over its length errors have no meaning.
     """
     travelled = np.concatenate([[0], np.cumsum(_steps(asked))])
     if travelled[-1] < _STANDING_M:

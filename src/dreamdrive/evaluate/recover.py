@@ -23,10 +23,7 @@ _HEIGHT_M = 1.5
 class Recovered:
     """A path found in the frames, in an arbitrary unit.
 
-    Attributes:
-        world_from_camera: Poses (F, 4, 4).
-        camera: The pinhole at the clip's size; a focal length that was not calibrated is refined if it shows.
-        method: What found it.
+    The pinhole has the clip's size; a focal length that was not calibrated is refined if it shows.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"]
@@ -37,22 +34,14 @@ class Recovered:
 def recover(
     clip: Clip, seen: Evidence, street: Bool[np.ndarray, "f h w"], found: Sequence[Features], seed: int
 ) -> Recovered | None:
-    """Find the path of a clip.
+    """Find the path of a clip of one camera; None where the frames show none.
 
     Structure from motion counts here even where ``geometry.reconstruct`` refuses it as too coarse to build a
     scene on: its residual is what inconsistent frames look like. On two built-in streets its
     path ends 0.1 % of a stretch off, that of odometry 0.9 %; corrupted by ``generated``, structure from
     motion ends 2.0 and 2.3 % off (docs/results/figures_of_evaluate.md).
 
-    Args:
-        clip: Frames of one camera.
-        seen: The first look at them.
-        street: Pixels at the size of ``seen.grey`` that belong to the street and stand still.
-        found: Features of each frame, at the size of ``seen.working``.
-        seed: Seed of everything random.
-
-    Returns:
-        The path, or None where the frames show none.
+    The street that stands still is given at the size of ``seen.grey``, features at that of ``seen.working``.
     """
     camera = clip.rig[0]
     if seen.motion.tracks < MIN_TRACKS:

@@ -30,12 +30,9 @@ class Retrieval:
 def retrieval(
     true: Bool[np.ndarray, "*n"], score: Float[np.ndarray, "*n"], threshold: float = 0.5
 ) -> Retrieval:
-    """Compare a score with the truth.
+    """Compare a score with the truth; from the threshold on something counts as found.
 
-    Args:
-        true: The truth, of any shape.
-        score: The score of each, of the same shape.
-        threshold: Score from which something counts as found; the average precision takes all thresholds.
+    The average precision takes all thresholds.
     """
     wanted, found = true.ravel(), score.ravel() >= threshold
     both, either = int((wanted & found).sum()), int((wanted | found).sum())

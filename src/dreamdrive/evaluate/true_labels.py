@@ -27,7 +27,7 @@ def places(scene: Scene, t_s: float) -> Float[np.ndarray, "n 3"]:
 def true_labels(
     scene: Scene, views: Sequence[Camera], truth: Truth, scale: float
 ) -> tuple[Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
-    """Whether each Gaussian, the static ones first, stands for something that moves.
+    """Whether each Gaussian, the static ones first, stands for something that moves; whether it was judged.
 
     A Gaussian is judged in the frame it was seeded from, where it is at that frame's time. It is moving if
     its centre falls on a pixel of a moving road user and does not lie behind it, by more than a tenth of the
@@ -36,14 +36,8 @@ def true_labels(
     judged in the frame where its depth is nearest to the true one. One that is in no picture, or before the
     sky only, is not judged.
 
-    Args:
-        scene: The scene.
-        views: Its cameras (F,) at the size of the truth.
-        truth: The same frames.
-        scale: Metres of the truth for a metre of the scene.
-
-    Returns:
-        Which are moving (N,), and which were judged (N,).
+    The views are the scene's cameras at the size of the truth; ``scale`` is metres of the truth for one of
+    the scene.
     """
     source = torch.cat([scene.static.source_frame, scene.dynamic.source_frame]).numpy()
     moving = np.zeros(len(source), dtype=bool)

@@ -120,12 +120,8 @@ def evaluate_video(
 ) -> VideoReport:
     """Compare a set of clips with real ones by every figure whose weights are there.
 
-    Args:
-        real: A folder of clips (sub-folders of images, or videos), or one clip.
-        fake: The same. Clips of equal names belong together; so do two single clips.
-        settings: How to compare.
-        files: Weights that cannot be found by themselves.
-        progress: Is told how far it is.
+    A set is a folder of clips (sub-folders of images, or videos), or one clip. Clips of equal names belong
+    together; so do two single clips.
 
     Raises:
         InputError: Clips or weights that cannot be used.

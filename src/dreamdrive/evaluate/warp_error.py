@@ -19,12 +19,7 @@ _STEPS_KEPT = 64  # more than two threads need at once; a long clip's flows woul
 
 @dataclass(frozen=True)
 class WarpError:
-    """Change of colour over a number of frames, all pairs together.
-
-    Attributes:
-        grey_levels: Mean absolute difference of colours, 0 to 255; None where no pixel could be followed.
-        share: Share of the pixels that could be followed there and back.
-    """
+    """Mean absolute change of colour, 0 to 255, over the share of the pixels that could be followed."""
 
     grey_levels: float | None
     share: float
@@ -38,10 +33,6 @@ def warp_error(clip: Clip, gap: int) -> WarpError:
     built-in street (320x192, seed 1) it left 13.9 grey levels over 8 frames, and 15.4 once corrupted by
     ``generated``, where this leaves 7.4 and 10.0. Only pixels count whose flow comes back to within half a
     pixel; what is hidden in one of the frames, or cannot be followed, is left out.
-
-    Args:
-        clip: Frames, and where they hold a picture.
-        gap: Frames from one of a pair to the other.
 
     Raises:
         ValueError: The clip has no two frames that far apart.

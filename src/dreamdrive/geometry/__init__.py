@@ -37,11 +37,8 @@ def reconstruct(
 ) -> Geometry:
     """Reconstruct a clip by one of ``BACKENDS``; geometry given as files comes in by ``attach``.
 
-    Args:
-        clip: Frames, with what is known of their geometry; those of several cameras see ``surround``.
-        options: The method and its settings.
-        seed: Seed of everything random.
-        work: Told of each step, where the method can count them; keeps parts of the result.
+    For clips of several cameras see ``surround``. ``work`` is told of each step, where the method can count
+    them.
 
     Raises:
         InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.

@@ -44,40 +44,25 @@ class Dense:
     moving: Float[np.ndarray, "f h w"]
 
 
-@dataclass(frozen=True)
-class StaticDepth:
-    """Depth that was measured as if nothing moved, as the plane sweep measures it.
-
-    Attributes:
-        depth_m: Depth along z (F, H, W); 0 where there is none.
-        confidence: Trust in it (F, H, W) in [0, 1].
-    """
-
-    depth_m: Float[np.ndarray, "f h w"]
-    confidence: Float[np.ndarray, "f h w"]
+DepthMaps = tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]
+"""Depth along z in metres, 0 where there is none, and trust in it in [0, 1]; or inverse depth and trust."""
 
 
 def densify(
     clip: Clip,
     posed: Posed,
-    measured: StaticDepth | None = None,
+    measured: DepthMaps | None = None,
     tell: Tell = unheard,
     keep: Keep = at_once,
 ) -> Dense:
     """Depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
-    as given in ``clip.known.depth_m``, else from the plane sweep, else (standing camera, or poses from the
-    fallback) from the road plane and a backdrop at 40 m, little trusted. What moves is found against the
-    parallax of a moving camera or against the temporal median of a standing one; from fallback poses no such
-    evidence is drawn.
-
-    Args:
-        clip: The frames.
-        posed: Their cameras.
-        measured: Depth to take in place of the plane sweep's, such as a network's.
-        tell: Called for each frame of each pass, of which there are ``PASSES`` at most.
-        keep: Keeps the depth that was swept.
+    as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
+    which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
+    m, little trusted. What moves is found against the parallax of a moving camera or against the temporal
+    median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for each frame
+    of at most ``PASSES``.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
     given = clip.known.depth_m is not None
@@ -88,33 +73,25 @@ def densify(
             inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
             confidence = (inverse > 0).astype(np.float32)
         elif measured is not None:
-            inverse = _inverse(np.where(view.used[:, None, None], measured.depth_m, 0))
-            confidence = np.where(inverse > 0, measured.confidence, 0).astype(np.float32)
+            inverse = _inverse(np.where(view.used[:, None, None], measured[0], 0))
+            confidence = np.where(inverse > 0, measured[1], 0).astype(np.float32)
         elif rough:
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
-        moving = _moving(view, inverse, sky, given, posed) * ~sky
+        if posed.standing:
+            moving = standing_evidence(view)
+        elif posed.fallback is not None:
+            moving = np.zeros(inverse.shape, np.float32)
+        else:
+            moving = moving_evidence(view, inverse, sky, given)
+        moving = moving * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _finish(view, inverse, confidence, sky, moving)
 
 
-def _moving(
-    view: View,
-    inverse: Float[np.ndarray, "f h w"],
-    sky: Bool[np.ndarray, "f h w"],
-    given: bool,
-    posed: Posed,
-) -> Float[np.ndarray, "f h w"]:
-    if posed.standing:
-        return standing_evidence(view)
-    if posed.fallback is not None:
-        return np.zeros(inverse.shape, np.float32)
-    return moving_evidence(view, inverse, sky, given)
-
-
-def _plane_and_backdrop(view: View) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+def _plane_and_backdrop(view: View) -> DepthMaps:
     inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
     confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
     return inverse, confidence.astype(np.float32)
@@ -135,9 +112,7 @@ def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
     return np.where(depth_m > 0, 1 / np.maximum(depth_m, 1e-3), 0).astype(np.float32)
 
 
-def _swept(
-    view: View, sky: Bool[np.ndarray, "f h w"]
-) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+def _swept(view: View, sky: Bool[np.ndarray, "f h w"]) -> DepthMaps:
     found = sweep_frames(view, sky)
     inverse = np.zeros(view.grey.shape, np.float32)
     confidence = np.zeros(view.grey.shape, np.float32)
@@ -161,7 +136,7 @@ def _stand_movers(
     confidence: Float[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
     view: View,
-) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+) -> DepthMaps:
     """Moving pixels get the depth at which their column of the object meets the road."""
     inverse, confidence = inverse.copy(), confidence.copy()
     for frame in view.frames:

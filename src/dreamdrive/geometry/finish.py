@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
-from dreamdrive.geometry.dense import Dense, StaticDepth, densify
+from dreamdrive.geometry.dense import Dense, densify
 from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
@@ -24,15 +24,8 @@ def finish(
     """Bring what was measured to metres and find road, sky and what moves, as for any clip.
 
     The metre comes from the unit where that is one, else from known depth in metres, else from the height of
-    the camera above the road. Of a clip that stands still the measured path is noise: all frames get one
-    pose, or the known ones where these are in metres.
-
-    Args:
-        clip: The frames.
-        measured: Their cameras and depth.
-        evidence: The first look at them.
-        camera_height_m: Height of the camera above the road; None assumes 1.5 m.
-        seed: Seed of everything random.
+    the camera above the road, by default 1.5 m. Of a clip that stands still the measured path is noise: all
+    frames get one pose, or the known ones where these are in metres.
     """
     still = stands(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)
@@ -56,7 +49,7 @@ def finish(
     posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
-    dense = densify(known, posed, StaticDepth(depth_m, measured.confidence))
+    dense = densify(known, posed, (depth_m, measured.confidence))
     return assemble(clip, posed, dense)
 
 
@@ -180,9 +173,5 @@ def _by_median_depth() -> Metric:
     """The rough factor, where the path is none and no road was seen."""
     problem = "no road plane was found, and the path shows no speed"
     words = f"a median depth of {_MEDIAN_DEPTH_M:.0f} m is assumed"
-    return Metric(
-        1.0,
-        None,
-        Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD, basis="usual depth"),
-        (f"{problem}: {words}",),
-    )
+    scale = Scale(f"none: {problem}; {words}", scales.SPEED_SPREAD, basis="usual depth")
+    return Metric(1.0, None, scale, (f"{problem}: {words}",))

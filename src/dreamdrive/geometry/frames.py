@@ -11,10 +11,6 @@ _ALIKE = 1.0  # grey levels
 def check_frames(clip: Clip, backend: str) -> None:
     """Refuse what no network can find cameras in.
 
-    Args:
-        clip: The frames.
-        backend: For messages.
-
     Raises:
         InputError: Fewer than two frames, or frames that are all alike.
     """

@@ -12,12 +12,9 @@ from dreamdrive.scene.camera import Camera
 def trusted(
     depth: Float[np.ndarray, "f h w"], trust: Float[np.ndarray, "f h w"], there: Bool[np.ndarray, "f h w"]
 ) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
-    """Depth (F, H, W) where it is there, and as its confidence the share of that depth that is trusted less.
+    """Depth where it is there, and as its confidence the share of that depth that is trusted less.
 
-    Args:
-        depth: As a network gives it.
-        trust: Grows with its trust, on any scale.
-        there: Pixels whose depth counts; elsewhere both are 0.
+    ``trust`` grows with the network's trust, on any scale; elsewhere both are 0.
     """
     confidence = np.zeros(depth.shape, np.float32)
     confidence[there] = ranks(trust[there])

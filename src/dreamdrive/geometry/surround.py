@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -17,11 +18,7 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
     """Reconstruct the first camera, then the others from where it tells that they were.
 
     The path of the first camera and the mountings of the rig give the poses of all others, unless poses are
-    known; metres and the road are those of the first camera.
-
-    Args:
-        clip: Frames of several cameras, with the mountings in ``rig``.
-        reconstruct: The way of getting geometry from frames of one camera.
+    known; metres and the road are those of the first camera. ``reconstruct`` takes frames of one camera.
 
     Raises:
         InputError: Neither poses nor mountings are known; or see ``reconstruct``.
@@ -115,24 +112,19 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
     return replace(
         first,
         cameras=tuple(cameras),
-        depth_m=_woven(clip, {k: part.depth_m for k, part in parts.items()}),
-        confidence=_woven(clip, {k: part.confidence for k, part in parts.items()}),
-        sky=_woven(clip, {k: part.sky for k, part in parts.items()}),
-        moving=_woven(clip, {k: part.moving for k, part in parts.items()}),
+        **{name: _woven(clip, parts, name) for name in ("depth_m", "confidence", "sky", "moving")},
         fixed_regions=fixed,
         region_names=names,
         detected=tuple(dict.fromkeys(said)),
-        details={
-            **first.details,
-            "cameras": {str(k): part.details for k, part in parts.items() if k != lead},
-        },
+        details=first.details | {"cameras": {str(k): p.details for k, p in parts.items() if k != lead}},
     )
 
 
-def _woven(clip: Clip, parts: dict[int, np.ndarray]) -> np.ndarray:
+def _woven(clip: Clip, parts: dict[int, Geometry], name: str) -> Any:
     """Maps of all frames (F, H, W) from those of each camera."""
-    some = next(iter(parts.values()))
+    maps = {camera: getattr(part, name) for camera, part in parts.items()}
+    some = next(iter(maps.values()))
     whole = np.zeros((len(clip), *some.shape[1:]), some.dtype)
-    for camera, values in parts.items():
+    for camera, values in maps.items():
         whole[clip.of_camera(camera)] = values
     return whole

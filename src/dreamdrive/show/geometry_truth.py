@@ -24,12 +24,8 @@ def draw_geometry_errors(
     """RGB picture: for up to three frames the depth beside its errors, and below them both paths from above.
 
     Of frames that have both depths the first, the middle and the last are taken. A wrong scale would paint
-    all of a frame in one colour, and is taken out.
-
-    Args:
-        estimate: What was found.
-        truth: What is known of the same frames, on the same pixels.
-        scale: What the depth found is multiplied by: the median scale, see ``depth_errors.median_scale``.
+    all of a frame in one colour: the depth found is multiplied by the median scale, see
+    ``depth_errors.median_scale``.
     """
     rows = [] if estimate.depth_m is None else _rows(estimate, scale * estimate.depth_m, truth.depth_m)
     width = rows[0].shape[1] if rows else max(2 * estimate.size[0], 480)

@@ -7,17 +7,7 @@ from jaxtyping import Float, UInt8
 Image = UInt8[np.ndarray, "h w 3"]
 
 
-def beside(recorded: Image, rendered: Image) -> UInt8[np.ndarray, "h w2 3"]:
-    """The recorded frame left of the rendered one."""
-    return grid({"recorded": recorded, "rendered": rendered}, columns=2)
-
-
-def parts(static: Image, dynamic: Image, score: Image, depth: Image) -> UInt8[np.ndarray, "h2 w2 3"]:
-    """Static and dynamic part above, dynamic score and depth below."""
-    return grid({"static": static, "dynamic": dynamic, "score": score, "depth": depth}, columns=2)
-
-
-def grid(images: dict[str, Image], columns: int) -> UInt8[np.ndarray, "hg wg 3"]:
+def grid(images: dict[str, Image], columns: int = 2) -> UInt8[np.ndarray, "hg wg 3"]:
     """Labelled pictures of one size in rows; missing ones at the end are black."""
     if not images or len({image.shape for image in images.values()}) != 1:
         raise ValueError(f"panels: expected images of one size, got {[i.shape for i in images.values()]}")

@@ -15,11 +15,8 @@ _FILES = (".mp4", ".png", ".npz")
 def places(out: Path, output: Path | None, drives: Sequence[Drive], look: Look) -> list[Path]:
     """Where each drive goes: ``-o``, or ``video`` in the output folder, where no link leads elsewhere.
 
-    Args:
-        out: The folder that generate wrote.
-        output: What ``-o`` says: the result of a single drive, or the folder for those of several.
-        drives: The drives.
-        look: Decides about endings; what is not all colours is part of the default name.
+    ``-o`` is the result of a single drive, or the folder for those of several. What is not all colours is
+    part of the default name.
 
     Raises:
         InputError: ``-o`` does not fit the format or lies among the results of generate, or a link is there.

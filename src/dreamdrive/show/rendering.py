@@ -76,20 +76,13 @@ def check_size(look: Look) -> None:
 
 
 def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Callable[[int], None]) -> None:
-    """Render a drive and write it; the result appears when it is whole.
+    """Render a drive and write it; the result appears when it is whole, in place of one from here.
 
     A video holds colours; depth has those of ``drive.panels``. A folder holds one file a frame: ``NNNN.png``,
-    8-bit RGB or depth in 16 bits (see ``depth_png``), or ``NNNN.npz``: ``colour`` float32 (H, W, 3) in
-    [0, 1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing;
-    ``alpha`` float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has
-    calibration, poses and times. One frame is held at a time.
-
-    Args:
-        path: The video or folder; a folder is replaced if this function wrote it.
-        scene: What to render.
-        drive: The drive.
-        look: What to show, and how.
-        progress: Called with the number of frames done.
+    8-bit RGB or depth in 16 bits (see ``depth_png``), or ``NNNN.npz``: ``colour`` float32 (H, W, 3) in [0,
+    1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing; ``alpha``
+    float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has calibration,
+    poses and times. One frame is held at a time. ``progress`` is called with the number of frames done.
 
     Raises:
         InputError: It cannot be written, or the rate is none of a video.

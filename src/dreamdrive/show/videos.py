@@ -29,12 +29,9 @@ SHIFT_M = 2.0
 
 @dataclass(frozen=True)
 class Scored:
-    """Gaussians of the static fit with their dynamic scores, for the panel that shows them.
+    """Gaussians of the static fit with their dynamic scores in [0, 1], for the panel that shows them.
 
-    Attributes:
-        gaussians: N Gaussians.
-        scores: Scores (N,) in [0, 1].
-        threshold: Score above which a Gaussian votes for moving (eq. 9).
+    Above the threshold a Gaussian votes for moving (eq. 9).
     """
 
     gaussians: Gaussians
@@ -51,14 +48,8 @@ def write_videos(
 ) -> None:
     """Write ``drive.mp4``, ``shift.mp4``, ``recorded_beside_rendered.mp4`` and ``panels.mp4``.
 
-    All show the rig's first camera; of several, ``surround.mp4`` shows what each of them sees.
-
-    Args:
-        folder: Where to.
-        scene: What to show.
-        recorded: The frames of that camera as recorded (F, H, W, 3), in the source's distortion.
-        scored: Dynamic scores; without them their panel is black.
-        progress: Called with frames done and frames in all.
+    All show the rig's first camera, with its frames as recorded, in the source's distortion; of several,
+    ``surround.mp4`` shows what each of them sees. Without scores their panel is black.
     """
     rate = frame_rate(scene.trajectory)
     drive = smooth(scene.trajectory)
@@ -91,11 +82,7 @@ def write_videos(
 def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
     """Write the view of each withheld frame as ``NNNN.png``, in the source's distortion.
 
-    Args:
-        folder: Where to.
-        scene: What to render.
-        source_index: Index of each frame of the scene in the source: the number in the name. Of several
-            cameras, those after the first add ``_cameraK``.
+    The number is the frame's index in the source. Of several cameras, those after the first add ``_cameraK``.
     """
     lens = lens_of(scene)
     for i in np.flatnonzero(scene.held_out).tolist():
@@ -146,7 +133,7 @@ def _beside(
     scene: Scene, recorded: UInt8[np.ndarray, "f h w 3"], lens: Lens | None
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     for frame, rendered in zip(recorded, drive_frames(scene, scene.trajectory, lens), strict=True):
-        yield panels.beside(frame, rendered)
+        yield panels.grid({"recorded": frame, "rendered": rendered})
 
 
 def _surround(scene: Scene, camera: Int[np.ndarray, " f"]) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
@@ -175,12 +162,13 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
         score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near[frame])
-        yield panels.parts(
-            panels.to_bytes(still.numpy()),
-            panels.to_bytes(moving.numpy()),
-            panels.score_colours(score.numpy()),
-            panels.depth_colours(whole.depth_m.numpy()),
-        )
+        images = {
+            "static": panels.to_bytes(still.numpy()),
+            "dynamic": panels.to_bytes(moving.numpy()),
+            "score": panels.score_colours(score.numpy()),
+            "depth": panels.depth_colours(whole.depth_m.numpy()),
+        }
+        yield panels.grid(images)
 
 
 @torch.no_grad()

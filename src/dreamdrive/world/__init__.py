@@ -3,6 +3,7 @@
 from dreamdrive.world.drive import MOUNTS, Drive, Mount, WorldBox, drive, front_from_mount, make_street
 from dreamdrive.world.files import MARK, read_world, write_world
 from dreamdrive.world.materials import Semantic
+from dreamdrive.world.mesh import upright
 from dreamdrive.world.render import WorldView
 from dreamdrive.world.streets import StreetOptions, draw_street
-from dreamdrive.world.world import World, upright
+from dreamdrive.world.world import World

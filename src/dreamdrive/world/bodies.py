@@ -88,14 +88,13 @@ def _finish(rng: np.random.Generator, size_m: Size, kind: Semantic, materials: M
 
 def _wheels(size_m: Size, radius_m: float, finish: _Finish) -> list[Part]:
     length, width, _ = size_m
-    parts: list[Part] = []
-    for x in (0.3 * length, -0.3 * length):
-        mesh = [
+    pair = Mesh.joined(
+        [
             cylinder((0, y - 0.11, 0), (0, y + 0.11, 0), (radius_m, radius_m), finish.tyre, finish.rim, 12)
             for y in (0.5 * width - 0.12, 0.12 - 0.5 * width)
         ]
-        parts.append(Part(Mesh.joined(mesh), _rolling((x, 0.0, radius_m), radius_m)))
-    return parts
+    )
+    return [Part(pair, _rolling((x, 0.0, radius_m), radius_m)) for x in (0.3 * length, -0.3 * length)]
 
 
 def _rolling(at_m: tuple[float, float, float], radius_m: float) -> Turn:
@@ -112,15 +111,11 @@ def _car(rng: np.random.Generator, size_m: Size, materials: Materials) -> list[P
     high = (back, front, -side, side)
     nose = (back + 0.05, front - 0.12, 0.06 - side, side - 0.06)
     roof = (boot + rng.uniform(0.2, 0.5), bonnet - rng.uniform(0.55, 0.8), 0.2 - side, side - 0.2)
+    cabin = (boot, bonnet, 0.06 - side, side - 0.06)
     meshes = [
         frustum(low, high, (0.18, 0.3 * height), (f.under, f.under, f.under, f.under, None, f.under)),
         frustum(high, nose, (0.3 * height, belt), (f.side, f.side, f.back, f.front, f.panel, None)),
-        frustum(
-            (boot, bonnet, 0.06 - side, side - 0.06),
-            roof,
-            (belt, height),
-            (f.glass, f.glass, f.glass, f.glass, f.panel, None),
-        ),
+        frustum(cabin, roof, (belt, height), (f.glass, f.glass, f.glass, f.glass, f.panel, None)),
     ]
     return [Part(Mesh.joined(meshes)), *_wheels(size_m, 0.31, f)]
 
@@ -133,20 +128,11 @@ def _van(rng: np.random.Generator, size_m: Size, materials: Materials) -> list[P
     flanks = (back, front, -side, side)
     top = (back + 0.03, front - 0.32 * length, 0.08 - side, side - 0.08)
     cab = (front - 0.32 * length, front - 0.12 * length, 0.05 - side, side - 0.05)
+    cab_top, box = (cab[0], cab[1] - 0.08 * length, *top[2:]), (back, front - 0.32 * length, -side, side)
     meshes = [
         frustum(flanks, flanks, (0.2, belt), (f.side, f.side, f.back, f.front, f.panel, f.under)),
-        frustum(
-            (back, front - 0.32 * length, -side, side),
-            top,
-            (belt, height),
-            (f.side, f.side, f.glass, f.panel, f.panel, None),
-        ),
-        frustum(
-            cab,
-            (cab[0], cab[1] - 0.08 * length, *top[2:]),
-            (belt, height - 0.05),
-            (f.glass, f.glass, None, f.glass, f.panel, None),
-        ),
+        frustum(box, top, (belt, height), (f.side, f.side, f.glass, f.panel, f.panel, None)),
+        frustum(cab, cab_top, (belt, height - 0.05), (f.glass, f.glass, None, f.glass, f.panel, None)),
     ]
     return [Part(Mesh.joined(meshes)), *_wheels(size_m, 0.34, f)]
 
@@ -157,16 +143,11 @@ def _truck(rng: np.random.Generator, size_m: Size, materials: Materials) -> list
     front, back, side = 0.5 * length, -0.5 * length, 0.5 * width
     cabin = front - 2.0
     cab, cargo = (cabin, front, 0.05 - side, side - 0.05), (back, cabin - 0.3, -side, side)
-    chassis = (back + 0.1, front - 0.1, 0.2 - side, side - 0.2)
+    chassis, roof = (back + 0.1, front - 0.1, 0.2 - side, side - 0.2), (cabin, front - 0.25, *cab[2:])
     meshes = [
         frustum(chassis, chassis, (0.35, 0.8), [f.under] * 6),
         frustum(cab, cab, (0.5, 1.6), (f.panel, f.panel, f.panel, f.front, None, f.under)),
-        frustum(
-            cab,
-            (cabin, front - 0.25, *cab[2:]),
-            (1.6, 0.85 * height),
-            (f.glass, f.glass, f.panel, f.glass, f.panel, None),
-        ),
+        frustum(cab, roof, (1.6, 0.85 * height), (f.glass, f.glass, f.panel, f.glass, f.panel, None)),
         frustum(cargo, cargo, (0.8, height), (f.side, f.side, f.back, f.panel, f.panel, f.under)),
     ]
     return [Part(Mesh.joined(meshes)), *_wheels(size_m, 0.45, f)]
@@ -177,13 +158,9 @@ def _limb(
 ) -> Part:
     """A bar that hangs from a joint."""
     bar = cylinder((0, 0, -length_m), (0, 0, 0), (0.75 * radius_m, radius_m), material, material, 7)
-    return Part(bar, lambda way_m: _at(at_m, turn(way_m)))
-
-
-def _at(at_m: tuple[float, float, float], pose: np.ndarray) -> np.ndarray:
-    moved = pose.copy()
-    moved[:3, 3] += at_m
-    return moved
+    joint = np.zeros((4, 4))
+    joint[:3, 3] = at_m
+    return Part(bar, lambda way_m: turn(way_m) + joint)
 
 
 def _swing(amplitude_rad: float, stride_m: float, phase: float) -> Turn:
@@ -213,18 +190,10 @@ def _pedestrian(rng: np.random.Generator, size_m: Size, materials: Materials) ->
     stride = 0.8 * height
     parts = [Part(Mesh.joined(meshes))]
     for side, phase in ((0.09, 0.0), (-0.09, np.pi)):
-        parts.append(
-            _limb((0, side, 0.5 * height), 0.5 * height, 0.085, use["legs"], _swing(0.5, stride, phase))
-        )
-        parts.append(
-            _limb(
-                (0, 2.7 * side, 0.82 * height),
-                0.4 * height,
-                0.055,
-                use["shirt"],
-                _swing(0.45, stride, phase + np.pi),
-            )
-        )
+        leg, arm = _swing(0.5, stride, phase), _swing(0.45, stride, phase + np.pi)
+        hip, shoulder = (0, side, 0.5 * height), (0, 2.7 * side, 0.82 * height)
+        parts.append(_limb(hip, 0.5 * height, 0.085, use["legs"], leg))
+        parts.append(_limb(shoulder, 0.4 * height, 0.055, use["shirt"], arm))
     return parts
 
 
@@ -252,16 +221,10 @@ def _bicycle(rng: np.random.Generator, size_m: Size, materials: Materials) -> li
     for x in (axle, -axle):
         wheel = cylinder((0, -0.02, 0), (0, 0.02, 0), (radius, radius), dark, tyre, 14)
         parts.append(Part(wheel, _rolling((x, 0, radius), radius)))
+    bent, arm = pitched((0, 0, 0), -0.45), pitched((0, 0, 0), -1.0)
     for side, phase in ((0.1, 0.0), (-0.1, np.pi)):
-        hip = (-0.25, side, 0.52 * height)
+        hip, shoulder = (-0.25, side, 0.52 * height), (0.02, 2.2 * side, 0.78 * height)
         pedal = _swing(0.35, 5.0, phase)
-        parts.append(
-            _limb(
-                hip, 0.42 * height, 0.08, use["legs"], lambda way, p=pedal: p(way) @ pitched((0, 0, 0), -0.45)
-            )
-        )
-        arm = pitched((0, 0, 0), -1.0)
-        parts.append(
-            _limb((0.02, 2.2 * side, 0.78 * height), 0.36 * height, 0.05, use["shirt"], lambda _, a=arm: a)
-        )
+        parts.append(_limb(hip, 0.42 * height, 0.08, use["legs"], lambda way, p=pedal: p(way) @ bent))
+        parts.append(_limb(shoulder, 0.36 * height, 0.05, use["shirt"], lambda _: arm))
     return parts

@@ -13,9 +13,10 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.layout import EDITIONS, Ego, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.render import WorldView, look
 from dreamdrive.world.streets import StreetOptions, draw_street
-from dreamdrive.world.world import World, upright
+from dreamdrive.world.world import World
 
 Mount = Literal["front", "front_left", "front_right", "back", "back_left", "back_right"]
 _MOUNT_YAW_RAD: dict[Mount, float] = {
@@ -127,7 +128,7 @@ def ego_poses(
     poses: list[np.ndarray] = []
     for place, p, r in zip(track_function(ego.track)(times_s), pitch, roll, strict=True):
         pose = upright(place)
-        about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
+        about_y = pitched((0, 0, 0), p)[:3, :3]
         about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
         nodding = pose[:3, :3] @ about_y @ about_x
         pose[:3, :3] = nodding @ mounted[:3, :3] @ _LEVEL
@@ -149,7 +150,7 @@ def _mounted(mount: Mount) -> Float[np.ndarray, "4 4"]:
     """Pose of a camera on the car: x ahead, y left, z up from the front camera."""
     turn = _MOUNT_YAW_RAD[mount]
     out = 0.0 if mount == "front" else _MOUNT_OUT_M
-    return upright(np.array([out * np.cos(turn), out * np.sin(turn), turn]))
+    return upright((out * np.cos(turn), out * np.sin(turn), turn))
 
 
 def drive(
@@ -163,17 +164,10 @@ def drive(
     antialiased: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Drive:
-    """Drive through the street of a layout.
+    """Drive through the street of a layout, or of its world if that is made already.
 
-    Args:
-        layout: The street.
-        frames: Number of frames.
-        fps: Frames a second.
-        size: Width and height in pixels; the horizontal field of view is 64 degrees.
-        world: The same street, if it is made already.
-        mount: Which camera of the car.
-        antialiased: Whether edges take more than one ray a pixel.
-        progress: Called with frames done and frames in all.
+    The size is width and height in pixels; the horizontal field of view is 64 degrees. ``progress`` is called
+    with frames done and frames in all.
     """
     if frames < 1 or fps <= 0 or min(size) < 2:
         raise ValueError(f"world: cannot drive {frames} frames of {size} at {fps}/s")

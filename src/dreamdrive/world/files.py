@@ -102,11 +102,7 @@ def write_world(
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:
-    """Read one camera's drive from a world folder.
-
-    Args:
-        path: The folder that :func:`write_world` wrote.
-        camera: Which of several cameras; a folder of one camera holds that one alone.
+    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone.
 
     Raises:
         InputError: It is no world folder, or a part of it is missing, damaged or of another size.
@@ -212,12 +208,11 @@ def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> 
         np.savez_compressed(place, depth_m=depth_m)
     np.savez_compressed(folder / "flow.npz", flow_px=drive.flow_px)
     made = {} if corruption is None else {"corruption": asdict(corruption)}
-    poses = {"world_from_camera": drive.trajectory.world_from_camera.tolist()}
+    poses = {"world_from_camera": drive.trajectory.world_from_camera}
+    boxes = [vars(box) for box in drive.boxes]
     _write_json(folder / "cameras.json", {**_calibration(drive), **poses, **made})
-    _write_json(folder / "poses.json", {**poses, "times_s": drive.times_s.tolist()})
-    _write_json(
-        folder / "boxes.json", {"boxes": _boxes(drive), "world_from_map": drive.world_from_map.tolist()}
-    )
+    _write_json(folder / "poses.json", {**poses, "times_s": drive.times_s})
+    _write_json(folder / "boxes.json", {"boxes": boxes, "world_from_map": drive.world_from_map})
 
 
 def _write_png(path: Path, image: np.ndarray) -> None:
@@ -225,8 +220,9 @@ def _write_png(path: Path, image: np.ndarray) -> None:
 
 
 def _write_json(path: Path, values: dict[str, Any]) -> None:
-    """Values as readable JSON without NaN."""
-    path.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    """Values and arrays as readable JSON without NaN."""
+    text = json.dumps(values, indent=1, allow_nan=False, default=np.ndarray.tolist)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 def _calibration(drive: Drive) -> dict[str, Any]:
@@ -238,17 +234,3 @@ def _calibration(drive: Drive) -> dict[str, Any]:
         "cy": camera.cy_px - 0.5,
     }
     return {"width": camera.width_px, "height": camera.height_px, "intrinsics": intrinsics}
-
-
-def _boxes(drive: Drive) -> list[dict[str, Any]]:
-    return [
-        {
-            "instance": box.instance,
-            "id": box.id,
-            "kind": box.kind,
-            "moving": box.moving,
-            "size_m": box.size_m.tolist(),
-            "world_from_box": box.world_from_box.tolist(),
-        }
-        for box in drive.boxes
-    ]

@@ -1,5 +1,6 @@
 """The map as a picture from above: asphalt, slabs, grass and paint, and the class of every spot."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -65,9 +66,8 @@ def paint_ground(layout: Layout, bounds_m: tuple[float, float, float, float]) ->
     shape = int((y1 - y0) / texel), int((x1 - x0) / texel)
     sheet = _Sheet((x0, y1), texel, shape)
     rng = np.random.default_rng([layout.seed, 1])
-    image = (
-        np.array([88, 104, 62], np.float32) * (1 + noise(rng, shape, {2: 0.08, 9: 0.1, 60: 0.12}))[..., None]
-    )
+    uneven = 1 + noise(rng, shape, {2: 0.08, 9: 0.1, 60: 0.12})
+    image = np.array([88, 104, 62], np.float32) * uneven[..., None]
     label = np.full(shape, Semantic.GRASS, dtype=np.uint8)
     asphalt, slabs = _asphalt(rng, shape, texel), _slabs(rng, shape, texel)
     wear = np.clip(0.85 + noise(rng, shape, {2: 0.1, 10: 0.1, 60: 0.1}), 0, 1)
@@ -112,11 +112,7 @@ class _Sheet:
 
     def area(self, area: Area) -> Float[np.ndarray, "h w"]:
         """Share of every texel that a polygon covers."""
-        mask = np.zeros(self.shape, dtype=np.uint8)
-        cv2.fillPoly(
-            mask, [self.pixels(ring) for ring in (area.polygon, *area.holes)], (255,), cv2.LINE_AA, _SHIFT
-        )
-        return mask.astype(np.float32) / 255
+        return self._cover([[area.polygon, *area.holes]])
 
     def line(self, line: Line) -> Float[np.ndarray, "h w"]:
         """Share of every texel that a painted line covers."""
@@ -125,16 +121,18 @@ class _Sheet:
         if line.kind == "lane_divider":
             starts = np.arange(0.0, path.length, _DASH_M + _GAP_M)
             pieces = [substring(path, s, s + _DASH_M) for s in starts]
-        width = _WIDTH_M[line.kind] / 2
-        outlines = [
-            piece.buffer(width, cap_style="flat", join_style="mitre") for piece in pieces if piece.length > 0
-        ]
+        half = _WIDTH_M[line.kind] / 2
+        outlines = [p.buffer(half, cap_style="flat", join_style="mitre") for p in pieces if p.length > 0]
+        parts = [part for outline in outlines for part in shapely.get_parts(outline)]
+        return self._cover([[np.array(part.exterior.coords)] for part in parts])
+
+    def _cover(
+        self, polygons: Sequence[Sequence[list[tuple[float, float]] | np.ndarray]]
+    ) -> Float[np.ndarray, "h w"]:
+        """Share of every texel that polygons cover; rings after the first are holes."""
         mask = np.zeros(self.shape, dtype=np.uint8)
-        for outline in outlines:
-            for polygon in shapely.get_parts(outline):
-                cv2.fillPoly(
-                    mask, [self.pixels(np.array(polygon.exterior.coords))], (255,), cv2.LINE_AA, _SHIFT
-                )
+        for rings in polygons:
+            cv2.fillPoly(mask, [self.pixels(ring) for ring in rings], (255,), cv2.LINE_AA, _SHIFT)
         return mask.astype(np.float32) / 255
 
     def stripes(self, area: Area, cover: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:

@@ -32,17 +32,12 @@ _BOXES = {
     "pedestrian": (200, 90, 20),
 }
 _PROPS = {"tree": (96, 150, 70), "lamp": (120, 120, 120), "sign": (200, 60, 60)}
-_PARKED, _EGO = (130, 136, 146), (210, 30, 60)
+_PARKED, _EGO, _INK = (130, 136, 146), (210, 30, 60), (40, 40, 40)
 _SHIFT = 4
 
 
 def draw_layout(layout: Layout, seconds: float) -> UInt8[np.ndarray, "h w 3"]:
-    """RGB picture (H, W, 3), east to the right: map, houses, boxes at time 0 with their ways, the car's path.
-
-    Args:
-        layout: What to draw.
-        seconds: How far the ways lead.
-    """
+    """RGB picture, east to the right: map, houses, boxes at time 0, their ways for ``seconds``, the car's."""
     return _Sheet(layout, seconds).draw()
 
 
@@ -52,11 +47,8 @@ class _Sheet:
         self.times = np.linspace(0, seconds, 25)
         path = _way(layout.ego.track, self.times)
         low, high = path.min(0) - _REACH_M / 2, path.max(0) + _REACH_M / 2
-        ahead = (
-            np.array([np.cos(layout.ego.track[-1].yaw_rad), np.sin(layout.ego.track[-1].yaw_rad)])
-            * _REACH_M
-            / 2
-        )
+        yaw = layout.ego.track[-1].yaw_rad
+        ahead = np.array([np.cos(yaw), np.sin(yaw)]) * _REACH_M / 2
         low, high = np.minimum(low, low + ahead) - _MARGIN_M, np.maximum(high, high + ahead) + _MARGIN_M
         self.scale = _SIZE_PX / float((high - low).max())
         self.corner = np.array([low[0], high[1]])
@@ -73,17 +65,9 @@ class _Sheet:
             self._fill([house.polygon], (184, 168, 156))
             self._stroke([*house.polygon, house.polygon[0]], (120, 104, 94), 1)
         for prop in layout.props:
-            radius = 1.6 if prop.kind == "tree" else 0.4
+            radius = int((1.6 if prop.kind == "tree" else 0.4) * self.scale * 2**_SHIFT)
             centre = self._pixels([prop.at_m])[0].tolist()
-            cv2.circle(
-                self.image,
-                centre,
-                int(radius * self.scale * 2**_SHIFT),
-                _PROPS[prop.kind],
-                -1,
-                cv2.LINE_AA,
-                _SHIFT,
-            )
+            cv2.circle(self.image, centre, radius, _PROPS[prop.kind], -1, cv2.LINE_AA, _SHIFT)
         for box in layout.boxes:
             moving = is_moving(box.track)
             if moving:
@@ -119,24 +103,15 @@ class _Sheet:
 
     def _name(self, text: str, track: list[TrackPoint]) -> None:
         x, y, _ = track_function(track)(np.zeros(1))[0]
-        place = self._pixels([(x + 1.2, y + 1.2)])[0] // 2**_SHIFT
-        cv2.putText(
-            self.image, text, place.tolist(), cv2.FONT_HERSHEY_SIMPLEX, 0.36, (40, 40, 40), 1, cv2.LINE_AA
-        )
+        self._write(text, (self._pixels([(x + 1.2, y + 1.2)])[0] // 2**_SHIFT).tolist(), 0.36)
+
+    def _write(self, text: str, place: Sequence[int], size: float) -> None:
+        cv2.putText(self.image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, _INK, 1, cv2.LINE_AA)
 
     def _scale_bar(self) -> None:
         height = self.image.shape[0]
-        cv2.line(self.image, (14, height - 14), (14 + round(10 * self.scale), height - 14), (40, 40, 40), 2)
-        cv2.putText(
-            self.image,
-            "10 m",
-            (14, height - 20),
-            cv2.FONT_HERSHEY_SIMPLEX,
-            0.45,
-            (40, 40, 40),
-            1,
-            cv2.LINE_AA,
-        )
+        cv2.line(self.image, (14, height - 14), (14 + round(10 * self.scale), height - 14), _INK, 2)
+        self._write("10 m", (14, height - 20), 0.45)
 
 
 def _way(track: list[TrackPoint], times_s: np.ndarray) -> np.ndarray:

@@ -39,18 +39,16 @@ class Mesh:
         """All of them as one."""
         if not parts:
             return Mesh(np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64))
-        corners = np.concatenate([p.corners for p in parts])
-        return Mesh(
-            corners, np.concatenate([p.uv for p in parts]), np.concatenate([p.material for p in parts])
-        )
+        fields = zip(*((p.corners, p.uv, p.material) for p in parts), strict=True)
+        return Mesh(*(np.concatenate(field) for field in fields))
 
 
-def place(at_m: Sequence[float], yaw_rad: float = 0.0) -> Float[np.ndarray, "4 4"]:
-    """Pose of something upright."""
-    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+def upright(place: Sequence[float] | Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:
+    """Pose on the ground from x, y and yaw."""
+    cos, sin = np.cos(place[2]), np.sin(place[2])
     pose = np.eye(4)
     pose[:2, :2] = [[cos, -sin], [sin, cos]]
-    pose[: len(at_m), 3] = at_m
+    pose[:2, 3] = place[:2]
     return pose
 
 
@@ -90,13 +88,9 @@ def frustum(
     z_m: tuple[float, float],
     materials: Sequence[int | None],
 ) -> Mesh:
-    """A body between two rectangles (x0, x1, y0, y1).
+    """A body between a lower and an upper rectangle (x0, x1, y0, y1) at two heights.
 
-    Args:
-        low: The lower rectangle.
-        high: The upper one.
-        z_m: Their heights.
-        materials: Of the faces left, right, back, front, top and bottom; None leaves one out.
+    Materials are those of the faces left, right, back, front, top and bottom; None leaves one out.
     """
     points = [
         [x, y, z]
@@ -177,10 +171,8 @@ def walls(
     points = np.array(outline.exterior.coords)
     here, there = points[:-1], points[1:]
     low, high = (np.full((len(here), 1), z) for z in z_m)
-    corners = np.stack(
-        [np.hstack([here, low]), np.hstack([there, low]), np.hstack([there, high]), np.hstack([here, high])],
-        axis=1,
-    )
+    around = ((here, low), (there, low), (there, high), (here, high))
+    corners = np.stack([np.hstack(corner) for corner in around], axis=1)
     # A wall takes whole textures across, so that no window is cut.
     times = np.maximum(1, np.rint(np.linalg.norm(there - here, axis=1) / texture_m[0]))
     size = np.stack([times, np.full(len(times), (z_m[1] - z_m[0]) / texture_m[1])], axis=1)

@@ -33,15 +33,9 @@ def _flat(colour: Colour, shape: tuple[int, int]) -> np.ndarray:
     return np.full((*shape, 3), colour, dtype=np.float32)
 
 
-def plain(
-    rng: np.random.Generator,
-    width_m: float,
-    height_m: float,
-    colour: Colour,
-    texel_m: float = 0.04,
-) -> Image:
+def plain(rng: np.random.Generator, width_m: float, height_m: float, colour: Colour) -> Image:
     """A wall, roof or post of one colour with stains and grain."""
-    shape = max(8, round(height_m / texel_m)), max(8, round(width_m / texel_m))
+    shape = _shape(width_m, height_m, 0.04)
     return finished(_flat(colour, shape) + noise(rng, shape, {1: 4, 4: 6, 16: 7, 60: 9})[..., None])
 
 
@@ -115,7 +109,7 @@ def _shop(rng: np.random.Generator, image: np.ndarray, height_px: float) -> None
     while left < width - 20:
         span = int(rng.uniform(24, 75))
         is_door = rng.random() < 0.3
-        shade = rng.uniform(30, 90, 3) if not is_door else rng.uniform(50, 150, 3)
+        shade = rng.uniform(50, 150, 3) if is_door else rng.uniform(30, 90, 3)
         right = min(left + span, width - 8)
         bottom = height - (3 if is_door else int(0.14 * height_px))
         cv2.rectangle(image, (left, top + board + 6), (right, bottom), shade.tolist(), -1)
@@ -157,9 +151,8 @@ def _print(rng: np.random.Generator, image: np.ndarray) -> None:
     _write(image, letters, at, height / 45, inks[1].tolist(), max(2, height // 30))
     for _ in range(3):
         centre = rng.uniform((0.5 * width, 0.1 * height), (0.95 * width, 0.8 * height)).astype(int)
-        cv2.circle(
-            image, centre.tolist(), int(rng.uniform(0.05, 0.2) * height), inks[1].tolist(), -1, cv2.LINE_AA
-        )
+        radius = int(rng.uniform(0.05, 0.2) * height)
+        cv2.circle(image, centre.tolist(), radius, inks[1].tolist(), -1, cv2.LINE_AA)
 
 
 def end(rng: np.random.Generator, width_m: float, height_m: float, paint: Colour, lamp: Colour) -> Image:
@@ -230,9 +223,8 @@ def leaves(rng: np.random.Generator, colour: Colour) -> Image:
 
 def bark(rng: np.random.Generator) -> Image:
     """A trunk: upright furrows."""
-    grain = cv2.resize(
-        rng.normal(0, 22, (12, 64)).astype(np.float32), (64, 128), interpolation=cv2.INTER_CUBIC
-    )
+    furrows = rng.normal(0, 22, (12, 64)).astype(np.float32)
+    grain = cv2.resize(furrows, (64, 128), interpolation=cv2.INTER_CUBIC)
     return finished(_flat((98, 82, 66), (128, 64)) + grain[..., None])
 
 

@@ -49,14 +49,9 @@ class WorldView:
 def look(
     world: World, moment: Moment, camera: Camera, following: tuple[float, Camera], *, antialiased: bool = True
 ) -> WorldView:
-    """The picture of a camera in the map frame.
+    """The picture of a camera in the map frame, and the flow to where another time and camera see the same.
 
-    Args:
-        world: The street.
-        moment: The street at the time of the picture.
-        camera: Where the picture is taken.
-        following: When and where the flow leads to.
-        antialiased: Whether pixels that differ from their neighbours take four further rays.
+    Antialiased, pixels that differ from their neighbours take four further rays.
     """
     shape = camera.height_px, camera.width_px
     eye = _Eye(world, moment, camera)
@@ -83,11 +78,10 @@ def _refine(
     """Give pixels that differ from a neighbour the mean over further rays, in place."""
     seen = _encoded(colour).T.mean(axis=0).reshape(shape)
     uneven = np.zeros(shape, dtype=bool)
-    for axis in (0, 1):
-        step = np.abs(np.diff(seen, axis=axis)) > _CONTRAST
-        first, second = (slice(None, -1), slice(1, None))
-        uneven[(first, slice(None)) if axis == 0 else (slice(None), first)] |= step
-        uneven[(second, slice(None)) if axis == 0 else (slice(None), second)] |= step
+    for view, grey in ((uneven, seen), (uneven.T, seen.T)):
+        step = np.abs(np.diff(grey, axis=0)) > _CONTRAST
+        view[:-1] |= step
+        view[1:] |= step
     chosen = np.flatnonzero(uneven.ravel())
     across = (columns[chosen] + _RAYS[:, :1]).ravel()
     down = (rows[chosen] + _RAYS[:, 1:]).ravel()

@@ -61,11 +61,9 @@ class Road:
         self, right_m: float, left_m: float, start_m: float | None = None, end_m: float | None = None
     ) -> shapely.Polygon:
         """The part of the road between two distances from its middle line, left counted positive."""
-        stations = np.linspace(
-            self.start_m if start_m is None else start_m,
-            self.end_m if end_m is None else end_m,
-            2 * len(self.points),
-        )
+        first = self.start_m if start_m is None else start_m
+        last = self.end_m if end_m is None else end_m
+        stations = np.linspace(first, last, 2 * len(self.points))
         right, left = self.at(stations, right_m)[:, :2], self.at(stations, left_m)[:, :2]
         return shapely.Polygon(np.concatenate([right, left[::-1]]))
 
@@ -141,9 +139,8 @@ class RoadNet:
         """The map's paint, left out inside the junction."""
         found: list[Line] = []
         for road in self.roads:
-            found += _lines(
-                "road_divider" if road.lanes > 1 else "lane_divider", road.line(0.0), self.junction
-            )
+            middle: LineKind = "road_divider" if road.lanes > 1 else "lane_divider"
+            found += _lines(middle, road.line(0.0), self.junction)
             for side in (-1, 1):
                 for lane in range(1, road.lanes):
                     found += _lines("lane_divider", road.line(side * lane * LANE_M), self.junction)

@@ -9,7 +9,7 @@ from dreamdrive.scene.layout import Building, Layout, Prop
 from dreamdrive.world import paint
 from dreamdrive.world.ground import GroundMap
 from dreamdrive.world.materials import Materials, Semantic
-from dreamdrive.world.mesh import Mesh, ball, box, cylinder, place, plate, walls
+from dreamdrive.world.mesh import Mesh, ball, box, cylinder, plate, upright, walls
 
 KERB_M = 0.12
 _REACH_M = 600.0
@@ -32,10 +32,31 @@ def scenery(layout: Layout, ground: GroundMap, ground_material: int, materials: 
             _kerb(ring, kerb, outer)
             for ring, outer in ((area.polygon, True), *((h, False) for h in area.holes))
         ]
-    made: dict[tuple[str, int], int] = {}
-    meshes += [_house(house, materials, made) for house in layout.buildings]
-    meshes += [_prop(prop, materials, made) for prop in layout.props]
+    paints = _Paints(materials)
+    build = {"tree": _tree, "lamp": _lamp, "sign": _sign}
+    meshes += [_house(house, paints) for house in layout.buildings]
+    meshes += [build[p.kind](p, paints).moved(upright((*p.at_m, p.yaw_rad))) for p in layout.props]
     return Mesh.joined(meshes)
+
+
+class _Paints:
+    """Materials of what stands beside the road, each of them painted once."""
+
+    def __init__(self, materials: Materials) -> None:
+        self._materials, self._made = materials, dict[tuple[str, int], int]()
+
+    def get(self, name: str, look: int, kind: Semantic, make: Callable[[], paint.Image]) -> int:
+        """Index of the material of a name and look."""
+        if (name, look) not in self._made:
+            self._made[name, look] = self._materials.add(make(), kind, repeats=True)
+        return self._made[name, look]
+
+    def steel(self) -> int:
+        """That of posts."""
+        grey = (98, 104, 106)
+        return self.get(
+            "steel", 0, Semantic.POLE, lambda: paint.plain(np.random.default_rng(8), 0.5, 2.0, grey)
+        )
 
 
 def _kerb(ring: list[tuple[float, float]], material: int, outer: bool) -> Mesh:
@@ -44,49 +65,27 @@ def _kerb(ring: list[tuple[float, float]], material: int, outer: bool) -> Mesh:
     return mesh if outer else Mesh(mesh.corners[:, ::-1], mesh.uv[:, ::-1], mesh.material)
 
 
-def _house(house: Building, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
+def _house(house: Building, paints: _Paints) -> Mesh:
     """Walls with a facade for every look and height, and a flat roof."""
     height = round(house.height_m, 1)
-    key = (f"house {height}", house.look)
-    if key not in made:
-        rng = np.random.default_rng([house.look, 4])
-        made[key] = materials.add(paint.facade(rng, _FACADE_M, height), Semantic.BUILDING, repeats=True)
-    if ("roof", 0) not in made:
-        slates = paint.plain(np.random.default_rng(5), 6.0, 6.0, (112, 104, 100))
-        made["roof", 0] = materials.add(slates, Semantic.BUILDING, repeats=True)
-    roof = plate(shapely.Polygon(house.polygon), house.height_m, made["roof", 0], (0, 0), (6.0, 6.0))
-    return Mesh.joined(
-        [walls(house.polygon, (0.0, house.height_m), made[key], (_FACADE_M, house.height_m)), roof]
+    rng = np.random.default_rng([house.look, 4])
+    facade = paints.get(
+        f"house {height}", house.look, Semantic.BUILDING, lambda: paint.facade(rng, _FACADE_M, height)
     )
+    slates = (112, 104, 100)
+    slate = paints.get(
+        "roof", 0, Semantic.BUILDING, lambda: paint.plain(np.random.default_rng(5), 6.0, 6.0, slates)
+    )
+    roof = plate(shapely.Polygon(house.polygon), house.height_m, slate, (0, 0), (6.0, 6.0))
+    front = walls(house.polygon, (0.0, house.height_m), facade, (_FACADE_M, house.height_m))
+    return Mesh.joined([front, roof])
 
 
-def _prop(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
-    build = {"tree": _tree, "lamp": _lamp, "sign": _sign}
-    return build[prop.kind](prop, materials, made).moved(place(prop.at_m, prop.yaw_rad))
-
-
-def _shared(
-    made: dict[tuple[str, int], int],
-    key: tuple[str, int],
-    make: Callable[[], paint.Image],
-    materials: Materials,
-    kind: Semantic,
-) -> int:
-    """A material that is painted once."""
-    if key not in made:
-        made[key] = materials.add(make(), kind, repeats=True)
-    return made[key]
-
-
-def _tree(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
+def _tree(prop: Prop, paints: _Paints) -> Mesh:
     rng = np.random.default_rng([prop.look, 6])
     colour = tuple(rng.uniform((52, 78, 30), (112, 122, 60)))
-    leaves = _shared(
-        made, ("leaves", prop.look), lambda: paint.leaves(rng, colour), materials, Semantic.VEGETATION
-    )
-    bark = _shared(
-        made, ("bark", 0), lambda: paint.bark(np.random.default_rng(7)), materials, Semantic.VEGETATION
-    )
+    leaves = paints.get("leaves", prop.look, Semantic.VEGETATION, lambda: paint.leaves(rng, colour))
+    bark = paints.get("bark", 0, Semantic.VEGETATION, lambda: paint.bark(np.random.default_rng(7)))
     height, wide = prop.height_m, prop.height_m * rng.uniform(0.22, 0.32)
     parts = [cylinder((0, 0, 0), (0, 0, 0.6 * height), (0.045 * height, 0.02 * height), bark, None, 8)]
     for _ in range(7):
@@ -97,20 +96,8 @@ def _tree(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) ->
     return Mesh.joined(parts)
 
 
-def _steel(materials: Materials, made: dict[tuple[str, int], int]) -> int:
-    grey = (98, 104, 106)
-    return _shared(
-        made,
-        ("steel", 0),
-        lambda: paint.plain(np.random.default_rng(8), 0.5, 2.0, grey),
-        materials,
-        Semantic.POLE,
-    )
-
-
-def _lamp(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
-    steel = _steel(materials, made)
-    top = prop.height_m
+def _lamp(prop: Prop, paints: _Paints) -> Mesh:
+    steel, top = paints.steel(), prop.height_m
     return Mesh.joined(
         [
             cylinder((0, 0, 0), (0, 0, top), (0.11, 0.06), steel, None, 8),
@@ -120,15 +107,8 @@ def _lamp(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) ->
     )
 
 
-def _sign(prop: Prop, materials: Materials, made: dict[tuple[str, int], int]) -> Mesh:
-    steel = _steel(materials, made)
-    face = _shared(
-        made,
-        ("sign", prop.look),
-        lambda: paint.sign(np.random.default_rng([prop.look, 9])),
-        materials,
-        Semantic.SIGN,
-    )
-    top = prop.height_m
+def _sign(prop: Prop, paints: _Paints) -> Mesh:
+    steel, top, rng = paints.steel(), prop.height_m, np.random.default_rng([prop.look, 9])
+    face = paints.get("sign", prop.look, Semantic.SIGN, lambda: paint.sign(rng))
     board = box((0.04, 0, top - 0.4), (0.04, 0.75, 0.75), [steel, steel, steel, face, steel, steel])
     return Mesh.joined([cylinder((0, 0, 0), (0, 0, top), (0.04, 0.04), steel, None, 6), board])

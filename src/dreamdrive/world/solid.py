@@ -16,12 +16,7 @@ _OFF_SURFACE_M = 2e-3
 
 @dataclass(frozen=True)
 class Hits:
-    """First triangles on some rays.
-
-    Attributes:
-        triangle: Index (N,), -1 for none.
-        distance: In lengths of the ray's direction (N,); infinite for none.
-    """
+    """First triangles on some rays, -1 for none; distances in lengths of the ray's direction, or infinite."""
 
     triangle: Int[np.ndarray, " n"]
     distance: Float[np.ndarray, " n"]

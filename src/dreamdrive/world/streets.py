@@ -56,11 +56,7 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
     Raises:
         InputError: The drive is longer than ``MOST_SECONDS``, or the edition is unknown.
     """
-    if (
-        options.seconds <= 0
-        or (options.speed_m_s or 0) < 0
-        or min(options.movers or 0, options.parked or 0) < 0
-    ):
+    if options.seconds <= 0 or min(options.speed_m_s or 0, options.movers or 0, options.parked or 0) < 0:
         raise ValueError(f"street: cannot draw {options}")
     if options.seconds > MOST_SECONDS:
         raise InputError(
@@ -154,9 +150,8 @@ def _houses(rng: np.random.Generator, net: RoadNet) -> list[Building]:
                     continue
                 taken.append(outline.buffer(-0.05))
                 ring = [(round(float(x), 2), round(float(y), 2)) for x, y in outline.exterior.coords[:-1]]
-                houses.append(
-                    Building(polygon=ring, height_m=round(height, 1), look=look + 100 * (net.roads[0].lanes))
-                )
+                look += 100 * net.roads[0].lanes
+                houses.append(Building(polygon=ring, height_m=round(height, 1), look=look))
     return houses
 
 
@@ -172,9 +167,8 @@ def _props(
     rng: np.random.Generator, net: RoadNet, houses: list[Building], boxes: list[shapely.Polygon]
 ) -> list[Prop]:
     """Lamps and trees along the kerbs, signs at some places; none on the road, in a house or in a box."""
-    blocked = shapely.union_all([net.paved, *(shapely.Polygon(h.polygon) for h in houses), *boxes]).buffer(
-        0.25
-    )
+    standing = [net.paved, *(shapely.Polygon(house.polygon) for house in houses), *boxes]
+    blocked = shapely.union_all(standing).buffer(0.25)
     shapely.prepare(blocked)
     props: list[Prop] = []
     trees, kinds = float(rng.uniform(0.0, 0.9)), int(rng.integers(2, 4))

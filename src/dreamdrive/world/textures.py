@@ -36,13 +36,9 @@ class Textures:
         along: Float[np.ndarray, "n 2"],
         width: Float[np.ndarray, " n"],
     ) -> Float[np.ndarray, "n 3"]:
-        """Colours (N, 3) in 0..255 of the mean over narrow ellipses on the textures.
+        """Colours in 0..255 of the mean over narrow ellipses on the textures; 0 to 1 is once across.
 
-        Args:
-            index: The texture of each point.
-            uv: The point on it; 0 to 1 is once across.
-            along: Half the long axis of the ellipse.
-            width: Its short axis, in units of u.
+        ``along`` is half of the long axis, ``width`` the short axis in units of u.
         """
         atlas = self._packed()
         first = index * self._most

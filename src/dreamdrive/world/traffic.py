@@ -1,5 +1,7 @@
 """Who uses a drawn street: traffic that never collides, and parked vehicles."""
 
+from itertools import cycle, islice, product
+
 import numpy as np
 import shapely
 
@@ -22,11 +24,7 @@ _MOST_TRIES = 400
 
 
 class Traffic:
-    """Boxes, each kept clear of all before it.
-
-    Attributes:
-        boxes: Those that found a place.
-    """
+    """Boxes that found a place, each kept clear of all before it."""
 
     def __init__(
         self, rng: np.random.Generator, net: RoadNet, ego: Ego, speed_m_s: float, seconds: float
@@ -49,50 +47,50 @@ class Traffic:
         if zebras:
             self._zebra = zebras[0]
             turns.insert(2, self._on_zebra)
-        tries = 0
-        while len(self.boxes) < wanted and tries < _MOST_TRIES:
-            turns[tries % len(turns)]()
-            tries += 1
+        for turn in islice(cycle(turns), _MOST_TRIES):
+            if len(self.boxes) < wanted:
+                turn()
 
     def add_parked(self, count: int | None, *, alike: bool) -> None:
         """Vehicles at both kerbs, nearest first; if ``alike``, every second one looks like a moving one."""
-        rng, main = self._rng, self._net.roads[0]
+        rng = self._rng
         wanted = int(rng.integers(4, 11)) if count is None else count
         models = [box for box in self.boxes if box.kind in ("car", "van")]
         before = len(self.boxes)
         for number in range(_MOST_TRIES):
             if len(self.boxes) - before >= wanted:
                 break
-            station = float(rng.uniform(2, 18 + 3.0 * wanted + 0.2 * number))
+            station = self._uniform(2, 18 + 3.0 * wanted + 0.2 * number)
             side = int(rng.choice([-1, 1]))
-            left = side * (main.half_m - 0.5 * PARKING_M + float(rng.uniform(-0.08, 0.08)))
-            x, y, yaw = main.at(np.array([station]), left)[0]
-            place = [TrackPoint(0.0, _round(x), _round(y), _round(yaw + (np.pi if side > 0 else 0.0), 4))]
+            place, clear = self._at_kerb(station, side, self._uniform(-0.08, 0.08))
             if alike and models and number % 2 == 0:
                 model = models[int(rng.integers(len(models)))]
                 kind, size, look = model.kind, model.size_m, model.look
             else:
                 kind = "van" if rng.random() < 0.2 else "car"
                 size, look = self._size(kind), int(rng.integers(10_000))
-            # Not in the junction, nor in front of a zebra crossing.
-            if self._net.junction.buffer(3.0).contains(shapely.Point(x, y)):
-                continue
-            self._add(kind, size, place, look)
+            if clear:
+                self._add(kind, size, place, look)
         looks = {(box.kind, box.look) for box in self.boxes[:before]}
         if alike and wanted and not any((box.kind, box.look) in looks for box in self.boxes[before:]):
             self._park_one_alike(models or [box for box in self.boxes[:before] if box.kind == "truck"])
 
     def _park_one_alike(self, models: list[Box]) -> None:
         """At the first kerb with room for what looks like a moving one."""
+        for station, side, model in product(np.arange(4.0, 80.0).tolist(), (-1, 1), models):
+            place, clear = self._at_kerb(station, side, 0.0)
+            if clear and self._add(model.kind, model.size_m, place, model.look):
+                return
+
+    def _at_kerb(self, station_m: float, side: int, aside_m: float) -> tuple[list[TrackPoint], bool]:
+        """A parking place, and whether it is neither in the junction nor in front of a zebra crossing."""
         main = self._net.roads[0]
-        for station in np.arange(4.0, 80.0) if models else ():
-            for side, model in ((side, model) for side in (-1, 1) for model in models):
-                x, y, yaw = main.at(np.array([station]), side * (main.half_m - 0.5 * PARKING_M))[0]
-                turned = _round(yaw + (np.pi if side > 0 else 0.0), 4)
-                clear = not self._net.junction.buffer(3.0).contains(shapely.Point(x, y))
-                place = [TrackPoint(0.0, _round(x), _round(y), turned)]
-                if clear and self._add(model.kind, model.size_m, place, model.look):
-                    return
+        x, y, yaw = main.at(np.array([station_m]), side * (main.half_m - 0.5 * PARKING_M + aside_m))[0]
+        place = TrackPoint(0.0, _round(x), _round(y), _round(yaw + (np.pi if side > 0 else 0.0), 4))
+        return [place], not self._net.junction.buffer(3.0).contains(shapely.Point(x, y))
+
+    def _uniform(self, low: float, high: float) -> float:
+        return float(self._rng.uniform(low, high))
 
     def _add(
         self, kind: BoxKind, size_m: tuple[float, float, float], track: list[TrackPoint], look: int
@@ -139,31 +137,24 @@ class Traffic:
         self._add(kind, self._size(kind), to_track(t, way), int(self._rng.integers(10_000)))
 
     def _ahead(self) -> None:
-        rng, road = self._rng, self._net.roads[0]
-        speed = max(self._speed, 4.0) * float(rng.uniform(0.9, 1.25))
+        road = self._net.roads[0]
+        speed = max(self._speed, 4.0) * self._uniform(0.9, 1.25)
         lane = -(road.lanes - 0.5) * LANE_M
-        self._drive(
-            self._vehicle(), road, float(rng.uniform(10, 16)), lane, speed, float(rng.uniform(-0.8, 0.8))
-        )
+        self._drive(self._vehicle(), road, self._uniform(10, 16), lane, speed, self._uniform(-0.8, 0.8))
 
     def _oncoming(self) -> None:
-        rng, road = self._rng, self._net.roads[0]
-        lane = (int(rng.integers(road.lanes)) + 0.5) * LANE_M
-        self._drive(self._vehicle(), road, float(rng.uniform(16, 55)), lane, -float(rng.uniform(5, 10)))
+        road = self._net.roads[0]
+        lane = (int(self._rng.integers(road.lanes)) + 0.5) * LANE_M
+        self._drive(self._vehicle(), road, self._uniform(16, 55), lane, -self._uniform(5, 10))
 
     def _overtaking(self) -> None:
         """On the next lane, faster than the recording car; without one, a bicycle that is overtaken."""
-        rng, road = self._rng, self._net.roads[0]
+        road = self._net.roads[0]
         if road.lanes == 1:
-            return self._drive(
-                "bicycle", road, float(rng.uniform(7, 16)), 0.6 - LANE_M, float(rng.uniform(3.5, 5))
-            )
+            return self._drive("bicycle", road, self._uniform(7, 16), 0.6 - LANE_M, self._uniform(3.5, 5))
+        kind, start_m = self._vehicle(), self._uniform(-4, 4)
         return self._drive(
-            self._vehicle(),
-            road,
-            float(rng.uniform(-4, 4)),
-            -(road.lanes - 1.5) * LANE_M,
-            self._speed + float(rng.uniform(2, 5)),
+            kind, road, start_m, -(road.lanes - 1.5) * LANE_M, self._speed + self._uniform(2, 5)
         )
 
     def _crossing(self) -> None:
@@ -173,30 +164,26 @@ class Traffic:
         rng, road = self._rng, self._net.roads[1]
         side = int(rng.choice([-1, 1]))
         lane = -side * (int(rng.integers(road.lanes)) + 0.5) * LANE_M
-        self._drive(
-            self._vehicle(), road, -side * float(rng.uniform(6, 22)), lane, side * float(rng.uniform(4, 9))
-        )
+        self._drive(self._vehicle(), road, -side * self._uniform(6, 22), lane, side * self._uniform(4, 9))
 
     def _on_zebra(self) -> None:
-        rng = self._rng
         frame = rectangle_around(self._zebra)[:4]
         a, b = (frame[0] + frame[1]) / 2, (frame[2] + frame[3]) / 2
         if np.linalg.norm(b - a) < np.linalg.norm(frame[1] - frame[0]):
             a, b = (frame[1] + frame[2]) / 2, (frame[3] + frame[0]) / 2
-        if rng.random() < 0.5:
+        if self._rng.random() < 0.5:
             a, b = b, a
         along = (b - a) / np.linalg.norm(b - a)
-        start = float(rng.uniform(0.0, 0.6)) * float(np.linalg.norm(b - a))
-        self._walk(a + start * along, along, float(rng.uniform(1.1, 1.7)))
+        start = self._uniform(0.0, 0.6) * float(np.linalg.norm(b - a))
+        self._walk(a + start * along, along, self._uniform(1.1, 1.7))
 
     def _walking(self) -> None:
         rng, road = self._rng, self._net.roads[0]
         side, way = (int(rng.choice([-1, 1])) for _ in range(2))
-        left = side * (road.half_m + float(rng.uniform(0.9, SIDEWALK_M - 0.6)))
-        x, y, heading = road.at(np.array([float(rng.uniform(5, 28))]), left)[0]
-        self._walk(
-            np.array([x, y]), way * np.array([np.cos(heading), np.sin(heading)]), float(rng.uniform(0.9, 1.7))
-        )
+        left = side * (road.half_m + self._uniform(0.9, SIDEWALK_M - 0.6))
+        x, y, heading = road.at(np.array([self._uniform(5, 28)]), left)[0]
+        along = way * np.array([np.cos(heading), np.sin(heading)])
+        self._walk(np.array([x, y]), along, self._uniform(0.9, 1.7))
 
     def _walk(self, start: np.ndarray, direction: np.ndarray, speed_m_s: float) -> None:
         place = start + speed_m_s * self._times[:, None] * direction
@@ -205,11 +192,10 @@ class Traffic:
         self._add("pedestrian", self._size("pedestrian"), track, int(self._rng.integers(10_000)))
 
     def _cycling(self) -> None:
-        rng, road = self._rng, self._net.roads[0]
-        against = bool(rng.random() < 0.5)
-        left = (1 if against else -1) * (road.lanes * LANE_M - 0.5)
-        speed = float(rng.uniform(3.5, 5.5))
-        self._drive("bicycle", road, float(rng.uniform(8, 30)), left, -speed if against else speed)
+        road = self._net.roads[0]
+        way = -1 if self._rng.random() < 0.5 else 1
+        left, speed = -way * (road.lanes * LANE_M - 0.5), way * self._uniform(3.5, 5.5)
+        self._drive("bicycle", road, self._uniform(8, 30), left, speed)
 
 
 def to_track(times_s: np.ndarray, way: np.ndarray) -> list[TrackPoint]:

@@ -12,7 +12,7 @@ from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_fu
 from dreamdrive.world.bodies import Part, body
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
-from dreamdrive.world.mesh import Mesh
+from dreamdrive.world.mesh import Mesh, upright
 from dreamdrive.world.scenery import scenery
 from dreamdrive.world.sky import Sky, make_sky
 from dreamdrive.world.solid import Solid
@@ -53,13 +53,7 @@ class Mover:
 
 @dataclass(frozen=True)
 class Moment:
-    """A world at a time.
-
-    Attributes:
-        time_s: The time.
-        moving: The movers' triangles.
-        poses: ``map_from_part`` (P, 4, 4) of each part; triangles say which is theirs.
-    """
+    """A world at a time: its movers' triangles, whose owner is a part, and ``map_from_part`` of each part."""
 
     time_s: float
     moving: Solid
@@ -87,14 +81,14 @@ class World:
         self.movers = [self._mover(i + 1, box) for i, box in enumerate(layout.boxes)]
         still = scenery(layout, self.ground, self.ground_material, self.materials)
         parked = [m for m in self.movers if not m.moving]
-        meshes = [_posed(m, 0.0) for m in parked]
+        meshes = [
+            Mesh.joined([p.mesh.moved(pose) for p, pose in zip(m.parts, m.part_poses(0.0), strict=True)])
+            for m in parked
+        ]
         owners = [np.full(len(mesh), m.instance) for m, mesh in zip(parked, meshes, strict=True)]
+        owner = np.concatenate([np.zeros(len(still), dtype=np.int64), *owners])
         self._device = EmbreeDevice()
-        self.standing = Solid(
-            Mesh.joined([still, *meshes]),
-            np.concatenate([np.zeros(len(still), dtype=np.int64), *owners]),
-            self._device,
-        )
+        self.standing = Solid(Mesh.joined([still, *meshes]), owner, self._device)
 
     def poses(self, t_s: float) -> Float[np.ndarray, "p 4 4"]:
         """``map_from_part`` of all parts of moving boxes at a time."""
@@ -123,20 +117,6 @@ class World:
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
         return Mover(box, instance, is_moving(box.track), parts, places, _way(box.track, places))
-
-
-def upright(place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:
-    """Pose on the ground from x, y and yaw."""
-    cos, sin = np.cos(place[2]), np.sin(place[2])
-    pose = np.eye(4)
-    pose[:2, :2] = [[cos, -sin], [sin, cos]]
-    pose[:2, 3] = place[:2]
-    return pose
-
-
-def _posed(mover: Mover, t_s: float) -> Mesh:
-    poses = mover.part_poses(t_s)
-    return Mesh.joined([part.mesh.moved(pose) for part, pose in zip(mover.parts, poses, strict=True)])
 
 
 def _way(

@@ -33,7 +33,7 @@ from dreamdrive.scene.layout import (
 )
 from dreamdrive.world import draw_street
 from dreamdrive.world.drive import ego_poses
-from dreamdrive.world.world import upright
+from dreamdrive.world.mesh import upright
 
 EAST = Ego([TrackPoint(0.0, 0.0, 0.0, 0.0), TrackPoint(1.0, 10.0, 0.0, 0.0)])
 NOW = np.zeros(1)

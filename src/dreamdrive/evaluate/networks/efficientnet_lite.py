@@ -98,9 +98,5 @@ def efficientnet_lite0_features(
 ) -> Float[Tensor, "n 1280"]:
     """Features of RGB images, brought to 224 x 224 by antialiased bilinear, values (x - 127) / 128."""
     with torch.inference_mode():
-        return torch.cat(
-            [
-                network((resize(batch, SIZE_PX, SIZE_PX, "antialias") - 127) / 128)
-                for batch in frames.split(_BATCH)
-            ]
-        )
+        pictures = (resize(batch, SIZE_PX, SIZE_PX, "antialias") for batch in frames.split(_BATCH))
+        return torch.cat([network((picture - 127) / 128) for picture in pictures])

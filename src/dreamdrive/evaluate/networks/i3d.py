@@ -1,5 +1,6 @@
 """Inflated 3-D Inception for FVD: RGB, Kinetics-400, with the keys of its PyTorch port (Carreira 2017)."""
 
+from collections import OrderedDict
 from pathlib import Path
 
 import torch
@@ -32,18 +33,6 @@ class ConvNorm3d(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Apply to (n, channels, t, h, w)."""
         return functional.relu(self.bn(self.conv3d(pad_same(x, *self._window))))
-
-
-class Logits(nn.Module):
-    """The classifier as a 1x1x1 convolution."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.conv3d = nn.Conv3d(1024, 400, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, 1024, t, h, w)."""
-        return self.conv3d(x)
 
 
 class Mixed(nn.Module):
@@ -86,7 +75,7 @@ class I3d(nn.Module):
         self.Mixed_4f = Mixed(528, (256, 160, 320, 32, 128, 128))
         self.Mixed_5b = Mixed(832, (256, 160, 320, 32, 128, 128))
         self.Mixed_5c = Mixed(832, (384, 192, 384, 48, 128, 128))
-        self.logits = Logits()
+        self.logits = nn.Sequential(OrderedDict(conv3d=nn.Conv3d(1024, 400, 1)))
 
     def forward(self, x: Float[Tensor, "n 3 t 224 224"]) -> Float[Tensor, "n 400"]:
         """Logits of prepared clips, averaged over the time steps that are left."""

@@ -37,114 +37,117 @@ class ConvNorm(nn.Module):
         return functional.relu(self.bn(self.conv(x)))
 
 
-def _average(x: Tensor) -> Tensor:
-    return functional.avg_pool2d(x, 3, 1, 1, count_include_pad=False)
+class Block(nn.Module):
+    """Convolutions behind and beside each other.
+
+    Rows are the name of a convolution, what it takes (``x`` is the input, ``pool`` the pooled one), its
+    channels and its kernel; ``ends`` are put side by side. A block that halves does so at its ends, without
+    padding; any other pools over the neighbours, by their mean or their maximum.
+    """
+
+    def __init__(
+        self,
+        channels: int,
+        ends: tuple[str, ...],
+        rows: tuple[tuple[str, str, int, int | tuple[int, int]], ...],
+        *,
+        halves: bool = False,
+        pool_maximum: bool = False,
+    ) -> None:
+        super().__init__()
+        self._ends, self._halves, self._pool_maximum = ends, halves, pool_maximum
+        self._sources = [source for _, source, *_ in rows]
+        widths = {"x": channels, "pool": channels}
+        for name, source, out, kernel in rows:
+            widths[name], end = out, halves and name in ends
+            layer = ConvNorm(widths[source], out, kernel, 2 if end else 1, padding=not end)
+            self.add_module(f"branch{name}", layer)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Apply to (n, channels, h, w)."""
+        values = {"x": x, "pool": self._pooled(x)}
+        for (name, layer), source in zip(self.named_children(), self._sources, strict=True):
+            values[name.removeprefix("branch")] = layer(values[source])
+        return torch.cat([values[end] for end in self._ends], 1)
+
+    def _pooled(self, x: Tensor) -> Tensor:
+        if self._halves:
+            return functional.max_pool2d(x, 3, 2)
+        if self._pool_maximum:
+            return functional.max_pool2d(x, 3, 1, 1)
+        return functional.avg_pool2d(x, 3, 1, 1, count_include_pad=False)
 
 
-class BlockA(nn.Module):
+def _block_a(channels: int, pooled: int) -> Block:
     """35 x 35: 1x1, 5x5, double 3x3 and pool branches."""
-
-    def __init__(self, channels: int, pooled: int) -> None:
-        super().__init__()
-        self.branch1x1 = ConvNorm(channels, 64, 1)
-        self.branch5x5_1 = ConvNorm(channels, 48, 1)
-        self.branch5x5_2 = ConvNorm(48, 64, 5)
-        self.branch3x3dbl_1 = ConvNorm(channels, 64, 1)
-        self.branch3x3dbl_2 = ConvNorm(64, 96, 3)
-        self.branch3x3dbl_3 = ConvNorm(96, 96, 3)
-        self.branch_pool = ConvNorm(channels, pooled, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, channels, h, w)."""
-        five = self.branch5x5_2(self.branch5x5_1(x))
-        double = self.branch3x3dbl_3(self.branch3x3dbl_2(self.branch3x3dbl_1(x)))
-        return torch.cat([self.branch1x1(x), five, double, self.branch_pool(_average(x))], 1)
+    rows = (
+        ("1x1", "x", 64, 1),
+        ("5x5_1", "x", 48, 1),
+        ("5x5_2", "5x5_1", 64, 5),
+        ("3x3dbl_1", "x", 64, 1),
+        ("3x3dbl_2", "3x3dbl_1", 96, 3),
+        ("3x3dbl_3", "3x3dbl_2", 96, 3),
+        ("_pool", "pool", pooled, 1),
+    )
+    return Block(channels, ("1x1", "5x5_2", "3x3dbl_3", "_pool"), rows)
 
 
-class BlockB(nn.Module):
+def _block_b() -> Block:
     """35 x 35 to 17 x 17."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.branch3x3 = ConvNorm(288, 384, 3, 2, padding=False)
-        self.branch3x3dbl_1 = ConvNorm(288, 64, 1)
-        self.branch3x3dbl_2 = ConvNorm(64, 96, 3)
-        self.branch3x3dbl_3 = ConvNorm(96, 96, 3, 2, padding=False)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, 288, h, w)."""
-        double = self.branch3x3dbl_3(self.branch3x3dbl_2(self.branch3x3dbl_1(x)))
-        return torch.cat([self.branch3x3(x), double, functional.max_pool2d(x, 3, 2)], 1)
+    rows = (
+        ("3x3", "x", 384, 3),
+        ("3x3dbl_1", "x", 64, 1),
+        ("3x3dbl_2", "3x3dbl_1", 96, 3),
+        ("3x3dbl_3", "3x3dbl_2", 96, 3),
+    )
+    return Block(288, ("3x3", "3x3dbl_3", "pool"), rows, halves=True)
 
 
-class BlockC(nn.Module):
+def _block_c(inner: int) -> Block:
     """17 x 17: 1x1, 7x7, double 7x7 and pool branches."""
-
-    def __init__(self, inner: int) -> None:
-        super().__init__()
-        wide, tall = (1, 7), (7, 1)
-        self.branch1x1 = ConvNorm(768, 192, 1)
-        self.branch7x7_1 = ConvNorm(768, inner, 1)
-        self.branch7x7_2 = ConvNorm(inner, inner, wide)
-        self.branch7x7_3 = ConvNorm(inner, 192, tall)
-        self.branch7x7dbl_1 = ConvNorm(768, inner, 1)
-        self.branch7x7dbl_2 = ConvNorm(inner, inner, tall)
-        self.branch7x7dbl_3 = ConvNorm(inner, inner, wide)
-        self.branch7x7dbl_4 = ConvNorm(inner, inner, tall)
-        self.branch7x7dbl_5 = ConvNorm(inner, 192, wide)
-        self.branch_pool = ConvNorm(768, 192, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, 768, h, w)."""
-        seven = self.branch7x7_3(self.branch7x7_2(self.branch7x7_1(x)))
-        double = self.branch7x7dbl_3(self.branch7x7dbl_2(self.branch7x7dbl_1(x)))
-        double = self.branch7x7dbl_5(self.branch7x7dbl_4(double))
-        return torch.cat([self.branch1x1(x), seven, double, self.branch_pool(_average(x))], 1)
+    rows = (
+        ("1x1", "x", 192, 1),
+        ("7x7_1", "x", inner, 1),
+        ("7x7_2", "7x7_1", inner, (1, 7)),
+        ("7x7_3", "7x7_2", 192, (7, 1)),
+        ("7x7dbl_1", "x", inner, 1),
+        ("7x7dbl_2", "7x7dbl_1", inner, (7, 1)),
+        ("7x7dbl_3", "7x7dbl_2", inner, (1, 7)),
+        ("7x7dbl_4", "7x7dbl_3", inner, (7, 1)),
+        ("7x7dbl_5", "7x7dbl_4", 192, (1, 7)),
+        ("_pool", "pool", 192, 1),
+    )
+    return Block(768, ("1x1", "7x7_3", "7x7dbl_5", "_pool"), rows)
 
 
-class BlockD(nn.Module):
+def _block_d() -> Block:
     """17 x 17 to 8 x 8."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.branch3x3_1 = ConvNorm(768, 192, 1)
-        self.branch3x3_2 = ConvNorm(192, 320, 3, 2, padding=False)
-        self.branch7x7x3_1 = ConvNorm(768, 192, 1)
-        self.branch7x7x3_2 = ConvNorm(192, 192, (1, 7))
-        self.branch7x7x3_3 = ConvNorm(192, 192, (7, 1))
-        self.branch7x7x3_4 = ConvNorm(192, 192, 3, 2, padding=False)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, 768, h, w)."""
-        seven = self.branch7x7x3_3(self.branch7x7x3_2(self.branch7x7x3_1(x)))
-        three = self.branch3x3_2(self.branch3x3_1(x))
-        return torch.cat([three, self.branch7x7x3_4(seven), functional.max_pool2d(x, 3, 2)], 1)
+    rows = (
+        ("3x3_1", "x", 192, 1),
+        ("3x3_2", "3x3_1", 320, 3),
+        ("7x7x3_1", "x", 192, 1),
+        ("7x7x3_2", "7x7x3_1", 192, (1, 7)),
+        ("7x7x3_3", "7x7x3_2", 192, (7, 1)),
+        ("7x7x3_4", "7x7x3_3", 192, 3),
+    )
+    return Block(768, ("3x3_2", "7x7x3_4", "pool"), rows, halves=True)
 
 
-class BlockE(nn.Module):
-    """8 x 8: branches that fork at their ends; the pool branch takes the mean or the maximum."""
-
-    def __init__(self, channels: int, pool_maximum: bool) -> None:
-        super().__init__()
-        self.pool_maximum = pool_maximum
-        self.branch1x1 = ConvNorm(channels, 320, 1)
-        self.branch3x3_1 = ConvNorm(channels, 384, 1)
-        self.branch3x3_2a = ConvNorm(384, 384, (1, 3))
-        self.branch3x3_2b = ConvNorm(384, 384, (3, 1))
-        self.branch3x3dbl_1 = ConvNorm(channels, 448, 1)
-        self.branch3x3dbl_2 = ConvNorm(448, 384, 3)
-        self.branch3x3dbl_3a = ConvNorm(384, 384, (1, 3))
-        self.branch3x3dbl_3b = ConvNorm(384, 384, (3, 1))
-        self.branch_pool = ConvNorm(channels, 192, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, channels, h, w)."""
-        three = self.branch3x3_1(x)
-        double = self.branch3x3dbl_2(self.branch3x3dbl_1(x))
-        pooled = functional.max_pool2d(x, 3, 1, 1) if self.pool_maximum else _average(x)
-        parts = [self.branch1x1(x), self.branch3x3_2a(three), self.branch3x3_2b(three)]
-        parts += [self.branch3x3dbl_3a(double), self.branch3x3dbl_3b(double), self.branch_pool(pooled)]
-        return torch.cat(parts, 1)
+def _block_e(channels: int, *, pool_maximum: bool) -> Block:
+    """8 x 8: branches that fork at their ends."""
+    rows = (
+        ("1x1", "x", 320, 1),
+        ("3x3_1", "x", 384, 1),
+        ("3x3_2a", "3x3_1", 384, (1, 3)),
+        ("3x3_2b", "3x3_1", 384, (3, 1)),
+        ("3x3dbl_1", "x", 448, 1),
+        ("3x3dbl_2", "3x3dbl_1", 384, 3),
+        ("3x3dbl_3a", "3x3dbl_2", 384, (1, 3)),
+        ("3x3dbl_3b", "3x3dbl_2", 384, (3, 1)),
+        ("_pool", "pool", 192, 1),
+    )
+    ends = ("1x1", "3x3_2a", "3x3_2b", "3x3dbl_3a", "3x3dbl_3b", "_pool")
+    return Block(channels, ends, rows, pool_maximum=pool_maximum)
 
 
 class Inception(nn.Module):
@@ -157,17 +160,17 @@ class Inception(nn.Module):
         self.Conv2d_2b_3x3 = ConvNorm(32, 64, 3)
         self.Conv2d_3b_1x1 = ConvNorm(64, 80, 1)
         self.Conv2d_4a_3x3 = ConvNorm(80, 192, 3, padding=False)
-        self.Mixed_5b = BlockA(192, 32)
-        self.Mixed_5c = BlockA(256, 64)
-        self.Mixed_5d = BlockA(288, 64)
-        self.Mixed_6a = BlockB()
-        self.Mixed_6b = BlockC(128)
-        self.Mixed_6c = BlockC(160)
-        self.Mixed_6d = BlockC(160)
-        self.Mixed_6e = BlockC(192)
-        self.Mixed_7a = BlockD()
-        self.Mixed_7b = BlockE(1280, pool_maximum=False)
-        self.Mixed_7c = BlockE(2048, pool_maximum=True)
+        self.Mixed_5b = _block_a(192, 32)
+        self.Mixed_5c = _block_a(256, 64)
+        self.Mixed_5d = _block_a(288, 64)
+        self.Mixed_6a = _block_b()
+        self.Mixed_6b = _block_c(128)
+        self.Mixed_6c = _block_c(160)
+        self.Mixed_6d = _block_c(160)
+        self.Mixed_6e = _block_c(192)
+        self.Mixed_7a = _block_d()
+        self.Mixed_7b = _block_e(1280, pool_maximum=False)
+        self.Mixed_7c = _block_e(2048, pool_maximum=True)
 
     def forward(self, x: Float[Tensor, "n 3 299 299"]) -> Float[Tensor, "n 2048"]:
         """Features of prepared images."""
@@ -191,19 +194,11 @@ def load_inception(path: Path) -> Inception:
 def inception_features(
     network: Inception, frames: UInt8[Tensor, "n h w 3"], method: Resize = "tf1"
 ) -> Float[Tensor, "n 2048"]:
-    """Features for FID of images.
+    """Features for FID of RGB images, brought to 299 x 299; of the aspect ratio nothing is kept.
 
-    Args:
-        network: With its weights.
-        frames: RGB.
-        method: How they are brought to 299 x 299; of the aspect ratio nothing is kept. Values become
-            (x - 128) / 128, with ``torch`` (x - 127.5) / 127.5 as in pytorch-fid.
+    Values become (x - 128) / 128, with ``torch`` (x - 127.5) / 127.5 as in pytorch-fid.
     """
     middle = 127.5 if method == "torch" else 128.0
     with torch.inference_mode():
-        return torch.cat(
-            [
-                network((resize(batch, SIZE_PX, SIZE_PX, method) - middle) / middle)
-                for batch in frames.split(_BATCH)
-            ]
-        )
+        pictures = (resize(batch, SIZE_PX, SIZE_PX, method) for batch in frames.split(_BATCH))
+        return torch.cat([network((picture - middle) / middle) for picture in pictures])

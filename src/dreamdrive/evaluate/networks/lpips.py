@@ -1,5 +1,6 @@
 """LPIPS v0.1 (Zhang et al. 2018): weighted distances between layers of VGG16 or AlexNet."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -97,17 +98,20 @@ CHANNELS = {"vgg": (64, 128, 256, 512, 512), "alex": (64, 192, 384, 256, 256)}
 """Channels at the taps."""
 
 
-def vgg() -> Trunk:
-    """VGG16, tapped after the last ReLU before each pooling and at the end."""
+def vgg(
+    pooling: Callable[[int], list[nn.Module]] = lambda channels: [nn.MaxPool2d(2, 2)],
+    taps: tuple[int, ...] = (3, 8, 15, 22, 29),
+) -> Trunk:
+    """VGG16, tapped after the last ReLU before each pooling, of so many channels, and at the end."""
     layers: list[nn.Module] = []
     channels = 3
     for stage, (out, convolutions) in enumerate(((64, 2), (128, 2), (256, 3), (512, 3), (512, 3))):
         if stage:
-            layers.append(nn.MaxPool2d(2, 2))
+            layers += pooling(channels)
         for _ in range(convolutions):
             layers += [nn.Conv2d(channels, out, 3, padding=1), nn.ReLU()]
             channels = out
-    return Trunk(layers, (3, 8, 15, 22, 29))
+    return Trunk(layers, taps)
 
 
 def alex() -> Trunk:

@@ -5,24 +5,23 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dreamdrive.evaluate.networks import lpips
 from dreamdrive.evaluate.networks.lpips import CHANNELS, Heads, PerceptualDistance, Trunk
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.models import fill_network, read_state
 
-_INSTALL = "pip install stlpips-pytorch==0.0.2"
+_SHA256 = {
+    "alex": "b356b382f96010f77d085ee8343ecd9fd322d0a56e8de2b2d0549fafcad8b9ee",
+    "vgg": "44597da68f49c1837c100ff52299050f274d102eb102e5837178c79be6f0e250",
+}
 FILES = {
-    "alex": PackagedFile(
+    kind: PackagedFile(
         "stlpips-pytorch",
-        "stlpips_pytorch/weights/vST0.0/alex_shift_tolerant.pth",
-        "b356b382f96010f77d085ee8343ecd9fd322d0a56e8de2b2d0549fafcad8b9ee",
-        _INSTALL,
-    ),
-    "vgg": PackagedFile(
-        "stlpips-pytorch",
-        "stlpips_pytorch/weights/vST0.0/vgg_shift_tolerant.pth",
-        "44597da68f49c1837c100ff52299050f274d102eb102e5837178c79be6f0e250",
-        _INSTALL,
-    ),
+        f"stlpips_pytorch/weights/vST0.0/{kind}_shift_tolerant.pth",
+        digest,
+        "pip install stlpips-pytorch==0.0.2",
+    )
+    for kind, digest in _SHA256.items()
 }
 
 
@@ -38,23 +37,13 @@ class BlurPool(nn.Module):
 
     def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
         """Halve both sides, roughly."""
-        weight = self.get_buffer("filt")
-        return functional.conv2d(
-            functional.pad(x, [2] * 4, mode="reflect"), weight, stride=2, groups=x.shape[1]
-        )
+        wide = functional.pad(x, [2] * 4, mode="reflect")
+        return functional.conv2d(wide, self.get_buffer("filt"), stride=2, groups=x.shape[1])
 
 
 def vgg() -> Trunk:
     """VGG16 whose pools have stride 1 and a blurred subsampling behind."""
-    layers: list[nn.Module] = []
-    channels = 3
-    for stage, (out, convolutions) in enumerate(((64, 2), (128, 2), (256, 3), (512, 3), (512, 3))):
-        if stage:
-            layers += [nn.MaxPool2d(2, 1), BlurPool(channels)]
-        for _ in range(convolutions):
-            layers += [nn.Conv2d(channels, out, 3, padding=1), nn.ReLU()]
-            channels = out
-    return Trunk(layers, (3, 9, 17, 25, 33))
+    return lpips.vgg(lambda channels: [nn.MaxPool2d(2, 1), BlurPool(channels)], (3, 9, 17, 25, 33))
 
 
 def alex() -> Trunk:
@@ -71,10 +60,7 @@ TRUNKS = {"alex": alex, "vgg": vgg}
 
 
 def load_stlpips(kind: str) -> PerceptualDistance:
-    """The distance with the weights of the installed package; it takes images in [-1, 1].
-
-    Args:
-        kind: ``alex`` or ``vgg``.
+    """``alex`` or ``vgg`` with the weights of the installed package; it takes images in [-1, 1].
 
     Raises:
         MissingWeightsError: The package is not installed.

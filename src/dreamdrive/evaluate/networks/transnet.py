@@ -1,5 +1,6 @@
 """TransNetV2 (Soucek and Lokoc 2020), made to find shot boundaries, as a small network for video features."""
 
+from collections import OrderedDict
 from pathlib import Path
 
 import cv2
@@ -23,20 +24,11 @@ _LOOKUP = 101
 _BINS = 8
 
 
-class DilatedConvolution(nn.Module):
-    """3 x 3 in space, then 3 in time with a dilation."""
-
-    def __init__(self, channels: int, out: int, dilation: int) -> None:
-        super().__init__()
-        space = nn.Conv3d(channels, 2 * out, (1, 3, 3), padding=(0, 1, 1), bias=False)
-        time = nn.Conv3d(
-            2 * out, out, (3, 1, 1), dilation=(dilation, 1, 1), padding=(dilation, 0, 0), bias=False
-        )
-        self.layers = nn.Sequential(space, time)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply to (n, channels, t, h, w)."""
-        return self.layers(x)
+def _dilated(channels: int, out: int, dilation: int) -> nn.Module:
+    """Convolution with 3 x 3 in space, then 3 in time with a dilation."""
+    space = nn.Conv3d(channels, 2 * out, (1, 3, 3), padding=(0, 1, 1), bias=False)
+    time = nn.Conv3d(2 * out, out, (3, 1, 1), dilation=(dilation, 1, 1), padding=(dilation, 0, 0), bias=False)
+    return nn.Sequential(OrderedDict(layers=nn.Sequential(space, time)))
 
 
 class DilatedBlock(nn.Module):
@@ -44,10 +36,9 @@ class DilatedBlock(nn.Module):
 
     def __init__(self, channels: int, out: int) -> None:
         super().__init__()
-        self.Conv3D_1 = DilatedConvolution(channels, out, 1)
-        self.Conv3D_2 = DilatedConvolution(channels, out, 2)
-        self.Conv3D_4 = DilatedConvolution(channels, out, 4)
-        self.Conv3D_8 = DilatedConvolution(channels, out, 8)
+        self.Conv3D_1, self.Conv3D_2, self.Conv3D_4, self.Conv3D_8 = (
+            _dilated(channels, out, dilation) for dilation in (1, 2, 4, 8)
+        )
         self.bn = nn.BatchNorm3d(4 * out, eps=1e-3)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -132,10 +123,7 @@ class TransNet(nn.Module):
 
 
 def load_transnet(path: Path | None = None) -> TransNet:
-    """The network with its weights; its classifiers are not used.
-
-    Args:
-        path: The weights; without it those of the installed package.
+    """The network with the weights of a file or of the installed package; its classifiers are not used.
 
     Raises:
         MissingWeightsError: The package is not installed.
@@ -150,8 +138,7 @@ def transnet_features(network: TransNet, frames: UInt8[Tensor, "t h w 3"]) -> Fl
 
     Frames are averaged over areas to 48 x 27 and rounded; of the aspect ratio nothing is kept.
     """
-    small = [
-        cv2.resize(frame, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA) for frame in frames.numpy()
-    ]
+    size = WIDTH_PX, HEIGHT_PX
+    small = [cv2.resize(frame, size, interpolation=cv2.INTER_AREA) for frame in frames.numpy()]
     with torch.inference_mode():
         return network(torch.from_numpy(np.stack(small))[None])[0].mean(dim=0)

@@ -29,13 +29,7 @@ _SAME_POSE = 0.01  # metres, and in the entries of the rotation
 
 @dataclass(frozen=True)
 class Explained:
-    """Shares of the tracks between pairs of frames that motions of the camera explain.
-
-    Attributes:
-        given: Median over pairs of frames, by the given poses.
-        own: The same by the motion that fits each pair best.
-        pairs: Number of pairs.
-    """
+    """Median shares of the tracks between pairs of frames that given poses, and the best motion, explain."""
 
     given: float
     own: float
@@ -49,10 +43,6 @@ class Explained:
 
 def check(clip: Clip, evidence: Evidence) -> None:
     """Refuse known poses that contradict the frames, where there are any and the user gave them.
-
-    Args:
-        clip: The frames.
-        evidence: The first look at them.
 
     Raises:
         InputError: The frames clearly show another motion.
@@ -82,38 +72,30 @@ def explain(
     camera: Camera,
     world_from_camera: Float[np.ndarray, "f 4 4"],
 ) -> Explained:
-    """How much of the flow between frames the given poses explain.
+    """How much of the flow between frames the given poses, in any unit, explain; frames are 320 px wide.
 
     A track is explained if it ends within 2 px of its epipolar line, on the side of points before the camera:
     poses that were inverted, or have other axes, drive backwards. Pairs between which either nothing moves or
     the given camera stands tell nothing.
-
-    Args:
-        grey: Frames at 320 px width.
-        usable: Pixels that belong to the street.
-        camera: Pinhole of that size.
-        world_from_camera: Poses to be checked, in any unit.
     """
     path = path_length(world_from_camera)
     given, own = [], []
-    for first, apart in _pairs(len(grey)):
-        relative = np.linalg.inv(world_from_camera[first + apart]) @ world_from_camera[first]
-        here, there = track(grey[first], grey[first + apart], usable[first])
-        stands = np.linalg.norm(relative[:3, 3]) <= _STANDING * path
-        if stands or len(here) < _MIN_TRACKS or _flow_px(here, there) < _MIN_FLOW_PX:
-            continue
-        given.append(_share(here, there, camera, relative))
-        own.append(_share(here, there, camera, _own(here, there, camera)))
+    for first, second in _pairs(len(grey)):
+        relative = np.linalg.inv(world_from_camera[second]) @ world_from_camera[first]
+        tracks = _clear_tracks(grey, usable, first, second)
+        if tracks is not None and np.linalg.norm(relative[:3, 3]) > _STANDING * path:
+            given.append(_share(*tracks, camera, relative))
+            own.append(_share(*tracks, camera, _own(*tracks, camera)))
     if not own:
         return Explained(0.0, 0.0, 0)
     return Explained(float(np.median(given)), float(np.median(own)), len(own))
 
 
 def _pairs(count: int) -> list[tuple[int, int]]:
-    """First frames of pairs all over a clip, and how far apart the two are."""
+    """First and second frames of pairs all over a clip."""
     apart = min(_APART, count - 1)
     firsts = np.unique(np.linspace(0, count - 1 - apart, _PAIRS).round().astype(int))
-    return [(first, apart) for first in firsts.tolist()]
+    return [(first, first + apart) for first in firsts.tolist()]
 
 
 def _stand(world_from_camera: Float[np.ndarray, "f 4 4"], metric: bool) -> bool:
@@ -123,16 +105,19 @@ def _stand(world_from_camera: Float[np.ndarray, "f 4 4"], metric: bool) -> bool:
 
 def _moves(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], camera: Camera) -> bool:
     """Whether most pairs of frames show one clear motion of the camera."""
-    shares: list[float] = []
-    for first, apart in _pairs(len(grey)):
-        here, there = track(grey[first], grey[first + apart], usable[first])
-        clear = len(here) >= _MIN_TRACKS and _flow_px(here, there) >= _MIN_FLOW_PX
-        shares.append(_share(here, there, camera, _own(here, there, camera)) if clear else 0.0)
+    found = [_clear_tracks(grey, usable, *pair) for pair in _pairs(len(grey))]
+    shares = [0.0 if tracks is None else _share(*tracks, camera, _own(*tracks, camera)) for tracks in found]
     return float(np.median(shares)) >= MIN_OWN
 
 
-def _flow_px(here: Float[np.ndarray, "n 2"], there: Float[np.ndarray, "n 2"]) -> float:
-    return float(np.median(np.linalg.norm(there - here, axis=1)))
+def _clear_tracks(
+    grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], first: int, second: int
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]] | None:
+    """Places of enough corners in both frames; None where they hardly move."""
+    here, there = track(grey[first], grey[second], usable[first])
+    if len(here) < _MIN_TRACKS or np.median(np.linalg.norm(there - here, axis=1)) < _MIN_FLOW_PX:
+        return None
+    return here, there
 
 
 def _own(

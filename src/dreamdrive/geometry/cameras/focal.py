@@ -1,6 +1,6 @@
 """The focal length: kept, or found when the drive shows it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +21,10 @@ FIELD = (0.35, 3.5)
 
 @dataclass(frozen=True)
 class Settled:
-    """A model with its focal length settled.
+    """A model with its focal length calibrated, found from the clip (observed) or assumed.
 
-    Attributes:
-        model: The adjusted model.
-        observed: Whether the focal length is calibrated or was found from the clip.
-        ladder: Mean robust cost at each multiple of the prior that was tried, relative to the prior's.
-        note: What happened, in words, or None when nothing worth a word did.
+    The ladder is the mean robust cost at each multiple of the prior that was tried, relative to the prior's.
+    The note says what happened, or None when nothing worth a word did.
     """
 
     model: Model
@@ -82,9 +79,7 @@ def _with_radial(model: Model) -> Settled:
 def _remap(
     database: Path, camera: Camera, lens: Float[np.ndarray, "5"], count: int, seed: int
 ) -> Model | None:
-    focal = float(lens[0])
-    changed = Camera(focal, focal, camera.cx_px, camera.cy_px, camera.width_px, camera.height_px)
-    sfm.rematch(database, changed, seed)
+    sfm.rematch(database, replace(camera, fx_px=float(lens[0]), fy_px=float(lens[0])), seed)
     return sfm.map_globally(database, count, seed)
 
 

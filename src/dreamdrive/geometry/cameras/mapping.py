@@ -1,7 +1,7 @@
 """Structure from motion of a clip with its gate: a believable model, or why there is none."""
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +26,10 @@ STARTS = 6
 
 @dataclass(frozen=True)
 class Outcome:
-    """What structure from motion gave.
+    """What structure from motion gave: an accepted model, or why and in what kind there is none.
 
-    Attributes:
-        settled: The accepted model, or None.
-        reasons: Why there is none, in words.
-        notes: What else was noticed, a sentence each.
-        figures: Figures of the gate and the focal test, as JSON values.
-        refusal: The kind of those reasons; None with a model.
+    Notes are sentences on what else was noticed; figures those of the gate and the focal test, as JSON
+    values.
     """
 
     settled: Settled | None
@@ -55,16 +51,8 @@ def reconstruct(
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
     Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
-    before incremental mapping.
-
-    Args:
-        grey: Frames at the working size.
-        usable: Pixels in which features may lie.
-        camera: Pinhole of the working size.
-        moving: Steps in which the picture moves.
-        calibrated: Whether the focal length is known.
-        seed: Seed of everything random.
-        tell: Called after features, after matches, and with the model.
+    before incremental mapping. Frames and pinhole are of the working size; ``moving`` are steps in which the
+    picture moves. ``tell`` is called after features, after matches, and with the model.
     """
     if len(grey) < MIN_FRAMES:
         return _refused(f"{len(grey)} frames are too few for structure from motion", "few")
@@ -122,13 +110,7 @@ def _wobbling(model: Model) -> str:
 def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[Features]]:
     """Stretch y so that both focal lengths agree: COLMAP's radial model has only one."""
     stretch = camera.fx_px / camera.fy_px
-    square = Camera(
-        camera.fx_px,
-        camera.fx_px,
-        camera.cx_px,
-        camera.cy_px * stretch,
-        camera.width_px,
-        max(1, round(camera.height_px * stretch)),
-    )
+    height_px = max(1, round(camera.height_px * stretch))
+    square = replace(camera, fy_px=camera.fx_px, cy_px=camera.cy_px * stretch, height_px=height_px)
     factor = np.array([1.0, stretch], np.float32)
     return square, [Features(entry.keypoints_px * factor, entry.descriptors) for entry in found]

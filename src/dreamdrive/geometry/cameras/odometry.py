@@ -24,12 +24,9 @@ MIN_CLEAR = 0.03
 
 @dataclass(frozen=True)
 class Odometry:
-    """A path without a map.
+    """Poses and steps in metres, the first pose the identity: a path without a map.
 
-    Attributes:
-        world_from_camera: Poses (F, 4, 4) in metres; the first is the identity.
-        step_m: Length of each step (F - 1,).
-        measured: Whether the lengths were read off the road; False when a constant speed was assumed.
+    The lengths were measured on the road, or else a constant speed was assumed.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"]
@@ -46,12 +43,7 @@ def drive(
 ) -> Odometry:
     """Rotation and direction from the essential matrix of tracked corners, step length from the road.
 
-    Args:
-        grey: Frames at 320 px width.
-        usable: Pixels that belong to the street.
-        camera: Pinhole at that size.
-        times_s: Times of the frames.
-        height_m: Height of the camera above a level road.
+    Frames and pinhole are 320 px wide; the camera is ``height_m`` above a level road.
     """
     count = len(grey)
     turns, directions = np.tile(np.eye(3), (count - 1, 1, 1)), np.zeros((count - 1, 3))

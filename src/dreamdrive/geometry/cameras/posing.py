@@ -60,17 +60,12 @@ class Posed:
 def pose_clip(
     clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, tell: Tell = unheard
 ) -> Posed:
-    """Pose every frame of a clip.
+    """Pose every frame of a clip of one camera.
 
     Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
     motion, which would register it on whatever drives through the picture. Else structure from motion is
-    tried and judged, and frame-to-frame odometry takes over when it is refused.
-
-    Args:
-        clip: Frames of one camera.
-        camera_height_m: Height of the camera above the road, when the user gave it; None assumes 1.5 m.
-        seed: Seed of everything random; the same seed gives the same poses.
-        tell: Called for each step: the first look, and those of ``reconstruct.STEPS``.
+    tried and judged, and frame-to-frame odometry takes over when it is refused. Without a camera height 1.5 m
+    is assumed. ``tell`` is called for the first look, and for the steps of ``reconstruct.STEPS``.
 
     Raises:
         InputError: Without frames; for a camera height that is not positive; for known poses that contradict
@@ -172,15 +167,8 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    return Street(
-        evidence.grey,
-        evidence.street,
-        evidence.small,
-        poses,
-        points,
-        clip.times_s,
-        scale.asked_m_s(clip),
-    )
+    asked_m_s = scale.asked_m_s(clip)
+    return Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s, asked_m_s)
 
 
 def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
@@ -202,15 +190,12 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     points = depth_points(clip)
     camera = clip.rig[0]
     street = Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
-    plane = None
-    if len(points):
-        plane, _ = scale.find_ground(street, 0)
+    plane = scale.find_ground(street, 0)[0] if len(points) else None
     metric = _level_road(height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
-        metric = replace(
-            metric, ground=ground, scale=Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
-        )
+        of_depth = Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
+        metric = replace(metric, ground=ground, scale=of_depth)
     posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
     return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
@@ -237,14 +222,9 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
 
 
 def _level_road(height_m: float | None, spread: float) -> Metric:
-    wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
+    ground = Ground(np.array([0.0, -1.0, 0.0]), scale.USUAL_HEIGHT_M if height_m is None else height_m)
     source = f"level road assumed, {scale.height_words(height_m)}"
-    return Metric(
-        1.0,
-        Ground(np.array([0.0, -1.0, 0.0]), wanted),
-        Scale(source, spread, basis=scale.height_basis(height_m)),
-        (),
-    )
+    return Metric(1.0, ground, Scale(source, spread, basis=scale.height_basis(height_m)), ())
 
 
 def as_posed(
@@ -259,15 +239,8 @@ def as_posed(
 ) -> Posed:
     """The cameras of all frames, and what was noticed before and by posing them.
 
-    Args:
-        clip: The frames.
-        evidence: The first look at them.
-        poses: World-from-camera (F, 4, 4) in metres, the first the identity.
-        camera: Pinhole of the clip's size.
-        metric: Scale and road.
-        observed: Whether the focal length was seen or given.
-        notes: What posing them showed, a sentence each.
-        details: Figures of the method.
+    Poses are in metres, the first the identity; the pinhole has the clip's size; the focal length is observed
+    where it was seen or given.
     """
     cameras = tuple(camera.at(pose) for pose in poses)
     figures = {

@@ -15,14 +15,9 @@ def register(
     *,
     robust_steps: int = 0,
 ) -> Similarity:
-    """Minimise sum w |s R x + t - y|^2 (Umeyama 1991, weighted), in float64.
+    """Minimise sum w |s R x + t - y|^2 over points x and y (Umeyama 1991, weighted), in float64; w >= 0.
 
-    Args:
-        source: Points x (..., 3).
-        target: Points y (..., 3) that they correspond to.
-        weights: Not negative (...).
-        robust_steps: Further steps in which each point weighs w / |s R x + t - y|; their limit minimises
-            sum w |s R x + t - y|.
+    In each robust step a point weighs w / |s R x + t - y|; their limit minimises sum w |s R x + t - y|.
 
     Raises:
         ValueError: Fewer than three points weigh anything.

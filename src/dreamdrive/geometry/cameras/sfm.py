@@ -51,14 +51,10 @@ class Model:
 def match(database: Path, features: Sequence[Features], camera: Camera, seed: int) -> None:
     """Write features, pair matches and two-view geometries into a new COLMAP database.
 
-    Args:
-        database: File to create.
-        features: One entry a frame, in order of time.
-        camera: Pinhole of the working size that the pairs are verified with.
-        seed: Seed of RANSAC.
+    Features are in order of time; pairs are verified with the pinhole of the working size.
     """
     with pycolmap.Database.open(str(database)) as store:
-        native = _native_camera(camera, camera_id=1)
+        native = _native_camera(camera)
         store.write_camera(native, use_camera_id=True)
         rig = pycolmap.Rig(rig_id=1)
         rig.add_ref_sensor(native.sensor_id)
@@ -79,7 +75,7 @@ def match(database: Path, features: Sequence[Features], camera: Camera, seed: in
 def rematch(database: Path, camera: Camera, seed: int) -> None:
     """Verify the stored pair matches again with another camera."""
     with pycolmap.Database.open(str(database)) as store:
-        store.update_camera(_native_camera(camera, camera_id=1))
+        store.update_camera(_native_camera(camera))
         store.clear_two_view_geometries()
     _verify_pairs(database, camera, seed)
 
@@ -87,13 +83,7 @@ def rematch(database: Path, camera: Camera, seed: int) -> None:
 def map_globally(database: Path, count: int, seed: int) -> Model | None:
     """Global mapping (GLOMAP, Pan et al. 2024) at a fixed focal length, then robust bundle adjustment.
 
-    Args:
-        database: What ``match`` wrote.
-        count: Number of frames.
-        seed: Seed of the random starting positions.
-
-    Returns:
-        The largest model, or None when no model comes out.
+    It starts at random positions of the seed. The largest model, or None when no model comes out.
     """
     options = pycolmap.GlobalPipelineOptions()
     options.num_threads = 1
@@ -143,15 +133,11 @@ def adjust(
     free_radial: bool = False,
     drop_outliers: bool = True,
 ) -> Model:
-    """Robust bundle adjustment of a copy of the model.
+    """Robust bundle adjustment of a copy of the model, from another focal length if one is given.
 
-    Args:
-        model: Where to start from.
-        focal_px: Focal length to start from, one for both axes; None keeps the model's.
-        free_focal: Whether the focal length is adjusted.
-        free_radial: Whether a radial term k (x (1 + k r^2)) is adjusted.
-        drop_outliers: Adjust twice and drop poor observations after each; otherwise once, briefly, and keep
-            all, so that costs can be compared.
+    The focal length and a radial term k (x (1 + k r^2)) are adjusted where free. Dropping outliers adjusts
+    twice and drops poor observations after each; otherwise it is done once, briefly, and all are kept, so
+    that costs can be compared.
     """
     native = pycolmap.Reconstruction(model.native)
     lens = model.lens.copy()
@@ -172,13 +158,13 @@ def adjust(
     return _read(native, len(model.world_from_camera))
 
 
-def _native_camera(camera: Camera, camera_id: int) -> Any:
+def _native_camera(camera: Camera) -> Any:
     native = pycolmap.Camera(
         model="PINHOLE",
         width=camera.width_px,
         height=camera.height_px,
         params=[camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px],
-        camera_id=camera_id,
+        camera_id=1,
     )
     native.has_prior_focal_length = True
     return native
@@ -276,15 +262,8 @@ def _read(native: Any, count: int) -> Model:
 
 def _lens(camera: Any) -> np.ndarray:
     radial = camera.params[3] if camera.model == pycolmap.CameraModelId.SIMPLE_RADIAL else 0.0
-    return np.array(
-        [
-            camera.focal_length_x,
-            camera.focal_length_y,
-            camera.principal_point_x,
-            camera.principal_point_y,
-            radial,
-        ]
-    )
+    focal = camera.focal_length_x, camera.focal_length_y
+    return np.array([*focal, camera.principal_point_x, camera.principal_point_y, radial])
 
 
 def _errors_px(poses: np.ndarray, points: np.ndarray, pixels: np.ndarray, lens: np.ndarray) -> np.ndarray:

@@ -34,13 +34,9 @@ def without_poses(clip: Clip) -> Clip:
 def unit_in(
     known: Float[np.ndarray, "f 4 4"], own: Float[np.ndarray, "f 4 4"], depth: float, metric: bool = False
 ) -> float:
-    """The unit of measured poses in that of known ones: by how far both go from the middle of their paths.
+    """The unit of own poses in that of known ones: by how far both go from the middle of their paths.
 
-    Args:
-        known: Poses (F, 4, 4) in the unit wanted.
-        own: The same as they were measured.
-        depth: Median depth in the unit of ``own``.
-        metric: Whether both units are the metre.
+    ``depth`` is the median in the unit of ``own``; with ``metric`` both units are the metre.
 
     Raises:
         InputError: One of the two stands still, and the units are not the same.

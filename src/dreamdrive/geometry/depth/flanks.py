@@ -24,17 +24,11 @@ def fill_flanks(
     plane_inverse: Float[np.ndarray, "h w"],
     street: Bool[np.ndarray, "h w"],
 ) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
-    """Inverse depth (1/m) and confidence (H, W) with flanks filled downwards, upright, to the road.
+    """Inverse depth (1/m) and confidence with flanks filled downwards, upright, to the road.
 
     A confirmed point hides the road behind it: below it, down to where its depth meets the plane, its column
     shows the same thing or one nearer, unless the road itself is confirmed there. Only regions are filled of
     which some confirmed pixels are low above the road; what hangs (branches, signs) is left alone.
-
-    Args:
-        swept: What the sweep found.
-        confidence: Its confidence.
-        plane_inverse: Inverse depth of the road plane in 1/m.
-        street: False in the sky and where no street is seen.
     """
     inverse = swept.inverse_depth
     below = (plane_inverse > _MIN_PLANE_INVERSE) & street

@@ -19,10 +19,8 @@ _MIN_PLANE_INVERSE = 0.008  # 1/m; the road farther than 125 m away is a line
 class Swept:
     """What the sweep found for one frame.
 
-    Attributes:
-        inverse_depth: In 1/m (H, W); 0 at infinity.
-        correlation: Photometric support of it (H, W) in [-1, 1].
-        on_plane: Pixels whose inverse depth is the road plane's own (H, W).
+    Inverse depth is in 1/m, 0 at infinity; ``correlation`` is its photometric support in [-1, 1]; on the
+    plane it is the road plane's own.
     """
 
     inverse_depth: Float[np.ndarray, "h w"]

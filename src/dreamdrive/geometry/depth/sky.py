@@ -28,12 +28,8 @@ def sky_mask(
 ) -> Bool[np.ndarray, "h w"]:
     """The sky of one RGB frame: smooth, blue or bright regions above the horizon that reach the top edge.
 
-    White facades and over-exposed walls that touch the top edge are taken for sky.
-
-    Args:
-        frame: RGB picture.
-        above: Pixels above the horizon, from ``above_horizon``.
-        usable: False where the frame holds no street (invalid or fixed to the camera).
+    White facades and over-exposed walls that touch the top edge are taken for sky. Not usable is what shows
+    no street (invalid or fixed to the camera).
     """
     grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
     lab_b = cv2.cvtColor(frame, cv2.COLOR_RGB2LAB)[..., 2]

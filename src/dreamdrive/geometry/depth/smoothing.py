@@ -20,11 +20,9 @@ class Workspace:
 
 
 def semi_global(work: Workspace, grey: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h labels w"]:
-    """Sum of the path costs over four directions (H, labels, W), float32, in ``work.total``.
+    """Sum of the path costs of ``work.cost`` over four directions, float32, in ``work.total``.
 
-    Args:
-        work: ``work.cost`` holds the matching cost, lower is better; it is left as it is.
-        grey: The picture; jumps are cheaper across its edges.
+    Jumps are cheaper across the edges of the picture.
     """
     for label in range(work.cost.shape[1]):
         work.turned_cost[:, label] = cv2.transpose(np.ascontiguousarray(work.cost[:, label]))

@@ -23,11 +23,6 @@ _LINEAR = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 _NEAREST = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
 
 
-def inverse_depths() -> Float[np.ndarray, " labels"]:
-    """The swept inverse depths in 1/m, uniform from 0."""
-    return np.linspace(0.0, MAX_INVERSE_DEPTH, LABELS)
-
-
 def choose_sources(
     positions_m: Float[np.ndarray, "f 3"], usable: Bool[np.ndarray, " f"], reference: int
 ) -> tuple[int, ...]:
@@ -181,8 +176,8 @@ def similarity(
 def matching_cost(
     correlation: Correlation, sources: Sequence[Source], cost: Float[np.ndarray, "h labels w"]
 ) -> None:
-    """One minus ``similarity`` for every plane of ``inverse_depths()``, into ``cost`` (H, labels, W)."""
-    for label, inverse in enumerate(inverse_depths().tolist()):
+    """One minus ``similarity`` for every plane, uniform in 1/m from 0, into ``cost`` (H, labels, W)."""
+    for label, inverse in enumerate(np.linspace(0.0, MAX_INVERSE_DEPTH, LABELS).tolist()):
         found = BestTwo(correlation.grey.shape)
         for source in sources:
             warped, seen = on_plane(source, inverse)

@@ -1,5 +1,6 @@
 """A first look at a clip: its motion, its regions fixed to the camera, its light."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -42,15 +43,14 @@ def look(clip: Clip) -> Evidence:
     size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
     working = features.working_size(width, height)
     grey = features.to_grey(clip.frames, size)
-    valid = _resize(clip.valid, size)
+    valid = resized(clip.valid, size)
     moves = motion.measure(grey, valid, clip.times_s)
     in_motion = np.zeros(len(clip), bool)
-    in_motion[:-1] |= moves.moving
-    in_motion[1:] |= moves.moving
-    if moves.standing:
-        in_motion[:] = False
+    if not moves.standing:
+        in_motion[:-1] |= moves.moving
+        in_motion[1:] |= moves.moving
     fixed = masks.find_fixed(grey, np.logical_and.reduce(valid), in_motion, clip.size)
-    street = valid & ~_resize(((fixed.regions > 0) | fixed.objects)[None], size)
+    street = valid & ~resized(((fixed.regions > 0) | fixed.objects)[None], size)
     detected = masks.describe(fixed)
     if moves.brightness < motion.DARK_LEVEL:
         detected.append(
@@ -58,15 +58,8 @@ def look(clip: Clip) -> Evidence:
         )
     if moves.tracks < motion.FEW_TRACKS:
         detected.append(f"little texture to follow: {moves.tracks:.0f} corners in a typical frame")
-    return Evidence(
-        grey,
-        street,
-        camera.resized(size[0], size[1]),
-        camera.resized(working[0], working[1]),
-        moves,
-        fixed,
-        tuple(detected),
-    )
+    small, large = camera.resized(*size), camera.resized(*working)
+    return Evidence(grey, street, small, large, moves, fixed, tuple(detected))
 
 
 def working_frames(
@@ -74,7 +67,7 @@ def working_frames(
 ) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
     """Grey frames at the working size and the pixels in which features may lie."""
     size = (evidence.working.width_px, evidence.working.height_px)
-    return features.to_grey(clip.frames, size), _resize(free_pixels(clip, evidence), size)
+    return features.to_grey(clip.frames, size), resized(free_pixels(clip, evidence), size)
 
 
 def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
@@ -82,7 +75,7 @@ def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
     return clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
 
 
-def _resize(mask: Bool[np.ndarray, "f _ _"], size: tuple[int, int]) -> Bool[np.ndarray, "f h w"]:
-    return np.stack(
-        [cv2.resize(one.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for one in mask]
-    )
+def resized(masks: Bool[np.ndarray, "f _ _"], size: Sequence[int]) -> Bool[np.ndarray, "f h w"]:
+    """Masks at another width and height."""
+    nearest = cv2.INTER_NEAREST
+    return np.stack([cv2.resize(mask.astype(np.uint8), size, interpolation=nearest) > 0 for mask in masks])

@@ -54,20 +54,15 @@ def find_fixed(
     moving: Bool[np.ndarray, " f"],
     size: tuple[int, int],
 ) -> Fixed:
-    """Find the regions from edges that stay in place while the street moves.
+    """Find the regions, in maps of ``size``, from edges that stay in place while the street moves.
 
-    An edge stays when its temporal median gradient is strong and the frames deviate little from it. Lane
-    lines and kerbs stay too under forward motion, so edges along lines through the centre of the image do not
-    count, nor does the far field above the road. Wide edges at the bottom are the bonnet. Of the rest, what
-    touches the border of the image, or is drawn over it away from the road ahead so sharply that only the
-    codec disturbs it, is a mirror or an overlay. Anything else that stays is an object: a lead car at a
-    constant distance stands on the road ahead, does not touch the border, and its edges shimmer.
-
-    Args:
-        grey: Frames at 320 px width.
-        valid: Pixels that hold a picture in all frames, at the same size.
-        moving: Frames in which the camera moves; with fewer than six, only bars are looked for.
-        size: Width and height (px) of the maps to return.
+    An edge stays when its temporal median gradient is strong and the frames, 320 px wide, deviate little from
+    it. Lane lines and kerbs stay too under forward motion, so edges along lines through the centre of the
+    image do not count, nor does the far field above the road. Wide edges at the bottom are the bonnet. Of the
+    rest, what touches the border of the image, or is drawn over it away from the road ahead so sharply that
+    only the codec disturbs it, is a mirror or an overlay. Anything else that stays is an object: a lead car
+    at a constant distance stands on the road ahead, does not touch the border, and its edges shimmer. With
+    fewer than six frames in which the camera moves only bars are looked for.
     """
     height, width = grey.shape[1:]
     regions = np.zeros((height, width), np.uint8)

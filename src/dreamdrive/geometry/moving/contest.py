@@ -48,14 +48,9 @@ class Verdict:
 def judge(
     view: View, frame: int, flows: Sequence[PairFlow], inverse_depth: Float[np.ndarray, "h w"], known: bool
 ) -> Verdict:
-    """Judge one frame against its neighbours.
+    """Judge one frame against its neighbours by its flows and its static depth in 1/m.
 
-    Args:
-        view: The posed frames.
-        frame: Index of the frame.
-        flows: Its flows.
-        inverse_depth: Static depth of the frame in 1/m.
-        known: Whether that depth was given, and so is exact on moving things too.
+    Depth that is known was given, and so is exact on moving things too.
     """
     shape = inverse_depth.shape
     correlation = Correlation(view.grey[frame], _WINDOW_PX)
@@ -144,12 +139,10 @@ class _Pair:
     def wins(self, correlation: Correlation) -> np.ndarray:
         """Flow clearly better correlated than the best static explanation, some slack granted to that one."""
         x, y, residual = self._nearest_allowed()
-        best = np.max([correlation(sample(self.grey, *at)) for at in self._candidates(x, y)], axis=0)
+        places = [(x, y), *(self.warp(inverse) for inverse in self.static)]
+        best = np.max([correlation(sample(self.grey, *at)) for at in places], axis=0)
         by_flow = correlation(sample(self.grey, self.flow.x, self.flow.y))
         return (by_flow > _FLOW_CORRELATION) & (by_flow - best > _LEAD) & (residual > _SLACK_PX)
-
-    def _candidates(self, x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        return [(x, y), *(self.warp(inverse) for inverse in self.static)]
 
     def _nearest_allowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Allowed point of the epipolar line nearest to the flow, moved up to the slack towards it."""
@@ -166,8 +159,5 @@ class _Pair:
         x, y = ax + share * dx, ay + share * dy
         residual = np.hypot(self.flow.x - x, self.flow.y - y)
         step = np.minimum(1, _SLACK_PX / np.maximum(residual, 1e-6))
-        return (
-            (x + step * (self.flow.x - x)).astype(np.float32),
-            (y + step * (self.flow.y - y)).astype(np.float32),
-            residual,
-        )
+        x, y = x + step * (self.flow.x - x), y + step * (self.flow.y - y)
+        return x.astype(np.float32), y.astype(np.float32), residual

@@ -34,17 +34,12 @@ def moving_evidence(
     sky: Bool[np.ndarray, "f h w"],
     known_depth: bool,
 ) -> Float[np.ndarray, "f h w"]:
-    """Evidence in [0, 1] (F, H, W) for a moving camera; ``FLAGGED`` and more inside whole moving objects.
+    """Evidence in [0, 1] for a moving camera; ``FLAGGED`` and more inside whole moving objects, never sky.
 
     Each frame's contest is carried along the flow to its neighbours, which vote; connected regions with
     enough sure pixels are kept, filled and completed to whole things. Oncoming vehicles look like nearer
-    static ones; they are found where they visibly do not stand on the road, see ``oncoming``.
-
-    Args:
-        view: The posed frames.
-        inverse_depth: Static depth in 1/m.
-        sky: Sky masks; nothing grows into them.
-        known_depth: Whether that depth was given rather than found.
+    static ones; they are found where they visibly do not stand on the road, see ``oncoming``, unless depth
+    was given rather than found.
     """
     flows = neighbour_flows(view)
 
@@ -52,10 +47,11 @@ def moving_evidence(
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
 
     verdicts = by_frame(view, judged)
-    likely = {frame: _likely(verdict) for frame, verdict in verdicts.items()}
+    likely = {f: _beyond(v, _EXCESS_PX, _GAIN).astype(np.float32) for f, v in verdicts.items()}
 
     def decided(frame: int) -> np.ndarray:
-        return decide(_vote(likely, frame, flows[frame]), _sure(verdicts[frame]), view.usable[frame])
+        sure = _beyond(verdicts[frame], _SURE_EXCESS_PX, _SURE_GAIN)
+        return decide(_vote(likely, frame, flows[frame]), sure, view.usable[frame])
 
     found = by_frame(view, decided)
     coming: dict[int, np.ndarray] = {}
@@ -96,13 +92,8 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
     return evidence
 
 
-def _likely(verdict: contest.Verdict) -> Float[np.ndarray, "h w"]:
-    beyond = (verdict.excess_px > _EXCESS_PX) & (verdict.gain > _GAIN)
-    return (beyond | verdict.off_line).astype(np.float32)
-
-
-def _sure(verdict: contest.Verdict) -> Bool[np.ndarray, "h w"]:
-    return ((verdict.excess_px > _SURE_EXCESS_PX) & (verdict.gain > _SURE_GAIN)) | verdict.off_line
+def _beyond(verdict: contest.Verdict, excess_px: float, gain: float) -> Bool[np.ndarray, "h w"]:
+    return ((verdict.excess_px > excess_px) & (verdict.gain > gain)) | verdict.off_line
 
 
 def _vote(
@@ -133,12 +124,9 @@ def _carried(
 def decide(
     votes: Float[np.ndarray, "h w"], sure: Bool[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w"]:
-    """Votes to evidence: at least ``FLAGGED`` inside kept and filled regions, less outside.
+    """Votes in [0, 1] to evidence: at least ``FLAGGED`` inside kept and filled regions, less outside.
 
-    Args:
-        votes: In [0, 1].
-        sure: Pixels of which a region needs some to be kept.
-        usable: Evidence is 0 elsewhere.
+    A region is kept that has some sure pixels. Evidence is 0 where pixels are not usable.
     """
     mask = ((votes >= _VOTE) & usable).astype(np.uint8)
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_SHARE * mask.shape[1]))

@@ -19,14 +19,9 @@ _ROUND_TRIP_SHARE = 0.05
 
 @dataclass(frozen=True)
 class PairFlow:
-    """Where the pixels of one frame went in another.
+    """Column and row, in pixel indices, of the pixels of one frame in another, ``offset`` used frames away.
 
-    Attributes:
-        offset: Distance between the two in the order of the used frames.
-        source: Index of the other frame.
-        x: Column in the other frame (H, W), in pixel indices.
-        y: Row in the other frame (H, W).
-        trusted: Seen there and confirmed by the flow back (H, W).
+    Trusted is what is seen there and confirmed by the flow back.
     """
 
     offset: int

@@ -13,14 +13,11 @@ def minimum_cut(
     right: Float[np.ndarray, "h v"],
     below: Float[np.ndarray, "u w"],
 ) -> Bool[np.ndarray, "h w"]:
-    """The labels (H, W) with the largest sum of gains of the labelled pixels less the weights that are cut.
+    """The labels with the largest sum of gains of the labelled pixels less the weights that are cut.
 
-    Args:
-        gain: What labelling a pixel is worth; negative where it costs.
-        right: Non-negative weight of unlike labels of each pixel (H, W - 1) and its neighbour on the right.
-        below: The same of each pixel (H - 1, W) and its neighbour below.
-
-    Gains and weights count in steps of 1/100. Of equally good labellings it is that of the fewest pixels.
+    A gain is what labelling a pixel is worth; negative where it costs. Non-negative weights are those of
+    unlike labels of each pixel and its neighbour on the right or below. Gains and weights count in steps of
+    1/100. Of equally good labellings it is that of the fewest pixels.
     """
     pixel = np.arange(gain.size).reshape(gain.shape)
     source, sink = gain.size, gain.size + 1

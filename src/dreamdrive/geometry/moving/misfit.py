@@ -13,14 +13,9 @@ _WINDOW_PX = 3
 def misfit(
     view: View, frame: int, other: int, x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w"]:
-    """Mean difference in grey levels (H, W) over a small window, capped; NaN outside the other frame.
+    """Mean difference in grey levels over a small window, capped; NaN outside the other frame.
 
-    Args:
-        view: The posed frames.
-        frame: Index of the frame.
-        other: Index of the other one.
-        x: Columns in the other frame, in pixel indices.
-        y: Rows in the other frame.
+    Columns and rows in the other frame are in pixel indices.
     """
     difference = np.minimum(np.abs(sample(view.grey[other], x, y) - view.grey[frame]), np.float32(_CAP))
     mean = cv2.boxFilter(difference, cv2.CV_32F, (_WINDOW_PX, _WINDOW_PX))

@@ -40,12 +40,7 @@ _BIAS_LEVELS = 0.5
 
 @dataclass(frozen=True)
 class _Thing:
-    """What comes towards the camera in one frame.
-
-    Attributes:
-        pixels: Where it is (H, W).
-        inverse: Inverse depth at which it seems to be, in 1/m.
-    """
+    """What comes towards the camera in one frame: its pixels, and its seeming inverse depth in 1/m."""
 
     pixels: Bool[np.ndarray, "h w"]
     inverse: float
@@ -55,10 +50,7 @@ class _Thing:
 class _Misfits:
     """Mean absolute difference in grey levels to the neighbours, if all pixels were at one place.
 
-    Attributes:
-        inverse: Inverse depths (L,) in 1/m, those of the background first.
-        upright: At each of them (L, H, W).
-        road: On the road (H, W).
+    Upright at each of the inverse depths in 1/m, those of the background first, or on the road.
     """
 
     inverse: Float[np.ndarray, " l"]
@@ -68,12 +60,9 @@ class _Misfits:
 
 @dataclass(frozen=True)
 class _Columns:
-    """The best guess in each column.
+    """The best guess in each column: the number of the thing's seeming inverse depth, and its lowest row.
 
-    Attributes:
-        score: Grey levels that thing and road gain together; 0 where there is none (W,).
-        label: Number of the inverse depth at which the thing seems to be (W,).
-        row: Lowest row of the thing (W,).
+    The score is grey levels that thing and road gain together; 0 where there is none.
     """
 
     score: Float[np.ndarray, " w"]

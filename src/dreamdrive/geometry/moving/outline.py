@@ -56,15 +56,9 @@ def outline(
     flagged: Bool[np.ndarray, "h w"],
     sky: Bool[np.ndarray, "h w"],
 ) -> Bool[np.ndarray, "h w"]:
-    """The moving things (H, W) of which ``flagged`` shows a part; what has no motion of its own stays so.
+    """The moving things of which ``flagged`` shows a part; what has no motion of its own stays so.
 
-    Args:
-        view: The posed frames.
-        frame: Index of the frame.
-        flows: Its flows.
-        inverse_depth: Static depth of the frame in 1/m.
-        flagged: Pixels known to move; some may be wrong.
-        sky: Never part of a thing.
+    Some of what is flagged may be wrong; the sky is never part of a thing. Static depth is in 1/m.
     """
     if not flagged.any():
         return flagged.copy()

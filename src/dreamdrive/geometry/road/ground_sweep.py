@@ -115,10 +115,8 @@ class Road:
 def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | None:
     """Best plane over height, pitch and roll, or None when the profile has no clear peak.
 
-    Args:
-        road: Frames, poses and intrinsics.
-        heights: Range of camera heights to try, in the units of the poses; None tries 0.08 to 12 steps. A
-            peak at either end of the range is what a failure looks like and is refused.
+    Without a range of camera heights, in the units of the poses, 0.08 to 12 steps are tried. A peak at either
+    end of the range is what a failure looks like and is refused.
     """
     poses = road.poses
     step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)

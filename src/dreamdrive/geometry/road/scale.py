@@ -84,12 +84,8 @@ def focal_spread_of(observed: bool) -> float:
 def from_ground(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric:
     """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
 
-    Args:
-        street: Posed clip in arbitrary units.
-        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
-        focal_spread: How far the focal length may be off, as a fraction: the scale is as uncertain as that.
-            0 where it was observed, ``FOCAL_SPREAD`` where it is only a prior.
-        seed: Seed of RANSAC.
+    Without a height 1.5 m, a car's, is assumed. The scale is as uncertain as the focal length, which may be
+    off by the fraction ``focal_spread``: 0 where it was observed, ``FOCAL_SPREAD`` where it is only a prior.
     """
     plane, how = find_ground(street, seed)
     if plane is None:
@@ -98,18 +94,13 @@ def from_ground(street: Street, height_m: float | None, focal_spread: float, see
     factor = wanted / plane.height
     speed = median_speed(street) * factor
     if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
-        return _from_speed(
-            street, f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
-        )
+        problem = f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
+        return _from_speed(street, problem)
     return _by_plane(plane, how, factor, height_m, focal_spread)
 
 
 def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_spread: float) -> Metric:
-    terms = (
-        plane.spread,
-        USUAL_SPREAD if height_m is None else GIVEN_SPREAD,
-        focal_spread,
-    )
+    terms = plane.spread, USUAL_SPREAD if height_m is None else GIVEN_SPREAD, focal_spread
     source = f"ground plane ({how}), {height_words(height_m)}"
     found = Scale(source, float(np.linalg.norm(terms)), basis=height_basis(height_m))
     return Metric(factor, Ground(plane.normal, plane.offset * factor), found, ())
@@ -118,16 +109,9 @@ def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, foc
 def from_road_points(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric | None:
     """Scale from the height of the camera above the road that measured depth shows, however slow the path.
 
-    Unlike a plane that is found by warping, it does not rest on the motion of the camera.
-
-    Args:
-        street: Posed clip in arbitrary units, its points those of dense depth.
-        height_m: Camera height that the user gave; None assumes 1.5 m, a car's.
-        focal_spread: See ``from_ground``.
-        seed: Seed of RANSAC.
-
-    Returns:
-        None where the points show no road, or one by which no car drives so fast.
+    Unlike a plane that is found by warping, it does not rest on the motion of the camera: the points of the
+    street are those of dense depth. None where they show no road, or one by which no car drives so fast. The
+    rest is as in ``from_ground``.
     """
     plane = fit_points(street.points, street.world_from_camera, seed)
     if plane is None or plane.support < MIN_INLIERS or plane.share < MIN_SHARE:
@@ -147,12 +131,9 @@ def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float 
 
 
 def by_height(plane: Plane | None, factor: float, height_m: float | None) -> dict[str, float]:
-    """What the camera's height above the road says of a scale, for ``Scale.others``.
+    """What the camera's height above the road, given or 1.5 m, says of a scale, for ``Scale.others``.
 
-    Args:
-        plane: The road in units of the poses, where found.
-        factor: Metres per unit by that scale.
-        height_m: Camera height that the user gave; None assumes 1.5 m.
+    The plane is in units of the poses, of which the scale makes ``factor`` metres.
     """
     if plane is None:
         return {}
@@ -174,15 +155,10 @@ def height_basis(height_m: float | None) -> Basis:
 def as_given(
     street: Street, source: str, spread: float, words: str, height_m: float | None, seed: int
 ) -> Metric:
-    """The unit of the poses is the metre already; the road is only looked for.
+    """The unit of the poses is the metre already, says ``source``; the road is only looked for.
 
-    Args:
-        street: Posed clip in metres.
-        source: What says so.
-        spread: How far it may be off, as a fraction.
-        words: The same for a note, where the road disagrees with it.
-        height_m: Camera height that the user gave; None assumes 1.5 m.
-        seed: Seed of RANSAC.
+    The metre may be off by the fraction ``spread``. ``words`` name the source in a note, where the road
+    disagrees.
     """
     plane, _ = find_ground(street, seed, KNOWN_HEIGHTS_M)
     ground = None if plane is None else Ground(plane.normal, plane.offset)
@@ -193,16 +169,12 @@ def as_given(
 
 
 def _from_speed(street: Street, problem: str) -> Metric:
-    speed = ASSUMED_SPEED_M_S if street.asked_m_s is None else street.asked_m_s
+    speed, word, rest = street.asked_m_s, "taken as asked for", "the speed that was asked for"
+    basis: Basis = "asked speed"
+    if speed is None:
+        speed, word, rest, basis = ASSUMED_SPEED_M_S, "assumed", "an assumed speed", "usual speed"
+    found = Scale(f"none: {problem}; a speed of {speed:.3g} m/s is {word}", SPEED_SPREAD, basis=basis)
     factor = speed / max(median_speed(street), 1e-9)
-    word, rest = (
-        ("assumed", "an assumed speed")
-        if street.asked_m_s is None
-        else ("taken as asked for", "the speed that was asked for")
-    )
-    words = f"none: {problem}; a speed of {speed:.3g} m/s is {word}"
-    basis: Basis = "usual speed" if street.asked_m_s is None else "asked speed"
-    found = Scale(words, SPEED_SPREAD, basis=basis)
     return Metric(factor, None, found, (f"{problem}: distances rest on {rest}",))
 
 

@@ -10,14 +10,11 @@ _SMOOTH_SHARE = 0.02  # of the image width: columns are smoothed over twice this
 def upright_depth(
     flagged: Bool[np.ndarray, "h w"], plane_inverse: Float[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w"]:
-    """Inverse depth in 1/m (H, W) of flagged regions, each column upright on the road; 0 where none is known.
+    """Inverse depth in 1/m of flagged regions, each column upright on the road; 0 where none is known.
 
-    The lowest flagged pixel of a region's column is its contact with the road; a running median over the
-    columns takes out notches. A region cut off by the lower edge of the image comes out too far away.
-
-    Args:
-        flagged: Pixels of upright things.
-        plane_inverse: Inverse depth of the road plane, 0 above the horizon.
+    The lowest flagged pixel of a region's column is its contact with the road, whose plane is 0 above the
+    horizon; a running median over the columns takes out notches. A region cut off by the lower edge of the
+    image comes out too far away.
     """
     height, width = flagged.shape
     reach = max(1, round(_SMOOTH_SHARE * width))

@@ -16,15 +16,8 @@ def corrupt(
     """Draw the frames of a clip as a video model might have drawn them.
 
     Frame k depends on the seed, on k and on the picture alone: a longer clip begins with the same frames.
-    What is off leaves no trace; with all off the frames come back bit for bit.
-
-    Args:
-        frames: RGB (F, H, W, 3).
-        corruption: What to do, and how strongly.
-        depth_m: Depth along z (F, H, W); 0 is the sky. Only ``far`` looks at it.
-
-    Returns:
-        New frames (F, H, W, 3).
+    What is off leaves no trace; with all off the frames come back bit for bit. Only ``far`` looks at the
+    depth along z, 0 in the sky.
 
     Raises:
         InputError: ``far`` is asked for and there is no depth.

@@ -58,9 +58,7 @@ PRESETS = {"generated": dict.fromkeys(STRENGTHS, 0.5)}
 def parse_corruption(text: str, seed: int = 0) -> Corruption:
     """Read strengths such as ``warp=0.5,flicker=1`` or ``generated,far=0``.
 
-    Args:
-        text: Names of ``STRENGTHS`` with a value, or of ``PRESETS``, between commas; a later one overrides.
-        seed: Seed of the result.
+    Names of ``STRENGTHS`` with a value, or of ``PRESETS``, stand between commas; a later one overrides.
 
     Raises:
         InputError: An unknown name, or a strength that is negative or no number.

@@ -24,13 +24,7 @@ def wobble(seed: int, frame: int, height: int, width: int) -> Float[np.ndarray, 
 
 
 def slide(seed: int, frame: int, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "2 h w"]:
-    """Displacement of ``far`` at strength 1: right and down in pixels (2, H, W).
-
-    Args:
-        seed: Not negative.
-        frame: Counted from 0.
-        depth_m: Depth along z (H, W); 0 is the sky.
-    """
+    """Displacement of ``far`` at strength 1: right and down in pixels, from depth along z, 0 in the sky."""
     height, width = depth_m.shape
     square = np.square(depth_m, dtype=np.float32)
     share = np.where(depth_m > 0, square / (square + np.float32(_HALF_WAY_M**2)), np.float32(1))
