@@ -1,11 +1,13 @@
 """Video models as priors: Stable Video Diffusion and Vista, one network on diffusers' classes."""
 
+from functools import partial
+
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.prior.vista.features import FeatureOptions, video_features
 from dreamdrive.prior.vista.kinds import KINDS, KindName
-from dreamdrive.progress import Progress, silent
+from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
@@ -15,24 +17,6 @@ _MEMORY = (
     "the decoder, at 576x320 4.9 and 13.7 GB (reckoned, not measured); a run that does not fit is refused "
     "before it starts"
 )
-
-
-def svd(control: Control, progress: Progress = silent) -> Clip:
-    """A photo goes on for 25 frames by Stable Video Diffusion; see ``make.make_clip``.
-
-    Raises:
-        InputError: See ``make.make_clip``.
-    """
-    return _make("svd", control, progress)
-
-
-def vista(control: Control, progress: Progress = silent) -> Clip:
-    """A street goes on from a photo or leading frames by Vista; see ``make.make_clip``.
-
-    Raises:
-        InputError: See ``make.make_clip``.
-    """
-    return _make("vista", control, progress)
 
 
 def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
@@ -45,7 +29,7 @@ def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
 
 SVD = Prior(
     name="svd",
-    make=svd,
+    make=partial(_make, "svd"),
     takes=_TAKES,
     gives="25 frames at 7 Hz, latents, features; no poses",
     about="a photo goes on for 25 frames (Stable Video Diffusion)",
@@ -60,7 +44,7 @@ SVD = Prior(
 )
 VISTA = Prior(
     name="vista",
-    make=vista,
+    make=partial(_make, "vista"),
     takes=_TAKES | {"action", "trajectory"},
     gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
     about="a street goes on from a photo or up to three frames, as told by an action (Vista)",

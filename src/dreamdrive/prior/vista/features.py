@@ -20,12 +20,12 @@ from dreamdrive.errors import InputError
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, SIDE, check_size, to_images
-from dreamdrive.prior.vista.rollout import SCALE, Seen
+from dreamdrive.prior.vista.rollout import SCALE
 from dreamdrive.prior.vista.sampler import time_of
 from dreamdrive.prior.vista.unet import watch
 from dreamdrive.progress import Progress, silent

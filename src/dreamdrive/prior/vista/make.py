@@ -159,7 +159,7 @@ def _sample(
         first = images[:1] + kind.noise * torch.randn(images[:1].shape, generator=draw)
     actions = [window.action for window in windows]
     made = roll_out(
-        engine.model(), kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
+        engine, kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
     )
     check_finite(made, "latents")
     return made
