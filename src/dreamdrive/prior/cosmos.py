@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
-from dreamdrive.prior.diffusers_pipeline import PROMPT, Wanted, make_clip, photo_of, wanted_frames
+from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.path_to_action import from_first
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.relative_poses import relative_poses
@@ -49,8 +49,7 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
         InputError: The photo, the path, the size or the weights cannot be used.
     """
     path = _path(control)
-    size, wanted = _size(control), _wanted(control)
-    count = wanted.count
+    size, (count, index) = _size(control), _wanted(control)
     rows = relative_poses(path, count - 1, RATE_HZ)
     photo = photo_of(control, size, "cosmos")
     pipeline = _load(control)
@@ -59,13 +58,13 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
         pipeline,
         steps,
         progress,
+        seed=control.seed,
         prompt=control.prompt or PROMPT,
         action=_condition(photo.rgb, rows, TIERS[size]),
         fps=RATE_HZ,
         guidance_scale=1.0,
         use_system_prompt=False,
         enable_safety_check=False,
-        generator=diffusers_pipeline.generator(control.seed),
     )
     times_s = np.arange(count) / RATE_HZ
     provenance = {
@@ -80,9 +79,8 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
             "NVIDIA's guardrail, which checks prompt and frames, was off.",
         ],
     }
-    return make_clip(
-        control, wanted, photo, made.video, RATE_HZ, provenance, Trajectory(path.at(times_s), times_s)
-    )
+    asked = Trajectory(path.at(times_s), times_s)
+    return make_clip(control, (count, index), photo, made.video, RATE_HZ, provenance, asked)
 
 
 def _path(control: Control) -> Trajectory:
@@ -101,15 +99,14 @@ def _size(control: Control) -> tuple[int, int]:
     return size
 
 
-def _wanted(control: Control) -> Wanted:
-    wanted = wanted_frames(control, FRAMES)
-    count = wanted.count
+def _wanted(control: Control) -> tuple[int, Int[np.ndarray, " f"]]:
+    count, index = wanted_frames(control, FRAMES)
     if not 1 < count <= FRAMES or (count - 1) % _A_LATENT:
         raise InputError(
             f"--frames {control.frames}: Cosmos 3 makes {_A_LATENT}n + 1 frames, at most {FRAMES}; "
             "choose such a STOP"
         )
-    return wanted
+    return count, index
 
 
 def _load(control: Control) -> Any:

@@ -72,9 +72,9 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
         pipeline,
         steps,
         progress,
+        seed=control.seed,
         image=Image.fromarray(photo.rgb),
-        num_frames=wanted.count,
-        generator=diffusers_pipeline.generator(control.seed),
+        num_frames=wanted[0],
         **given,
     )
     provenance = {

@@ -16,11 +16,7 @@ class Make(Protocol):
     """F_VDM (eq. 3): from what the user asks for to frames with features Z_ref."""
 
     def __call__(self, control: Control, progress: Progress) -> Clip:
-        """Make the clip.
-
-        Raises:
-            InputError: The prior cannot work with this control.
-        """
+        """Make the clip; InputError where the prior cannot work with this control."""
         ...
 
 

@@ -15,12 +15,7 @@ PER_METRE = 1.35
 
 
 def relative_poses(path: Trajectory, steps: int, rate_hz: float) -> Float[np.ndarray, "n 9"]:
-    """The first steps of a path, at a rate of their own.
-
-    Args:
-        path: The wanted path; positions are linear between its poses, rotations slerped.
-        steps: How many.
-        rate_hz: Steps a second.
+    """The first steps (N, 9) of a path; positions are linear between its poses, rotations slerped.
 
     Raises:
         InputError: The path is shorter than that.

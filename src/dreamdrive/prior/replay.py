@@ -1,6 +1,6 @@
 """The prior of a recorded clip: the recording itself, with its appearance as features."""
 
-from pathlib import Path
+from typing import Any
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.rig import is_rig, read_rig_clip
@@ -22,39 +22,23 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
     """
     if control.path is None:
         raise InputError("the prior replay needs an input: a video or a folder of images")
-    if is_rig(control.path):
-        return _of_rig(control, control.path)
-    clip = read_clip(
-        control.path,
-        frames=control.frames,
-        fps=control.fps,
-        size=control.size,
-        intrinsics=control.intrinsics,
-        poses=control.poses,
-        hfov_deg=control.hfov_deg,
-        trajectory=control.trajectory,
-        features=control.features,
-        hold_out=control.hold_out,
-    )
+    options: dict[str, Any] = {
+        "frames": control.frames,
+        "fps": control.fps,
+        "size": control.size,
+        "poses": control.poses,
+        "trajectory": control.trajectory,
+        "hold_out": control.hold_out,
+    }
+    of_one = {name: getattr(control, name) for name in ("intrinsics", "hfov_deg", "features")}
+    if not is_rig(control.path):
+        clip = read_clip(control.path, **options, **of_one)
+    elif given := [name for name, value in of_one.items() if value is not None]:
+        raise InputError(f"{control.path} has several cameras; {given[0]} is not taken for them")
+    else:
+        clip = read_rig_clip(control.path, **options)
     if "appearance" in clip.features:
         return clip
-    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
-
-
-def _of_rig(control: Control, path: Path) -> Clip:
-    """The frames of several cameras."""
-    for name in ("intrinsics", "hfov_deg", "features"):
-        if getattr(control, name) is not None:
-            raise InputError(f"{path} has several cameras; {name} is not taken for them")
-    clip = read_rig_clip(
-        path,
-        frames=control.frames,
-        fps=control.fps,
-        size=control.size,
-        poses=control.poses,
-        trajectory=control.trajectory,
-        hold_out=control.hold_out,
-    )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
 
 

@@ -23,10 +23,7 @@ def fourier(points: Float[Tensor, "*b 3"]) -> Float[Tensor, "*b 27"]:
 class BoxEmbedder(nn.Module):
     """One token a box, from its corners and its class (MagicDrive's ``ContinuousBBoxWithTextEmbedding``).
 
-    Args:
-        classes: Number of classes.
-        class_width: Width of a class's token, which is a text encoder's output for its name.
-        widths: Widths of the four layers; the last is that of the token.
+    A class's token is a text encoder's output for its name; the last of the widths is that of a box's token.
     """
 
     def __init__(self, classes: int, class_width: int, widths: tuple[int, int, int, int]) -> None:
@@ -50,12 +47,9 @@ class BoxEmbedder(nn.Module):
         classes: Int[Tensor, "*b"],
         present: Bool[Tensor, "*b"],
     ) -> Float[Tensor, "*b c"]:
-        """Tokens of boxes.
+        """Tokens of boxes; those that are not present get the token of no box, which attention sees as well.
 
-        Args:
-            corners_m: Corners in the LiDAR frame, in float32 whatever the network's type is.
-            classes: Index of the class; anything where no box is.
-            present: Whether there is a box; the others get the token of no box, which attention sees as well.
+        Corners are in the LiDAR frame, in float32 whatever the network's type is.
         """
         there = present[..., None]
         features = fourier(corners_m.float()).flatten(-2).to(self.null_pos_feature.dtype)

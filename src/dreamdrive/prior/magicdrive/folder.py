@@ -91,15 +91,12 @@ def vae_stride(vae: AutoencoderKL) -> int:
 
 
 def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = None) -> Parts:
-    """Load a folder; nothing in it is executed, nothing is fetched.
+    """Load a folder (see ``EXPECTED``); nothing in it is executed, nothing is fetched.
 
-    Args:
-        folder: See ``EXPECTED``.
-        temporal: Whether the weights have to be those of the temporal variant.
-        device: Where the networks run; on a GPU in half precision, elsewhere in float32.
+    On a GPU the networks run in half precision, elsewhere in float32.
 
     Raises:
-        InputError: Parts are missing or damaged, are of another model, or do not fit into memory.
+        InputError: Parts are missing or damaged, are of another model or variant, or do not fit into memory.
     """
     files = _find_parts(folder)
     configs = {

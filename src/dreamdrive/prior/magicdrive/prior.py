@@ -37,11 +37,6 @@ CAMERAS = len(NUSCENES)
 def magicdrive(control: Control, progress: Progress = silent) -> Clip:
     """Six pictures of every time step, each time step sampled by itself.
 
-    Args:
-        control: Layout, weights, time steps and their rate, description, sampler steps, seed, withheld time
-            steps.
-        progress: Told of every sampler step and every decoded time step.
-
     Raises:
         InputError: The layout or the weights cannot be used, or they do not fit into memory.
     """
@@ -58,10 +53,7 @@ def magicdrive(control: Control, progress: Progress = silent) -> Clip:
 def magicdrive_t(control: Control, progress: Progress = silent) -> Clip:
     """Six pictures of every time step, all time steps sampled together.
 
-    Args:
-        control: Layout, weights, time steps, description, sampler steps, seed, withheld time steps. Always
-            sampled is the whole length of the weights, at 12 Hz from the layout's time 0.
-        progress: Told of every sampler step and every decoded time step.
+    Always sampled is the whole length of the weights, at 12 Hz from the layout's time 0.
 
     Raises:
         InputError: The layout or the weights cannot be used, or they do not fit into memory.
@@ -167,34 +159,27 @@ _ALONE = (
     "motion can be seen in such frames: the poses are those that they were asked for."
 )
 _GPU = "take the weights for 400x224, which need least, or a GPU with more memory"
-_LICENCE = (
-    "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); Stable "
-    "Diffusion 1.5 CreativeML Open RAIL-M"
-)
-_TAKES = frozenset({"path", "frames", "prompt", "steps", "hold_out"})
-_GIVES = "six cameras at each time step, the intrinsics, mountings and path asked for, latents"
 
 MAGICDRIVE = Prior(
     name="magicdrive",
     make=magicdrive,
-    takes=_TAKES | {"fps"},
-    gives=_GIVES,
+    takes=frozenset({"path", "frames", "prompt", "steps", "hold_out", "fps"}),
+    gives="six cameras at each time step, the intrinsics, mountings and path asked for, latents",
     about="six cameras from a layout by MagicDrive, each time step by itself",
-    licence=_LICENCE,
+    licence=(
+        "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); "
+        "Stable Diffusion 1.5 CreativeML Open RAIL-M"
+    ),
     memory="for 400x224 about 7.5 GB on a CPU (float32), 4.3 GB on a GPU (half precision)",
     weights=EXPECTED,
     package=PACKAGE,
     install=INSTALL,
 )
-MAGICDRIVE_T = Prior(
+MAGICDRIVE_T = replace(
+    MAGICDRIVE,
     name="magicdrive-t",
     make=magicdrive_t,
-    takes=_TAKES,
-    gives=_GIVES,
+    takes=MAGICDRIVE.takes - {"fps"},
     about="six cameras from a layout by MagicDrive-t, 16 time steps together",
-    licence=_LICENCE,
     memory="about 13 GB on a CPU (float32), 7 GB on a GPU (half precision)",
-    weights=EXPECTED,
-    package=PACKAGE,
-    install=INSTALL,
 )

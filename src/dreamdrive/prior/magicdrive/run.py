@@ -56,11 +56,6 @@ def generate(
 
     The temporal variant samples all time steps of its length, others each wanted one by itself.
 
-    Args:
-        run: What is sampled.
-        wanted: Indices of the time steps.
-        progress: Told of every sampler step and every decoded time step.
-
     Raises:
         InputError: Latents or frames are not finite.
     """

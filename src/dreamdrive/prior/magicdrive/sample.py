@@ -50,7 +50,6 @@ def sample(
     branches: tuple[Conditions, Conditions],
     noise: Float[Tensor, "bn c h w"],
     scheduler: UniPCMultistepScheduler,
-    guidance: float = GUIDANCE,
     done: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "bn c h w"]:
     """Latents of all cameras of the time steps.
@@ -61,7 +60,6 @@ def sample(
         branches: The conditions and those of the unconditional branch.
         noise: Of every picture, in float32, which the steps are taken in.
         scheduler: Set to its steps.
-        guidance: How far to go beyond the conditional branch's wish.
         done: Called after every step.
     """
     dtype = unet.dtype
@@ -77,7 +75,7 @@ def sample(
             denoised(unet, seen, time, words, controlnet.residuals(seen, time, words, raster)).float()
             for words, raster in zip(tokens, rasters, strict=True)
         )
-        guided = free + guidance * (wanted - free)
+        guided = free + GUIDANCE * (wanted - free)
         latents = cast(Tensor, scheduler.step(guided, time, latents, return_dict=False)[0])
         done()
     return latents

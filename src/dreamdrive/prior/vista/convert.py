@@ -106,14 +106,7 @@ def write_tensors(
 ) -> None:
     """Write a ``.safetensors``: length and text of the header, then the numbers, as each tensor is read.
 
-    The library's own writer wants all tensors at once.
-
-    Args:
-        path: The file.
-        shapes: Of the tensors.
-        read: Gives one by its name.
-        dtype: To store them in.
-        tell: Told how many are written.
+    The library's own writer wants all tensors at once. ``tell`` is told how many are written.
 
     Raises:
         InputError: A number is too large for the type, or not finite.

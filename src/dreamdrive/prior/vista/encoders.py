@@ -45,9 +45,6 @@ def notes_of(stored: Stored) -> list[str]:
 def encoder_difference(path: Path) -> float | None:
     """How far the encoders of a single file are apart: the largest difference over a tensor's largest number.
 
-    Args:
-        path: The file.
-
     Returns:
         The largest of all tensors; None where there is no second encoder.
 

@@ -204,11 +204,7 @@ def _activations(
 
 
 def _check_block(weights: Iterable[str], block: str) -> None:
-    """Whether activations of a block can be had, by the names of the UNet's weights.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """Whether activations of a block can be had, by the names of the UNet's weights."""
     matches = (_BLOCKS.match(name) for name in weights)
     names = {name for match in matches if match for name in (match[0], match[1]) if name}
     if block not in names:

@@ -86,13 +86,7 @@ class Plan:
 
 
 def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
-    """What a run will take.
-
-    Args:
-        stored: The model.
-        job: What is done.
-        half: Whether the UNet computes in float16.
-    """
+    """What a run will take; ``half`` is whether the UNet computes in float16."""
     pixels = job.size[0] * job.size[1] // 64
     width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
     bytes_ = 2 if half else _FLOAT
@@ -109,13 +103,7 @@ def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
 
 
 def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
-    """Refuse a run that does not fit.
-
-    Args:
-        stored: The model.
-        job: What is done.
-        free: What there is.
-        half: Whether the UNet computes in float16.
+    """Refuse a run that does not fit; ``half`` is whether the UNet computes in float16.
 
     Raises:
         InputError: It does not fit; the message names a size that does.

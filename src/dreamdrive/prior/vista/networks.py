@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
-    """A network whose weights take no memory yet.
-
-    Args:
-        part: Which.
-        config: Of its class.
-        kind: Of which model it is.
-    """
+    """A network of a model by the configuration of its class, whose weights take no memory yet."""
     known = {key: value for key, value in config.items() if not key.startswith("_")}
     with init_empty_weights():
         if part == "unet":

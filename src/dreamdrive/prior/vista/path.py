@@ -35,22 +35,14 @@ def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last
 
 
 def asked_path(path: Trajectory, times_s: Float[np.ndarray, " f"]) -> Trajectory:
-    """The path at the frames of a clip, from the first of them on.
-
-    Args:
-        path: The wanted path.
-        times_s: Time of each frame since the first that is made.
-    """
+    """The path at times of frames since the first that is made, from the first of these frames on."""
     return from_first(Trajectory(from_first(path).at(times_s), times_s))
 
 
 def path_by_rounds(action: Waypoints | Steering, spans: Sequence[range], rate_hz: float) -> Trajectory:
     """The path of all frames that are made where every round is told the same action.
 
-    Args:
-        action: What each round is told.
-        spans: Frames of each round; the action counts from the first of them.
-        rate_hz: Frames a second.
+    The action counts from the first frame of the round, of which ``spans`` are the frames.
     """
     round_ = path_of(action, np.arange(len(spans[0])) / rate_hz).world_from_camera
     poses = round_

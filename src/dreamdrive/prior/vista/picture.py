@@ -92,12 +92,7 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def frame(source: tuple[int, int], target: tuple[int, int], name: str) -> Framing:
-    """The largest part of a photo, in its middle, that has the target's shape.
-
-    Args:
-        source: Width and height of the photo.
-        target: Width and height of the frame.
-        name: What to call the photo in messages.
+    """The largest part of a photo, in its middle, that has the target's shape; both by width and height.
 
     Raises:
         InputError: It would have to be enlarged more than twice.

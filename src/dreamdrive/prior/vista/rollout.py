@@ -14,6 +14,7 @@ from dreamdrive.prior.vista.sampler import Fixed, guidance, sample
 SCALE = 0.18215
 """From the autoencoder's latents to those that are sampled."""
 
+
 def rounds_for(frames: int, kind: Kind, per_round: int) -> int:
     """Rounds after which so many frames are there."""
     if frames <= per_round:

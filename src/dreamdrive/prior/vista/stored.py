@@ -83,11 +83,6 @@ class Stored:
     parts: Mapping[Part, StoredPart]
     ignored: tuple[str, ...] = ()
 
-    @property
-    def image_columns(self) -> int:
-        """Width of the context that describes the first frame."""
-        return int(self.parts["image_encoder"].config["projection_dim"])
-
 
 def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
     """Look at weights without reading them.
@@ -111,10 +106,11 @@ def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
         _check(stored, part)
     actions = ACTION_COLUMNS if stored.kind is VISTA else 0
     columns = stored.parts["unet"].config["cross_attention_dim"]
-    if columns != stored.image_columns + actions:
+    image = int(stored.parts["image_encoder"].config["projection_dim"])
+    if columns != image + actions:
         raise InputError(
-            f"{path}: the UNet takes a context of {columns} columns; expected {stored.image_columns} of the "
-            f"image encoder and {actions} of the action"
+            f"{path}: the UNet takes a context of {columns} columns; expected {image} of the image encoder "
+            f"and {actions} of the action"
         )
     return stored
 
@@ -236,11 +232,7 @@ def _check(stored: Stored, part: Part) -> None:
 
 
 def _check_config(stored: Stored, part: Part) -> None:
-    """Whether the sizes in a configuration are those of the tensors, before a network is built of them.
-
-    Raises:
-        InputError: They differ, or are beyond what networks have.
-    """
+    """Whether the sizes in a configuration are those of the tensors, before a network is built of them."""
     own = stored.parts[part]
     where = f"{stored.path}: config.json of the {TITLES[part]}"
     check_sizes(own.config, where)

@@ -27,7 +27,7 @@ class SharedCamera:
 
 
 def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
-    """Medians over all frames; the focal length also over both axes.
+    """Medians over all frames, and of the focal length also over both axes.
 
     Args:
         intrinsics: Pinholes (N, 3, 3) in pixels of the pictures.
@@ -46,16 +46,12 @@ def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
 
 
 def seen_through(seen: Seen, camera: Camera) -> Seen:
-    """What a network saw through pinholes of its own, as it is through the known one.
+    """What a network saw through pinholes of its own, as it is through the known one of the pictures.
 
     Networks that cannot be told have the principal point in the middle. What they see is right for a camera
     that looks along the middle of the picture: it is turned to look along the true axis, by the rotation that
     brings the rays of all pixels nearest together. What a rotation does not mend, a focal length of their
     own, stays.
-
-    Args:
-        seen: Poses, depth and the network's pinholes.
-        camera: The known pinhole of the pictures.
     """
     poses, depth = seen.world_from_camera.copy(), np.empty_like(seen.depth)
     rays = camera.rays()

@@ -129,14 +129,6 @@ def _measured(
     """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
 
     Known poses are kept, and give the depth their unit.
-
-    Args:
-        clip: The frames.
-        joined: Their poses and depth on the grid of the pictures.
-        shared: Their camera as the network has it.
-        free: Pixels (F, H, W) of the frames that show the street.
-        how: How the pictures were made of the frames.
-        network: The network, for its unit.
     """
     poses, factor, others = joined.world_from_camera, 1.0, dict[str, float]()
     unit, spread = network.unit, network.unit_spread
