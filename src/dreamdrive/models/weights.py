@@ -34,6 +34,9 @@ _WIDEST, _DEEPEST = 65_536, 1000
 _LAYERS = re.compile("layers|depth|blocks_num|num_blocks")
 _STRETCHED = 1_000_000
 """Numbers that a tensor may show although fewer are stored."""
+_BUILDING = (TypeError, ValueError, AttributeError, LookupError, OverflowError, MemoryError, AssertionError)
+"""What a damaged pickle raises, which builds what its classes do not take."""
+_READING = (RuntimeError, pickle.UnpicklingError, zipfile.BadZipFile, EOFError, OSError, struct.error)
 _REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
@@ -118,24 +121,7 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
         with warnings.catch_warnings(), torch.serialization.safe_globals(list(allowed)):
             warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
             return torch.load(path, map_location="cpu", weights_only=True)
-    except (
-        RuntimeError,
-        pickle.UnpicklingError,
-        zipfile.BadZipFile,
-        EOFError,
-        OSError,
-        ValueError,
-        KeyError,
-        # A damaged pickle builds what its classes do not take.
-        TypeError,
-        AttributeError,
-        IndexError,
-        OverflowError,
-        MemoryError,
-        AssertionError,
-        NotImplementedError,
-        struct.error,
-    ) as error:
+    except (*_READING, *_BUILDING) as error:
         refused = _REFUSED.search(str(error))
         about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
         about = f"; {briefly(error)}" if isinstance(error, zipfile.BadZipFile) else about

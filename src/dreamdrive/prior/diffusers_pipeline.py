@@ -105,11 +105,7 @@ def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
 
 
 def wanted_frames(control: Control, usual: int) -> tuple[int, Int[np.ndarray, " f"]]:
-    """How many frames to make, and which of them to keep, before anything is loaded or made.
-
-    Args:
-        control: The options ``frames`` and ``hold_out``.
-        usual: How many frames the model makes unless told.
+    """How many frames to make, ``usual`` unless told, and which to keep, before anything is loaded or made.
 
     Raises:
         InputError: Fewer than two frames are selected, or none can be withheld of those.
@@ -132,17 +128,10 @@ def make_clip(
     provenance: dict[str, Any],
     asked: Trajectory | None = None,
 ) -> Clip:
-    """The clip of a video that a model made from a photo.
+    """The clip of a video, RGB in [0, 1], that a model made from a photo, its frame 0.
 
-    Args:
-        control: Which frames are withheld.
-        wanted: Frames that were asked for, see ``wanted_frames``; some models make fewer, as a whole number
-            of latents.
-        photo: What it started from.
-        video: RGB in [0, 1], frame 0 the photo.
-        rate_hz: Frames a second.
-        provenance: What to remember; its notes come after those of the photo.
-        asked: The path that was asked for, one pose a frame of the video.
+    ``wanted`` is what ``wanted_frames`` gave; some models make fewer, as a whole number of latents. ``asked``
+    is the path that was asked for, one pose a frame of the video.
 
     Raises:
         InputError: The frames are not finite, or too few were made.

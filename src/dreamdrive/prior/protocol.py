@@ -1,7 +1,7 @@
 """What every prior offers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Protocol, runtime_checkable
 
 from dreamdrive.errors import InputError
 from dreamdrive.models import Backend
@@ -10,14 +10,8 @@ from dreamdrive.scene.action import check_action
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-
-@runtime_checkable
-class Make(Protocol):
-    """F_VDM (eq. 3): from what the user asks for to frames with features Z_ref."""
-
-    def __call__(self, control: Control, progress: Progress) -> Clip:
-        """Make the clip; InputError where the prior cannot work with this control."""
-        ...
+Make = Callable[[Control, Progress], Clip]
+"""F_VDM (eq. 3): from what the user asks for to frames with features Z_ref; InputError where it cannot."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -62,16 +62,11 @@ class Conditions:
 def see(
     layout: Layout, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
 ) -> Conditions:
-    """What the cameras are told at given times, on the device of the words.
+    """What the cameras are told at given times of the layout, on the device of the words' tokens.
 
     Each camera has its list of boxes, filled up to the longest list of all; all numbers are rounded to half
-    precision, in which the networks were taught: sine of 8 times a focal length tells the difference.
-
-    Args:
-        layout: Map, boxes and path.
-        times_s: Times of the layout.
-        cells: Cells along each side of the raster.
-        words: Tokens of what all pictures are described by.
+    precision, in which the networks were taught: sine of 8 times a focal length tells the difference. The
+    raster has ``cells`` along each side.
     """
     lidar_from_car = np.linalg.inv(car_from_lidar())
     lidar_from_camera = np.stack([lidar_from_car @ car_from_camera(each) for each in NUSCENES])
@@ -98,7 +93,7 @@ def see(
         present[:, :, :longest],
     )
     tensors = [torch.from_numpy(np.ascontiguousarray(each)).to(words.device) for each in given]
-    return Conditions(*tensors, words.expand(count, -1, -1))
+    return Conditions(*tensors, text=words.expand(count, -1, -1))
 
 
 def _rounded(values: np.ndarray) -> Float32[np.ndarray, "..."]:

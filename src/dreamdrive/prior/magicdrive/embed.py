@@ -61,14 +61,10 @@ class BoxEmbedder(nn.Module):
 
 
 class MapEncoder(nn.Module):
-    """From the raster of the map to the first feature map of the ControlNet.
+    """From the raster of the map to the first feature map of the ControlNet, through four levels.
 
-    Args:
-        channels: Channels of the raster.
-        widths: Widths of its four levels.
-        out: Width of the feature map.
-        pooled: Height and width that the result is averaged to, of MagicDrive's 272x736 model; None for the
-            others, which get 28x50 from 200x200 cells and 53x100 from 400x400 by their paddings.
+    Of MagicDrive's 272x736 model, the result is averaged to the height and width ``pooled``; the others get
+    28x50 from 200x200 cells and 53x100 from 400x400 by their paddings.
     """
 
     def __init__(

@@ -19,16 +19,7 @@ from dreamdrive.scene.layout import Layout
 
 @dataclass(frozen=True)
 class Run:
-    """What one run samples.
-
-    Attributes:
-        layout: Map, boxes and path.
-        parts: The networks.
-        prompt: The sentence.
-        steps: Steps of the sampler.
-        seed: Of the start noise.
-        rate_hz: Time steps in a second.
-    """
+    """What one run samples: time steps at ``rate_hz``, from start noise of the seed."""
 
     layout: Layout
     parts: Parts

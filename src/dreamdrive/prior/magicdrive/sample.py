@@ -52,15 +52,9 @@ def sample(
     scheduler: UniPCMultistepScheduler,
     done: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "bn c h w"]:
-    """Latents of all cameras of the time steps.
+    """Latents of all cameras of the time steps, from the conditions and those of the unconditional branch.
 
-    Args:
-        unet: Denoises.
-        controlnet: Reads the conditions.
-        branches: The conditions and those of the unconditional branch.
-        noise: Of every picture, in float32, which the steps are taken in.
-        scheduler: Set to its steps.
-        done: Called after every step.
+    The noise of every picture is in float32, which the steps are taken in; ``done`` is called after each.
     """
     dtype = unet.dtype
     rasters = [branch.raster.to(dtype) for branch in branches]

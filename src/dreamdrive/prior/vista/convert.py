@@ -32,13 +32,7 @@ _CLASSES: dict[Part, dict[str, str]] = {
 
 @dataclass(frozen=True)
 class Converted:
-    """What was made.
-
-    Attributes:
-        stored: What it was made from.
-        ignored: How many tensors were left out, by what they are.
-        notes: What to say of the file, a sentence each.
-    """
+    """What was made of which file; how many tensors were left out, by what they are; what to say of it."""
 
     stored: Stored
     ignored: dict[str, int]

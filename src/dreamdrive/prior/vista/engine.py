@@ -72,14 +72,10 @@ class Engine:
         mask: Float[Tensor, " t"],
         given: float = 1.0,
     ) -> Float[Tensor, "t c h w"]:
-        """One look of the UNet.
+        """One look of the UNet at scaled noisy latents.
 
-        Args:
-            seen: The conditions.
-            x: Scaled noisy latents.
-            time: 0.25 ln sigma.
-            mask: One for frames that are known.
-            given: One with the conditions, zero without.
+        ``time`` is 0.25 ln sigma, ``mask`` one for frames that are known; ``given`` is one with the
+        conditions of the round, zero without.
         """
         unet, kind = self.networks.unet(), self.networks.stored.kind
         to = (self._device, self.networks.dtype)

@@ -68,13 +68,9 @@ class Recipe:
 
 @dataclass
 class Recipes:
-    """What a file gives.
+    """What a file gives: the recipe of each tensor by part and name.
 
-    Attributes:
-        parts: The recipe of each tensor, by part and name.
-        ignored: Keys of no use.
-        unknown: Keys that no rule knows.
-        actions: Keys of the action adapters.
+    Beside them keys of no use, keys that no rule knows, and those of the action adapters.
     """
 
     parts: dict[Part, dict[str, Recipe]] = field(default_factory=lambda: {part: {} for part in PARTS})

@@ -24,7 +24,7 @@ from dreamdrive.prior.vista.kinds import SVD, Kind
 from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
-from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
+from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
 from dreamdrive.progress import Progress
 from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
@@ -149,7 +149,7 @@ def _sample(
 ) -> Float[Tensor, "f c h w"]:
     """Latents of all frames; noise is drawn on the CPU, so that it is the same everywhere."""
     draw = torch.Generator().manual_seed(seed)
-    images = leading.images()
+    images = to_images(leading.frames)
     height, width = images.shape[2] // 8, images.shape[3] // 8
     channels = engine.networks.stored.parts["unet"].config.get("out_channels", 4)
     shape = len(windows), len(windows[0].span), channels, height, width

@@ -32,10 +32,7 @@ def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
 class Networks:
     """A stored model whose networks are loaded when they are asked for; each leaves when the next one comes.
 
-    Attributes:
-        stored: The model.
-        device: Where its networks run.
-        half: Whether the UNet computes in float16; the others never do.
+    ``half`` is whether the UNet computes in float16; the others never do.
     """
 
     def __init__(self, stored: "Stored", device: torch.device, *, half: bool) -> None:

@@ -13,15 +13,11 @@ from dreamdrive.scene.trajectory import Trajectory
 
 
 def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last_s: float) -> list[Waypoints]:
-    """The waypoints of rounds, each from where the path is when the round starts.
-
-    Args:
-        path: The wanted path.
-        starts_s: When each round starts, from the first pose on.
-        last_s: Time of the last frame, to which the path has to lead.
+    """The waypoints of rounds that start at ``starts_s``, each from where the path is then.
 
     Raises:
-        InputError: The path is shorter than the frames or the waypoints need, or no car drives it.
+        InputError: The path does not last until ``last_s``, the time of the last frame, or for all waypoints;
+            or no car drives it.
     """
     path = from_first(path)
     needed_s = max(last_s, float(starts_s[-1]) + AT_S[-1])

@@ -35,15 +35,9 @@ def roll_out(
 ) -> Float[Tensor, "f c y x"]:
     """Scaled latents of all frames: 25 of the first round, and what each later one adds to its overlap.
 
-    Args:
-        engine: The networks.
-        kind: Which model they are.
-        leading: One to three known frames in [-1, 1].
-        noise: For each round (R, T, C, H/8, W/8), of standard deviation 1.
-        actions: For each round.
-        steps: Of the sampler in each round.
-        first: The first frame as the network is given it beside the noise, where noise was added (SVD).
-        tell: Called after each step.
+    ``noise`` (R, T, C, H/8, W/8), of standard deviation 1, and ``actions`` are for each round; ``leading``
+    are one to three known frames in [-1, 1], and ``first`` is the first frame as the network is given it
+    beside the noise, where noise was added (SVD). ``tell`` is called after each step of the sampler.
     """
     rounds, count = noise.shape[:2]
     coded = engine.encode(leading)

@@ -69,12 +69,8 @@ def denoise(
 ) -> Float[Tensor, "t c h w"]:
     """The clean latents that the network sees in noisy ones (v-prediction).
 
-    Args:
-        velocity: The network.
-        latents: Noisy latents.
-        sigma: Standard deviation of their noise.
-        scale: Guidance of each frame.
-        mask: One for fixed frames.
+    ``sigma`` is the standard deviation of their noise, ``scale`` the guidance of each frame, and ``mask`` one
+    for fixed frames.
     """
     without, given = velocity(latents / (sigma**2 + 1) ** 0.5, time_of(sigma), mask)
     strength = scale.to(latents)[:, None, None, None]

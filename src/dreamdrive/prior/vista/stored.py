@@ -49,13 +49,7 @@ _SECOND_TIME = "cond_time_embedding."
 
 @dataclass(frozen=True)
 class StoredPart:
-    """One network.
-
-    Attributes:
-        config: Of its class.
-        shapes: Of its tensors.
-        read: Reads one tensor by its name.
-    """
+    """One network: configuration of its class, shapes of its tensors, and a reader of one by its name."""
 
     config: dict[str, Any]
     shapes: Shapes
@@ -69,14 +63,7 @@ class StoredPart:
 
 @dataclass(frozen=True)
 class Stored:
-    """A video model on disk, checked by names and shapes.
-
-    Attributes:
-        path: Where it lies.
-        kind: Which model it is.
-        parts: Its networks.
-        ignored: Keys of the file that are left out on purpose.
-    """
+    """A video model on disk, checked by names and shapes; ``ignored`` keys are left out on purpose."""
 
     path: Path
     kind: Kind

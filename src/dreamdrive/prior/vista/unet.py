@@ -46,14 +46,10 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         time_ids: Float[Tensor, "b 3"],
         fixed: Float[Tensor, " t"] | None = None,
     ) -> Float[Tensor, "b t c2 h w"]:
-        """One look at a noisy clip.
+        """One look at scaled noisy latents with the condition latents behind them.
 
-        Args:
-            sample: Scaled noisy latents with the condition latents behind them.
-            time: 0.25 ln sigma.
-            context: First frame and action.
-            time_ids: Frame rate - 1, motion bucket, noise on the first frame.
-            fixed: One for frames that are known.
+        ``time`` is 0.25 ln sigma, ``context`` the first frame and the action, ``time_ids`` are frame rate
+        - 1, motion bucket and noise on the first frame, and ``fixed`` is one for frames that are known.
         """
         times = torch.full((len(sample),), time, device=sample.device)
         try:

@@ -1,6 +1,6 @@
 """One pinhole for a clip: from those that a network gives each frame, or a known one in their place."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -12,26 +12,11 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.similarity import nearest_rotation
 
 
-@dataclass(frozen=True)
-class SharedCamera:
-    """The camera that took all frames, as the network has it.
+def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> tuple[Camera, float]:
+    """The pinhole of the frames that took all pictures, with square pixels, and how far they disagree.
 
-    Attributes:
-        camera: Pinhole of the frames with square pixels.
-        spread: Robust standard deviation (1.4826 times the median distance) of the logarithm of the focal
-            lengths along both axes of all frames.
-    """
-
-    camera: Camera
-    spread: float
-
-
-def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
-    """Medians over all frames, and of the focal length also over both axes.
-
-    Args:
-        intrinsics: Pinholes (N, 3, 3) in pixels of the pictures.
-        how: How the pictures were made of the frames.
+    It is the median of all pinholes (N, 3, 3), and of both axes for the focal length; the disagreement is the
+    robust standard deviation (1.4826 times the median distance) of the logarithm of the focal lengths.
 
     Raises:
         InputError: A focal length is not positive.
@@ -42,7 +27,7 @@ def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
     focal_px = float(np.median(focals_px))
     spread = 1.4826 * float(np.median(np.abs(np.log(focals_px / focal_px))))
     cx_px, cy_px = how.to_frame(np.median(intrinsics[:, :2, 2], axis=0))
-    return SharedCamera(Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread)
+    return Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread
 
 
 def seen_through(seen: Seen, camera: Camera) -> Seen:

@@ -20,13 +20,9 @@ _NAMES = ("model.safetensors", "model.pt", "model.pth")
 
 @dataclass(frozen=True)
 class Stored:
-    """Weights as they lie on disk.
+    """Weights as they lie on disk, with what ``config.json`` beside them says, if it is there.
 
-    Attributes:
-        state: Tensors by key.
-        config: What ``config.json`` beside them says; empty without one.
-        source: Where they come from, for messages.
-        expected: Which weights are expected, for messages.
+    In messages ``source`` is where they come from, and ``expected`` which are expected.
     """
 
     state: dict[str, Tensor]
