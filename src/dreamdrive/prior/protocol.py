@@ -50,10 +50,6 @@ class Prior(Backend):
         self.check_start("prior", control.weights)
 
     def __call__(self, control: Control, progress: Progress = silent) -> Clip:
-        """Make the clip.
-
-        Raises:
-            InputError: See ``check``; or the input, an option or the weights cannot be used.
-        """
+        """Make the clip; InputError as of ``check``, or where input, options or weights cannot be used."""
         self.check(control)
         return self.make(control, progress)

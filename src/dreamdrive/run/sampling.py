@@ -114,7 +114,7 @@ def clip_features(
     Raises:
         InputError: The clip, the weights or an option cannot be used, or the file cannot be written.
     """
-    from dreamdrive.prior.vista import FeatureOptions, video_features
+    from dreamdrive.prior.vista.features import FeatureOptions, video_features
 
     if out.suffix != ".safetensors":
         raise InputError(f"-o {out}: expected a name that ends in .safetensors")

@@ -6,7 +6,6 @@ from functools import partial
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
-from dreamdrive.prior.vista.features import FeatureOptions, video_features
 from dreamdrive.prior.vista.kinds import KINDS, KindName
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip

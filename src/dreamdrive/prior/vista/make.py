@@ -59,7 +59,9 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     networks = open_networks(control.weights, kind)
     wanted = _wanted(control.frames, kind, networks.per_round)
     held_out = held_out_mask(len(wanted), control.hold_out)
-    spans = _rounds(int(wanted[-1]) + 1, kind, networks.per_round)
+    step = networks.per_round - kind.overlap
+    starts = range(0, step * rounds_for(int(wanted[-1]) + 1, kind, networks.per_round), step)
+    spans = [range(start, start + networks.per_round) for start in starts]
     check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
     told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
     noticed = notes_of(networks.stored)
@@ -113,12 +115,6 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, "
             f"more below {_MOST_FRAMES}"
         )
     return np.array(wanted, dtype=np.int64)
-
-
-def _rounds(frames: int, kind: Kind, per_round: int) -> list[range]:
-    """Frames of each round, the overlap with the round before among them."""
-    starts = [number * (per_round - kind.overlap) for number in range(rounds_for(frames, kind, per_round))]
-    return [range(start, start + per_round) for start in starts]
 
 
 def _told(

@@ -1,7 +1,7 @@
 """The networks of a video model, one at a time in memory. Importing this loads diffusers and transformers."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import torch
 from accelerate import init_empty_weights
@@ -53,21 +53,15 @@ class Networks:
 
     def unet(self) -> VideoUNet:
         """The UNet."""
-        network = self._use("unet")
-        assert isinstance(network, VideoUNet)
-        return network
+        return cast(VideoUNet, self._use("unet"))
 
     def vae(self) -> AutoencoderKLTemporalDecoder:
         """Encoder and decoder of frames."""
-        network = self._use("vae")
-        assert isinstance(network, AutoencoderKLTemporalDecoder)
-        return network
+        return cast(AutoencoderKLTemporalDecoder, self._use("vae"))
 
     def image_encoder(self) -> CLIPVisionModelWithProjection:
         """What describes the first frame."""
-        network = self._use("image_encoder")
-        assert isinstance(network, CLIPVisionModelWithProjection)
-        return network
+        return cast(CLIPVisionModelWithProjection, self._use("image_encoder"))
 
     def free(self) -> None:
         """Let go of what is held."""
