@@ -1,6 +1,7 @@
 """Time and memory of splatting against Gaussians, pixels and threads.
 
-    python benchmarks/scale.py [--quick] [--json FILE] [--plot FILE.png] [--markdown docs/performance.md]
+    python benchmarks/scale.py [--quick] [--json FILE] [--plot FILE.png]
+        [--markdown docs/results/performance.md]
 
 Each point is a process of its own, which loads a street, splats it and reports the best times and how much
 more was resident at the peak than once the scene was loaded (Linux). Gradients go to means, quaternions,

@@ -1,6 +1,7 @@
 """Milliseconds of splatting, forward and forward + backward, on the scenes in ``DREAMDRIVE_BENCH``.
 
-    python benchmarks/splat.py --scenes a b c --json FILE [--markdown docs/performance.md] [--threads N]
+    python benchmarks/splat.py --scenes a b c --json FILE [--threads N]
+        [--markdown docs/results/performance.md]
 
 A scene is t, a, b, c or an .npz file. Gradients go to means, quaternions, scales, opacities and colours (SH
 degree 0). Times are medians, or the best where it says so. Shown are

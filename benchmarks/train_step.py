@@ -24,10 +24,11 @@ from common.options import parser_of
 from common.report import as_json, write
 from dreamdrive import _native
 from dreamdrive.fit import trainer as trainer_module
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.trainer import Model, Trainer
-from dreamdrive.scene import deformation as deformation_module
-from dreamdrive.scene.exposure import ExposureNetwork
+from dreamdrive.motion import deformation as deformation_module
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import one_torch_thread
 from splat.fit_scene import FIRST_STEP, OPTIONS, FitScene, make
 from splat.plain_step import PlainTrainer
@@ -39,7 +40,7 @@ STAGES = [
     (deformation_module, "network_residual", "deformation network"),
     (deformation_module.DeformationField, "pose", "tracks"),
     (deformation_module, "posed", "tracks and life spans"),
-    (trainer_module, "alive_at", "tracks and life spans"),
+    (Gaussians, "alive_at", "tracks and life spans"),
     (trainer_module, "activate", "activations"),
     (trainer_module, "_splat", "splat"),
     (ExposureNetwork, "forward", "exposure network"),

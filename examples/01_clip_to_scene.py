@@ -31,7 +31,7 @@ def main() -> None:
         control, prior = Control(frames="0:12:1", size=(160, 96), hold_out=4), "street-world"
     else:
         control, prior = Control(given.clip, hold_out=8), "replay"
-    generate(control, given.out, prior=prior, quality="draft", progress=show)
+    generate(control, given.out, prior=prior, options="draft", progress=show)
 
     scene = load_scene(given.out / "scene")
     print(

@@ -1,4 +1,4 @@
-"""The pages: links lead somewhere, and each page is reached from the README."""
+"""The pages: links lead somewhere, the README reaches each page, and messages name pages that exist."""
 
 import re
 from pathlib import Path
@@ -9,8 +9,7 @@ LINK = re.compile(r"\]\(([^()\s]+)\)")
 
 
 def pages() -> list[Path]:
-    folders = (ROOT, ROOT / "docs", ROOT / "benchmarks")
-    return [page for folder in folders for page in sorted(folder.glob("*.md"))]
+    return sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md")])
 
 
 def links(page: Path) -> list[tuple[Path, str]]:
@@ -42,3 +41,10 @@ def test_every_page_is_reached_from_the_readme() -> None:
         reached |= near
         waiting += near
     assert [page.name for page in pages() if page not in reached] == []
+
+
+def test_pages_that_the_program_names_are_there() -> None:
+    sources = [*ROOT.glob("src/**/*.py"), *ROOT.glob("benchmarks/**/*.py"), ROOT / "CHANGELOG.md"]
+    named = {name for file in sources for name in re.findall(r"docs/[\w/]+\.md", file.read_text())}
+    assert "docs/layout.md" in named
+    assert sorted(name for name in named if not (ROOT / name).exists()) == []

@@ -7,8 +7,8 @@ from typing import get_args, get_type_hints
 
 import dreamdrive
 from dreamdrive.cli.generate import generate as generate_command
-from dreamdrive.fit import Representation
 from dreamdrive.geometry import BACKENDS
+from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import QUALITIES, QualityName
 from dreamdrive.prior import PRIORS
 from dreamdrive.run.stages import STAGES
@@ -58,7 +58,7 @@ def test_importing_the_package_and_the_commands_loads_nothing_heavy() -> None:
 def test_the_command_offers_what_there_is() -> None:
     hints = get_type_hints(generate_command)
     assert set(get_args(get_args(hints["prior"])[0])) == set(PRIORS)
-    assert set(get_args(hints["geometry"])) == set(BACKENDS)
-    assert set(get_args(hints["representation"])) == set(get_args(Representation))
+    assert set(get_args(get_args(hints["geometry"])[0])) == set(BACKENDS)
+    assert set(get_args(get_args(hints["representation"])[0])) == set(REPRESENTATIONS)
     assert set(get_args(hints["quality"])) == set(QUALITIES) == set(get_args(QualityName))
     assert set(get_args(get_args(hints["recompute_from"])[0])) == set(STAGES)

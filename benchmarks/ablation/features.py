@@ -1,24 +1,53 @@
-"""Other features for F_score: those of a network that has seen a million photos."""
+"""Other features for F_score: some of its own, or those of a network that has seen a million photos."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
 
 from dreamdrive.evaluate.networks.efficientnet_lite import EfficientNetLite0, load_efficientnet_lite0
 from dreamdrive.fit import initialise
-from dreamdrive.options import Quality
+from dreamdrive.options import Options
 from dreamdrive.prior.pca import reduce
-from street.case import Start
+from dreamdrive.scene.features import OF_GEOMETRY
+from dreamdrive.scene.gaussians import Gaussians
 
 _BLOCK = 4  # the last one of stride 8: 40 channels
+Before = Mapping[str, Any]
+"""Results of the stages before, by name."""
+Usual = Callable[[], Gaussians]
 
 
-def with_efficientnet(begin: Start, quality: Quality) -> Start:
-    """The same start, with 16 components of EfficientNet-Lite0's features as Z_ref."""
-    features = reduce(list(_features(load_efficientnet_lite0(), begin.clip.frames)))
-    clip = replace(begin.clip, features={"efficientnet": features})
-    return replace(begin, clip=clip, seeds=initialise(clip, begin.geometry, quality.seeds))
+def with_evidence(before: Before, options: Options, usual: Usual) -> Gaussians:
+    """Z_ref is the evidence of geometry alone."""
+    return _seeing(usual(), slice(0, OF_GEOMETRY))
+
+
+def with_appearance(before: Before, options: Options, usual: Usual) -> Gaussians:
+    """Z_ref is the appearance alone."""
+    return _seeing(usual(), slice(OF_GEOMETRY, None))
+
+
+def without_features(before: Before, options: Options, usual: Usual) -> Gaussians:
+    """No Z_ref."""
+    return _seeing(usual(), slice(0, 0))
+
+
+def with_efficientnet(before: Before, options: Options, usual: Usual) -> Gaussians:
+    """Z_ref is the evidence and 16 components of EfficientNet-Lite0's features."""
+    usual()  # the static fit that all variants share follows from it
+    clip = before["prior"]
+    features = reduce(list(_features(load_efficientnet_lite0(), clip.frames)))
+    return initialise(replace(clip, features={"efficientnet": features}), before["geometry"], options.seeds)
+
+
+def _seeing(seeds: Gaussians, channels: slice) -> Gaussians:
+    assert seeds.features is not None
+    seen = torch.zeros_like(seeds.features)
+    seen[:, channels] = seeds.features[:, channels]
+    return replace(seeds, features=seen)
 
 
 @torch.inference_mode()

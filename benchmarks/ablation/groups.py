@@ -1,8 +1,9 @@
 """Other ways to decompose that hybrid is compared with: clusters of HDBSCAN and of voxels."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,10 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from dreamdrive.decompose import GroupOptions
-from dreamdrive.decompose.covered import covered
-from dreamdrive.decompose.group import Grouping, elected, source_pixels
-from dreamdrive.options import Quality
-from street.case import Start
+from dreamdrive.decompose.group import Grouping, elected
+from dreamdrive.options import Options
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.gaussians import Gaussians
 
 METRES_PER_FRAME = 1.0
 """A training frame counts as so many metres: a car of a city street goes them at 10 Hz."""
@@ -25,23 +26,26 @@ METRES_PER_FEATURE = 0.5
 VOXEL_M = 1.0
 REACH_M = 1.5
 """Clusters of HDBSCAN that are no farther apart are one: else each frame of a near car is one of its own."""
+Before = Mapping[str, Any]
+"""Results of the stages before, by name."""
+Usual = Callable[[], Grouping]
 Labels = Callable[[Float[np.ndarray, "m d"]], Int[np.ndarray, " m"]]
 """From what ``space_time`` gives to one label each, -1 for noise."""
 
 
-def by_density(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+def by_density(before: Before, options: Options, usual: Usual) -> Grouping:
     """HDBSCAN over space, time and score."""
-    return _grouped(begin, scores, quality, lambda of: density_labels(of[:, :5], quality.group.smallest))
+    return _grouped(before, options.group, lambda of: density_labels(of[:, :5], options.group.smallest))
 
 
-def by_density_and_features(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+def by_density_and_features(before: Before, options: Options, usual: Usual) -> Grouping:
     """HDBSCAN over space, time, score and Z_ref."""
-    return _grouped(begin, scores, quality, lambda of: density_labels(of, quality.group.smallest))
+    return _grouped(before, options.group, lambda of: density_labels(of, options.group.smallest))
 
 
-def by_voxels(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
+def by_voxels(before: Before, options: Options, usual: Usual) -> Grouping:
     """Candidates that hang together by voxels of a metre and a training frame."""
-    return _grouped(begin, scores, quality, lambda of: voxel_labels(of[:, :4]))
+    return _grouped(before, options.group, lambda of: voxel_labels(of[:, :4]))
 
 
 def density_labels(values: Float[np.ndarray, "m d"], smallest: int) -> Int[np.ndarray, " m"]:
@@ -89,16 +93,15 @@ def majority(
 
 
 def space_time(
-    begin: Start, value: Float[np.ndarray, " n"], index: Int[np.ndarray, " m"]
+    clip: Clip, seeds: Gaussians, value: Float[np.ndarray, " n"], index: Int[np.ndarray, " m"]
 ) -> Float[np.ndarray, "m d"]:
     """Place, training frame, score and Z_ref of some seeds, all as metres.
 
     Withheld frames are not counted: no cluster ends at them.
     """
-    seeds = begin.seeds
     assert seeds.features is not None
     features = seeds.features.numpy()
-    number = np.cumsum(~begin.clip.held_out) - 1
+    number = np.cumsum(~clip.held_out) - 1
     columns = [
         seeds.means.detach().numpy(),
         METRES_PER_FRAME * number[seeds.source_frame.numpy()],
@@ -108,14 +111,11 @@ def space_time(
     return np.column_stack(columns).astype(np.float64)[index]
 
 
-def _grouped(begin: Start, scores: torch.Tensor, quality: Quality, labels: Labels) -> Grouping:
-    clip, geometry, seeds, options = begin.clip, begin.geometry, begin.seeds, quality.group
-    value = scores.detach().numpy()
+def _grouped(before: Before, options: GroupOptions, labels: Labels) -> Grouping:
+    clip, seeds = before["prior"], before["initialise"]
+    value = before["score"].detach().numpy()
     index = np.flatnonzero(value > options.candidate)
-    found = labels(space_time(begin, value, index))
+    found = labels(space_time(clip, seeds, value, index))
     cluster = np.full(len(seeds), -1, dtype=np.int64)
     cluster[index] = majority(found, value[index], options)
-    dynamic = torch.from_numpy(cluster >= 0)
-    pixels = source_pixels(geometry, seeds, np.arange(len(seeds)))
-    hidden = covered(clip, geometry, seeds, dynamic, pixels, math.ceil(options.reach_px / 1.5))
-    return Grouping(dynamic, torch.from_numpy(cluster), hidden)
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))

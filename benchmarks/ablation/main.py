@@ -3,33 +3,30 @@
 import argparse
 import os
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import torch
 
-from ablation.features import with_efficientnet
 from ablation.tables import markdown, tables
-from ablation.variants import VARIANTS, Variant
+from ablation.variants import VARIANTS
 from common.keep import is_current, load, save
 from common.machine import describe_machine
 from common.options import parser_of
 from common.report import publish
 from common.workers import work_off
-from dreamdrive.options import Quality
-from dreamdrive.run.stages import digest
-from dreamdrive.scene.features import OF_GEOMETRY
-from street.case import NOVEL, Case, References, Start, case_digest, start
-from street.fit import fit_case
-from street.fit import options_of as fit_options
-from street.jobs import QUALITY
+from common.worlds import DEVELOPMENT
+from dreamdrive.run import digest
+from street.case import NOVEL, Case, References, case_digest
+from street.fit import fit_case, key_of
+from street.jobs import start
 from street.measure import measure, told_apart
+from street.methods import QUALITY
 from street.views import views_digest
 
-SEEDS = (0, 1, 2, 3)
+SEEDS = DEVELOPMENT[:4]
 
 
 @dataclass(frozen=True)
@@ -65,36 +62,14 @@ class Cut:
     def key(self) -> str:
         """Of everything its figures follow from."""
         variant = VARIANTS[self.variant]
-        options = fit_options(variant.change(QUALITY), variant.representation)
-        others = [self.variant, variant.features, variant.representation]
         case = case_digest(Case(self.seed, "true", self.references))
-        return digest([case, options, others, views_digest(self.seed)])
-
-
-def begun(begin: Start, variant: Variant, quality: Quality) -> Start:
-    """What the variant is fitted to."""
-    if variant.features == "all":
-        return begin
-    if variant.features == "efficientnet":
-        return with_efficientnet(begin, quality)
-    features = begin.seeds.features
-    assert features is not None
-    seen = torch.zeros_like(features)
-    if variant.features == "evidence":
-        seen[:, :OF_GEOMETRY] = features[:, :OF_GEOMETRY]
-    if variant.features == "appearance":
-        seen[:, OF_GEOMETRY:] = features[:, OF_GEOMETRY:]
-    return replace(begin, seeds=replace(begin.seeds, features=seen))
+        return digest([key_of(case, variant.change(QUALITY)), self.variant, views_digest(self.seed)])
 
 
 def make(cut: Cut) -> None:
     """Fit, measure and keep."""
     case, variant = Case(cut.seed, "true", cut.references), VARIANTS[cut.variant]
-    quality = variant.change(QUALITY)
-    steps = quality.static.steps
-    cases = cut.runs / ("cases" if steps == QUALITY.static.steps else f"cases-{steps}")
-    begin = begun(start(case, quality, cases), variant, quality)
-    fitted = fit_case(begin, variant.representation, quality, variant.vote, variant.scale)
+    fitted = fit_case(start(case, cut.runs), variant.change(QUALITY), variant.around)
     scene = fitted.scene
     views, _, _ = measure(scene, case, [], cut.runs / "truth")
     novel = [views[view]["psnr"] for view in NOVEL if views[view]["psnr"] is not None]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ablation.variants import VARIANTS
 from common.markdown import grid, number
+from common.worlds import common_worlds
 
 FIGURES = {
     "held_out_psnr": ("withheld, dB", ".2f"),
@@ -22,7 +23,7 @@ def tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for references in dict.fromkeys(record["references"] for record in records):
         here = [record for record in records if record["references"] == references]
-        worlds = common_worlds(here)
+        worlds = common_worlds(here, "variant")
         by_variant: dict[str, dict[int, dict[str, Any]]] = {}
         for record in here:
             if record["seed"] in worlds:
@@ -31,14 +32,6 @@ def tables(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
         rows = [_row(variant, rows, whole) for variant, rows in by_variant.items()]
         found.append({"references": references, "worlds": worlds, "rows": rows})
     return found
-
-
-def common_worlds(records: list[dict[str, Any]]) -> list[int]:
-    """Seeds that every variant was measured on: means over different worlds cannot be compared."""
-    seeds: dict[str, set[int]] = {}
-    for record in records:
-        seeds.setdefault(record["variant"], set()).add(record["seed"])
-    return sorted(set.intersection(*seeds.values())) if seeds else []
 
 
 def _row(variant: str, found: dict[int, dict[str, Any]], whole: dict[int, dict[str, Any]]) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def make(layout: Layout, name: str, seed: int, options: argparse.Namespace) -> M
         control,
         folder / "out",
         prior="street-world",
-        quality=options.quality,
+        options=options.quality,
         geometry_files=given,
         force=True,
     )

@@ -11,7 +11,7 @@ from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.geometry import evaluate_geometry
 from dreamdrive.evaluate.geometry_truth import GeometryTruth, of_drive, read_geometry_truth
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.files import attach
 from dreamdrive.scene.clip import Clip
 from dreamdrive.world import Drive
@@ -91,12 +91,12 @@ class BackendRun(Measurement):
         return {"clip": self.clip, "way": self.way, "settings": made}
 
     def measure(self, runs: Path) -> Row:
-        """The figures of docs/geometry_evaluation.md, and seconds of the processor, of all threads."""
+        """The figures of docs/reference/evaluate_geometry.md, and processor seconds of all threads."""
         given = self._recorded() if self.clip in RECORDINGS else self._drawn(runs)
         clip = given.clip
         began = time.process_time()
         attached = clip if given.files is None else attach(clip, given.files)
-        geometry = reconstruct(attached, camera_height_m=given.camera_height_m)
+        geometry = reconstruct(attached, GeometryOptions(camera_height_m=given.camera_height_m))
         seconds = time.process_time() - began
         estimate = Estimate.of(geometry, clip.times_s, index=clip.source_index, source=given.source)
         figures = evaluate_geometry(estimate, truth_of(given.truth, estimate))

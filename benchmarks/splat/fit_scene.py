@@ -7,13 +7,13 @@ import torch
 from torch import Tensor
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Trainer
 from dreamdrive.fit.views import View
+from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
-from dreamdrive.scene.exposure import ExposureNetwork
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import render

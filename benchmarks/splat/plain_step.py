@@ -11,7 +11,7 @@ from dreamdrive.fit.losses import WEIGHTS, LossName
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.trainer import FitOptions, Model
 from dreamdrive.fit.views import View
-from dreamdrive.scene.deformation import DeformationField, alive_at, faded
+from dreamdrive.motion import DeformationField
 from dreamdrive.scene.exposure import transform_colour
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import render
@@ -68,7 +68,7 @@ def posed(field: DeformationField, gaussians: Gaussians, t_s: float) -> Gaussian
         "quaternions": unit + offsets.quaternion,
         "log_scales": gaussians.log_scales + offsets.log_scale,
     }
-    return faded(Gaussians(**fields), t_s)
+    return Gaussians(**fields).faded_at(t_s)
 
 
 class PlainLeaves:
@@ -128,7 +128,7 @@ class PlainTrainer:
         options = self.options
         done = step / options.steps
         dynamic = self.dynamic.gaussians()
-        rows = alive_at(dynamic, view.time_s)
+        rows = dynamic.alive_at(view.time_s)
         moved = posed(self.field, dynamic.select(rows), view.time_s)
         gaussians = Gaussians.concatenate(self.static.gaussians(), moved)
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)

@@ -1,24 +1,18 @@
 """What the street benchmark fits: seeded worlds, seen and understood in several ways."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from jaxtyping import UInt8
 
 from common.drawn import drawn_clip
-from dreamdrive.fit import StaticFit, fit_static, initialise
-from dreamdrive.geometry import reconstruct
-from dreamdrive.options import Quality
+from common.worlds import EDITION
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.run.stages import Stages, digest, stage_seed
+from dreamdrive.run import digest
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.geometry import Geometry
 from dreamdrive.world import Drive, make_street
 from dreamdrive.world.corruption import corrupt, parse_corruption
 
@@ -43,20 +37,10 @@ class Case:
         return f"{self.seed}-{self.geometry}-{self.references}"
 
 
-@dataclass(frozen=True)
-class Start:
-    """What all representations of a case begin with."""
-
-    clip: Clip
-    geometry: Geometry
-    seeds: Gaussians
-    static: StaticFit
-
-
 @lru_cache(maxsize=2)
 def world_of(seed: int) -> Drive:
     """The drive of a seed."""
-    return make_street(seed, FRAMES, RATE_HZ, SIZE)
+    return make_street(seed, FRAMES, RATE_HZ, SIZE, edition=EDITION)
 
 
 @cache
@@ -97,41 +81,3 @@ def clip_of(case: Case) -> Clip:
     known = Known(poses, intrinsics=case.geometry != "unknown_focal")
     clip = drawn_clip(made, frames, known, HOLD_OUT)
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
-
-
-def start(case: Case, quality: Quality, folder: Path) -> Start:
-    """Geometry, seeds and static fit of a case, kept in the folder."""
-    return prepare(lambda: clip_of(case), [case_digest(case)], quality, folder / case.name)
-
-
-def prepare(
-    make: Callable[[], Clip],
-    about: list[object],
-    quality: Quality,
-    folder: Path,
-    camera_height_m: float | None = None,
-) -> Start:
-    """What every fit of a clip begins with, kept in the folder; ``about`` tells the clip from others."""
-    stages = Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
-    clip = stages.run("prior", (), about, lambda _: make())
-    seed = stage_seed(0, "geometry")
-    geometry = stages.run(
-        "geometry",
-        ("prior",),
-        seed if camera_height_m is None else [seed, camera_height_m],
-        lambda _: reconstruct(clip, camera_height_m=camera_height_m, seed=seed),
-    )
-    seeds = stages.run(
-        "initialise",
-        ("prior", "geometry"),
-        quality.seeds,
-        lambda _: initialise(clip, geometry, quality.seeds),
-    )
-    number = stage_seed(0, "static")
-    static = stages.run(
-        "static",
-        ("initialise",),
-        [quality.static, number],
-        lambda tell: fit_static(clip, geometry, seeds, quality.static, number, tell),
-    )
-    return Start(clip, geometry, seeds, static)

@@ -1,32 +1,48 @@
-"""One fit of the street benchmark: a representation on a case, what it costs, and its scene on disk."""
+"""One fit of the street benchmark: what it shares with others, what it costs, and its scene on disk."""
 
 import shutil
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-import torch
+from typing import Any, TypeVar
 
 from common.keep import is_current, load, save
 from common.workers import threads
-from dreamdrive import __version__
-from dreamdrive.decompose import cast, error_maps, group, score
-from dreamdrive.decompose.group import Grouping
-from dreamdrive.fit import Parts, Representation, fit
-from dreamdrive.options import Quality
-from dreamdrive.run.stages import stage_seed
+from dreamdrive.options import Options
+from dreamdrive.pipeline import build_scene
+from dreamdrive.progress import Work
+from dreamdrive.run import Stages, digest, program_digest
+from dreamdrive.run.stages import trusted
+from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.folder import load_scene, save_scene
 from dreamdrive.scene.scene import Scene
-from street.case import Start
 
 PROBE_STEPS = 30
-Vote = Callable[[Start, torch.Tensor, Quality], Grouping]
-"""From the scores of the seeds to what of them is dynamic, and in which thing."""
-Errors = Callable[[Start, Quality], np.ndarray]
-"""From a static fit to the error maps (F, H, W) that the scores are trained on."""
+SHARED = ("prior", "geometry", "initialise", "static")
+"""Stages that all fits of a case begin with."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the fits of a case begin with.
+
+    Attributes:
+        folder: Where results of ``SHARED`` are kept.
+        about: What the clip follows from.
+        read: Makes the clip.
+    """
+
+    folder: Path
+    about: object
+    read: Callable[[], Clip]
+
+    def stages(self, options: Options) -> Stages:
+        """Keeps what is shared by all fits of these options, a folder for each choice of them."""
+        shared = digest([options.geometry, options.seeds, options.static, options.device, options.seed])
+        folder = self.folder / shared[:8]
+        return Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
 
 
 @dataclass(frozen=True)
@@ -65,61 +81,68 @@ class Fitted:
     cost: Cost
 
 
-def own_vote(begin: Start, scores: torch.Tensor, quality: Quality) -> Grouping:
-    """Hybrid's grouping."""
-    return group(begin.clip, begin.geometry, begin.seeds, scores, quality.group)
+Around = Callable[[Mapping[str, Any], Options, Callable[[], Any]], Any]
+"""Makes a stage's result from all results before it, by the names of their stages, the options, and what the
+stage itself would make."""
 
 
-def own_errors(begin: Start, quality: Quality) -> np.ndarray:
-    """Hybrid's errors: of colour, absolute."""
-    fitted = begin.static
-    return error_maps(begin.clip, begin.geometry, fitted.gaussians, fitted.sky, fitted.exposure)
+@dataclass
+class Watched:
+    """A ``Run`` of one fit: keeps what is shared, times the rest, and puts other stages in place of some.
+
+    Attributes:
+        kept: Of the shared stages.
+        options: Of the fit.
+        around: By the name of a stage.
+        results: Of all stages so far; of the joint fit none.
+        began_s: When the last shared stage ended, in seconds of the processor.
+        steps_s: When each step of the joint fit ended.
+    """
+
+    kept: Stages
+    options: Options
+    around: Mapping[str, Around]
+    results: dict[str, Any] = field(default_factory=dict)
+    began_s: float = 0.0
+    steps_s: list[float] = field(default_factory=list)
+
+    def __call__(
+        self,
+        name: str,
+        options: object,
+        compute: Callable[[Work], T],
+        *,
+        check: Callable[[T], None] = trusted,
+        given: T | None = None,
+    ) -> T:
+        """See ``Run``."""
+
+        def usual() -> T:
+            if name in SHARED:
+                return self.kept(name, options, compute, check=check, given=given)
+            return compute(Work(self._step if name == "fit" else lambda *_: None))
+
+        value = self.around[name](self.results, self.options, usual) if name in self.around else usual()
+        if name in SHARED:
+            self.began_s = time.process_time()
+        self.results[name] = value
+        return value
+
+    def _step(self, done: int, total: int) -> None:
+        self.steps_s.append(time.process_time())
 
 
-def fit_case(
-    begin: Start,
-    representation: Representation,
-    quality: Quality,
-    vote: Vote = own_vote,
-    errors: Errors = own_errors,
-) -> Fitted:
-    """Decompose, if the representation does, and fit."""
-    at = time.process_time()
-    parts = _parts(begin, representation, quality, vote, errors)
-    steps_at: list[float] = []
-    scene = fit(
-        begin.clip,
-        begin.geometry,
-        parts,
-        begin.static,
-        quality.fit,
-        quality.motion(representation),
-        quality.densify,
-        stage_seed(0, "fit"),
-        lambda *_: steps_at.append(time.process_time()),
-    )
-    end = time.process_time()
-    step_s = (steps_at[-1] - steps_at[0]) / max(len(steps_at) - 1, 1)
-    return Fitted(scene, Cost(quality.fit.steps, end - at, step_s, threads()))
+def fit_case(begin: Start, options: Options, around: Mapping[str, Around] | None = None) -> Fitted:
+    """Read, build and time."""
+    run = Watched(begin.stages(options), options, around or {})
+    clip = run("prior", begin.about, lambda _: begin.read())
+    scene = build_scene(clip, options, run=run)
+    seconds, steps_s = time.process_time() - run.began_s, run.steps_s
+    step_s = (steps_s[-1] - steps_s[0]) / max(len(steps_s) - 1, 1)
+    return Fitted(scene, Cost(options.fit.steps, seconds, step_s, threads()))
 
 
-def _parts(
-    begin: Start, representation: Representation, quality: Quality, vote: Vote, errors: Errors
-) -> Parts:
-    fitted, nothing = begin.static.gaussians, torch.zeros(0, dtype=torch.int64)
-    if representation == "static":
-        return Parts(fitted, fitted.select(nothing), None, ())
-    if representation != "hybrid":
-        return Parts(begin.seeds.select(nothing), fitted, None, ())
-    clip, geometry, seeds = begin.clip, begin.geometry, begin.seeds
-    maps = errors(begin, quality)
-    scores = score(clip, geometry, seeds, maps, quality.score, stage_seed(0, "score"), lambda *_: None)
-    grouping = vote(begin, scores, quality)
-    moving = cast(clip, geometry, seeds, grouping, quality.cast)
-    return Parts(fitted.select(grouping.static), moving.gaussians, moving.tracks, moving.actors)
-
-
-def equal_time(begin: Start, representation: Representation, quality: Quality) -> dict[str, Any]:
+def equal_time(begin: Start, options: Options) -> dict[str, Any]:
     """Steps of a representation in the time of hybrid, both timed now, one after the other.
 
     A fit of ``PROBE_STEPS`` steps passes through all phases of a long one; what is done once, such as the
@@ -128,18 +151,17 @@ def equal_time(begin: Start, representation: Representation, quality: Quality) -
     Returns:
         ``steps``, and ``hybrid_s``, the seconds of hybrid's whole fit that they follow from.
     """
-    short = with_steps(quality, PROBE_STEPS)
-    fit_case(begin, "static", with_steps(quality, 2))  # what a process does once is in neither
-    hybrid_s = fit_case(begin, "hybrid", short).cost.of_steps(quality.fit.steps)
-    return {"steps": fit_case(begin, representation, short).cost.steps_in(hybrid_s), "hybrid_s": hybrid_s}
+    short = with_steps(options, PROBE_STEPS)
+    # What a process does once is in neither.
+    fit_case(begin, replace(with_steps(options, 2), representation="static"))
+    hybrid = fit_case(begin, replace(short, representation="hybrid"))
+    hybrid_s = hybrid.cost.of_steps(options.fit.steps)
+    return {"steps": fit_case(begin, short).cost.steps_in(hybrid_s), "hybrid_s": hybrid_s}
 
 
-def options_of(quality: Quality, representation: Representation) -> dict[str, Any]:
-    """All options that a fit of a representation depends on, for a digest."""
-    names = ["static", "fit", "seeds", "densify"]
-    names += ["score", "group", "cast"] if representation == "hybrid" else []
-    used = {name: asdict(getattr(quality, name)) for name in names}
-    return {**used, "motion": asdict(quality.motion(representation)), "version": __version__}
+def key_of(about: object, options: Options) -> str:
+    """Of everything that a fit follows from: its clip, its options, and the program."""
+    return digest([about, options, options.motion, program_digest()])
 
 
 def kept_fit(folder: Path, key: str, make: Callable[[], Fitted]) -> Fitted:
@@ -187,7 +209,7 @@ class FitTask:
             shutil.rmtree(self.scene)
 
 
-def with_steps(quality: Quality, steps: int, static_steps: int | None = None) -> Quality:
+def with_steps(options: Options, steps: int, static_steps: int | None = None) -> Options:
     """The same with other numbers of steps."""
-    static = quality.static if static_steps is None else replace(quality.static, steps=static_steps)
-    return replace(quality, fit=replace(quality.fit, steps=steps), static=static)
+    static = options.static if static_steps is None else replace(options.static, steps=static_steps)
+    return replace(options, fit=replace(options.fit, steps=steps), static=static)

@@ -8,20 +8,16 @@ from typing import Any
 
 from common.keep import kept, save
 from dreamdrive.evaluate.extractors import Toolbox
-from dreamdrive.fit import Representation
-from dreamdrive.options import QUALITIES
-from dreamdrive.run.stages import digest
-from street.case import Case, Poses, References, case_digest, start
+from dreamdrive.run import digest
+from street.case import Case, Poses, References, case_digest, clip_of
 from street.consistency import consistency_of
-from street.fit import PROBE_STEPS, FitTask, Fitted, equal_time, fit_case, kept_fit, options_of, with_steps
+from street.fit import PROBE_STEPS, FitTask, Fitted, Start, equal_time, fit_case, kept_fit, key_of, with_steps
 from street.measure import keep_picture, measure, networks_key, told_apart, truth_features
+from street.methods import OURS, QUALITY, options_of
 from street.recording import Recorded, recording
 from street.views import views_digest
 
-SEEDS = tuple(range(8))
-REPRESENTATIONS: tuple[Representation, ...] = ("hybrid", "static", "vibration", "deformable", "hexplane")
 BUDGETS = ("equal_steps", "equal_time", "five_times")
-QUALITY = QUALITIES["draft"]
 TIMES = 5
 
 PLAN: tuple[tuple[str, Poses, References], ...] = (
@@ -42,14 +38,14 @@ class Job(FitTask):
     """One fit, and the folder of all of them."""
 
     case: Case
-    representation: Representation
+    method: str
     budget: str
     runs: Path
 
     @property
     def name(self) -> str:
         """For files and messages."""
-        return f"{self.case.name}-{self.representation}-{self.budget}"
+        return f"{self.case.name}-{self.method}-{self.budget}"
 
     @property
     def block(self) -> str:
@@ -79,11 +75,8 @@ class Job(FitTask):
     @property
     def fit_key(self) -> str:
         """Of everything the scene follows from: world, corruption, options, and the rule for its steps."""
-        rule: list[object] = [steps_of(self.budget)]
-        if self.budget == "equal_time":
-            rule = [self.budget, PROBE_STEPS, options_of(QUALITY, "hybrid")]
-        options = options_of(QUALITY, self.representation)
-        return digest([case_digest(self.case), self.representation, rule, options])
+        rule = [PROBE_STEPS] if self.budget == "equal_time" else [steps_of(self.budget)]
+        return key_of([case_digest(self.case), self.budget, rule], options_of(self.method))
 
     def key(self, toolbox: Toolbox) -> str:
         """Of everything its figures follow from."""
@@ -98,16 +91,16 @@ def jobs(options: argparse.Namespace) -> Iterator[Job]:
         if not chosen or geometry not in options.geometry:
             continue
         for seed in options.seeds:
-            for representation in options.representations:
-                if budget == "equal_steps" or representation != "hybrid":
-                    yield Job(Case(seed, geometry, references), representation, budget, options.runs)
+            for method in options.methods:
+                if budget == "equal_steps" or method != OURS:
+                    yield Job(Case(seed, geometry, references), method, budget, options.runs)
 
 
 def recorded(options: argparse.Namespace) -> list[Recorded]:
     """The fits of a recording, where it is there and wanted."""
     if options.no_recording or recording() is None:
         return []
-    return [Recorded(representation, options.runs) for representation in options.representations]
+    return [Recorded(method, options.runs) for method in options.methods]
 
 
 def in_order(street: list[Job], clips: list[Recorded]) -> list[Job | Recorded]:
@@ -122,22 +115,23 @@ def steps_of(budget: str) -> int:
     return base if budget == "equal_steps" else TIMES * (QUALITY.static.steps + base) - QUALITY.static.steps
 
 
+def start(case: Case, runs: Path) -> Start:
+    """What all fits of a case begin with."""
+    return Start(runs / "cases" / case.name, case_digest(case), lambda: clip_of(case))
+
+
 def fitted(job: Job) -> tuple[Fitted, dict[str, Any]]:
     """The scene, from the disk if it is there, and how its number of steps was found."""
-    case, representation = job.case, job.representation
-
-    def begin():
-        return start(case, QUALITY, job.runs / "cases")
-
+    begin, options = start(job.case, job.runs), options_of(job.method)
     plan: dict[str, Any] = {"steps": 0 if job.budget == "equal_time" else steps_of(job.budget)}
     if job.budget == "equal_time":
-        plan = kept(job.plan, job.fit_key, lambda: equal_time(begin(), representation, QUALITY))
-    quality = with_steps(QUALITY, plan["steps"])
-    return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin(), representation, quality)), plan
+        plan = kept(job.plan, job.fit_key, lambda: equal_time(begin, options))
+    options = with_steps(options, plan["steps"])
+    return kept_fit(job.scene, job.fit_key, lambda: fit_case(begin, options)), plan
 
 
-def run(job: Job, toolbox: Toolbox) -> None:
-    """Fit, unless the scene is there, measure and keep."""
+def run(job: Job, toolbox: Toolbox, *, consistency: bool = True) -> None:
+    """Fit, unless the scene is there, measure and keep; consistency takes as long as all else."""
     case = job.case
     found, plan = fitted(job)
     scene = found.scene
@@ -148,7 +142,7 @@ def run(job: Job, toolbox: Toolbox) -> None:
         "seed": case.seed,
         "geometry": case.geometry,
         "references": case.references,
-        "representation": job.representation,
+        "representation": job.method,
         "budget": job.budget,
         "static_steps": QUALITY.static.steps,
         **plan,
@@ -157,7 +151,7 @@ def run(job: Job, toolbox: Toolbox) -> None:
         "views": views,
         **told_apart(scene, case.seed),
     }
-    if job.representation == "hybrid" and case.references == "corrupted":
+    if consistency and job.method == OURS and case.references == "corrupted":
         record["consistency"] = consistency_of(scene, case, job.runs)
     keep_picture(job.runs / "shown" / f"{job.name}.png", middle)
     save(job.result, job.key(toolbox), record, features)

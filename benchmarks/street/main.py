@@ -14,13 +14,15 @@ from common.options import parser_of
 from common.places import DATA
 from common.report import publish
 from common.workers import work_off
+from common.worlds import SETS, set_of
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.evaluate.extractors import Toolbox, WeightFiles, open_toolbox
 from street.case import FRAMES, Poses, References, references_digest, world_digest
 from street.claims import claims
 from street.consistency import consistency_tables
-from street.jobs import BUDGETS, QUALITY, REPRESENTATIONS, SEEDS, Job, in_order, jobs, recorded, run
+from street.jobs import BUDGETS, Job, in_order, jobs, recorded, run
 from street.measure import truth_features
+from street.methods import METHODS, REPRESENTATIONS
 from street.picture import picture
 from street.recording import CLIP, Recorded, recording, run_recorded
 from street.renderer import frames_a_second
@@ -34,14 +36,14 @@ toolbox_of = lru_cache(maxsize=1)(open_toolbox)
 def make(job: Job | Recorded, weights: WeightFiles) -> None:
     """One fit, in a worker."""
     if isinstance(job, Recorded):
-        run_recorded(job, QUALITY)
+        run_recorded(job)
     else:
         run(job, toolbox_of(weights))
 
 
 def is_done(job: Job | Recorded, toolbox: Toolbox) -> bool:
     """Whether its figures are there, of these worlds, views, options and networks."""
-    key = job.key(QUALITY) if isinstance(job, Recorded) else job.key(toolbox)
+    key = job.key if isinstance(job, Recorded) else job.key(toolbox)
     return is_current(job.result, key)
 
 
@@ -69,7 +71,7 @@ def report_of(
     there = [job for job in wanted if is_done(job, toolbox)]
     clips = [job for job in clips if is_done(job, toolbox)]
     records = [record for job in there if (record := load(job.result)) is not None]
-    features = {(job.case, job.representation, job.budget): load_features(job.result) for job in there}
+    features = {(job.case, job.method, job.budget): load_features(job.result) for job in there}
     truth = {seed: truth_features(seed, runs, toolbox) for seed in seeds}
     renderer = kept(runs / "renderer.json", world_digest(seeds[0]), lambda: frames_a_second(seeds[0]))
     report = {
@@ -90,9 +92,10 @@ def options_of(doc: str | None = None, arguments: list[str] | None = None) -> ar
     """The command line."""
     parser = parser_of(doc, runs="runs/street", resume=True, markdown=True)
     parser.add_argument("--quick", action="store_true", help="two worlds, true poses, three representations")
-    parser.add_argument("--seeds", type=int, nargs="+", metavar="S")
+    parser.add_argument("--worlds", choices=SETS, default="development", help="which set of worlds")
+    parser.add_argument("--seeds", type=int, nargs="+", metavar="S", help="some worlds alone, of one set")
     parser.add_argument("--geometry", nargs="+", choices=get_args(Poses))
-    parser.add_argument("--representations", nargs="+", choices=REPRESENTATIONS)
+    parser.add_argument("--methods", nargs="+", choices=METHODS)
     parser.add_argument("--budgets", nargs="+", choices=BUDGETS)
     parser.add_argument("--references", nargs="+", choices=get_args(References))
     parser.add_argument("--no-recording", action="store_true", help="leave the recorded clip out")
@@ -103,13 +106,16 @@ def options_of(doc: str | None = None, arguments: list[str] | None = None) -> ar
     parser.add_argument("--inception", type=Path, metavar="FILE", help="weights of FID")
     parser.add_argument("--i3d", type=Path, metavar="FILE", help="weights of FVD")
     options = parser.parse_args(arguments)
-    options.seeds = options.seeds or (list(SEEDS[:2]) if options.quick else list(SEEDS))
+    worlds = list(SETS[options.worlds])
+    options.seeds = options.seeds or (worlds[:2] if options.quick else worlds)
+    try:
+        set_of(options.seeds)
+    except ValueError as error:
+        parser.error(f"--seeds: {error}")
     options.geometry = options.geometry or (["true"] if options.quick else list(get_args(Poses)))
     options.no_recording = options.no_recording or options.quick
     options.references = options.references or list(get_args(References))
-    options.representations = options.representations or list(
-        REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS
-    )
+    options.methods = options.methods or list(REPRESENTATIONS[:3] if options.quick else REPRESENTATIONS)
     options.budgets = options.budgets or (["equal_steps"] if options.quick else list(BUDGETS))
     return options
 

@@ -1,6 +1,6 @@
 """The same five fits on a recorded clip: withheld frames, and labelled boxes as the truth of what moves."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +9,18 @@ import numpy as np
 from common.keep import save
 from common.pandaset_truth import Movers, moving_masks
 from common.places import DATA
-from dreamdrive.fit import Representation
-from dreamdrive.options import Quality
+from dreamdrive.options import Options
 from dreamdrive.prior import choose_prior
+from dreamdrive.run import codec
 from dreamdrive.run.held_out import score_scene
-from dreamdrive.run.stages import digest
+from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat.scene_view import render_scene
-from street.case import HOLD_OUT, Start, prepare
-from street.fit import FitTask, fit_case, kept_fit, options_of
+from street.case import HOLD_OUT
+from street.fit import FitTask, Start, fit_case, kept_fit, key_of
+from street.methods import options_of
 
 CLIP, CAMERA = "pandaset_002", "front_camera"
 SIZE, FRAMES, RATE_HZ, CAMERA_HEIGHT_M = (320, 180), "20:68:2", 10.0, 2.2
@@ -29,13 +31,13 @@ ABOUT: list[object] = [CLIP, CAMERA, FRAMES, RATE_HZ, SIZE, HOLD_OUT]
 class Recorded(FitTask):
     """One fit of the recording, and the folder of all fits."""
 
-    representation: Representation
+    method: str
     runs: Path
 
     @property
     def name(self) -> str:
         """For files and messages."""
-        return f"{CLIP}-{self.representation}"
+        return f"{CLIP}-{self.method}"
 
     @property
     def block(self) -> str:
@@ -52,9 +54,16 @@ class Recorded(FitTask):
         """Where its figures are kept."""
         return self.runs / "recorded" / f"{self.name}.json"
 
-    def key(self, quality: Quality) -> str:
+    @property
+    def options(self) -> Options:
+        """Of the fit; the height of the camera gives the scale."""
+        options = options_of(self.method)
+        return replace(options, geometry=replace(options.geometry, camera_height_m=CAMERA_HEIGHT_M))
+
+    @property
+    def key(self) -> str:
         """Of everything its figures follow from."""
-        return digest([ABOUT, CAMERA_HEIGHT_M, self.representation, options_of(quality, self.representation)])
+        return key_of(ABOUT, self.options)
 
 
 def recording() -> Path | None:
@@ -63,36 +72,35 @@ def recording() -> Path | None:
     return folder if folder.exists() else None
 
 
-def run_recorded(job: Recorded, quality: Quality) -> None:
+def run_recorded(job: Recorded) -> None:
     """Fit, measure and keep."""
     folder = recording()
     if folder is None:
         raise FileNotFoundError(f"{DATA}/clips/{CLIP} is not there; set DREAMDRIVE_DATA")
     control = Control(folder / CAMERA, frames=FRAMES, fps=RATE_HZ, size=SIZE, hold_out=HOLD_OUT)
-    case = job.runs / "cases" / CLIP
-    begin = prepare(lambda: choose_prior("replay")(control), ABOUT, quality, case, CAMERA_HEIGHT_M)
-    key = job.key(quality)
-    fitted = kept_fit(job.scene, key, lambda: fit_case(begin, job.representation, quality))
-    scene = fitted.scene
-    truth = moving_masks(folder, begin.clip.source_index.tolist(), SIZE)
+    begin = Start(job.runs / "cases" / CLIP, ABOUT, lambda: choose_prior("replay")(control))
+    fitted = kept_fit(job.scene, job.key, lambda: fit_case(begin, job.options))
+    scene, kept = fitted.scene, begin.stages(job.options).folder
+    clip, geometry = codec.read(kept / "prior", Clip), codec.read(kept / "geometry", Geometry)
+    truth = moving_masks(folder, clip.source_index.tolist(), SIZE)
     record = {
-        "representation": job.representation,
+        "representation": job.method,
         "size": SIZE,
-        "frames": len(begin.clip),
-        "static_steps": quality.static.steps,
+        "frames": len(clip),
+        "static_steps": job.options.static.steps,
         **asdict(fitted.cost),
         "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
-        **measure_recorded(scene, begin, truth),
+        **measure_recorded(scene, clip, geometry, truth),
     }
-    save(job.result, key, record)
+    save(job.result, job.key, record)
 
 
-def measure_recorded(scene: Scene, begin: Start, truth: Movers) -> dict[str, Any]:
+def measure_recorded(scene: Scene, clip: Clip, geometry: Geometry, truth: Movers) -> dict[str, Any]:
     """Likeness of withheld frames, overall and inside the hulls of moving boxes, and IoU over all frames.
 
     A pixel counts as moving as it does in the drawn worlds, see ``evaluate.decomposition``.
     """
-    found = list(score_scene(begin.clip, begin.geometry, scene).values())
+    found = list(score_scene(clip, geometry, scene).values())
     shares: list[np.ndarray] = []
     errors: dict[int, np.ndarray] = {}
     for k, (camera, t_s) in enumerate(zip(scene.cameras, scene.times_s.tolist(), strict=True)):
@@ -100,7 +108,7 @@ def measure_recorded(scene: Scene, begin: Start, truth: Movers) -> dict[str, Any
         shares.append(view.dynamic_share.numpy())
         if scene.held_out[k]:
             shown = np.rint(view.colour.numpy() * 255) / 255
-            errors[k] = shown - begin.clip.frames[k] / 255
+            errors[k] = shown - clip.frames[k] / 255
     return {
         "psnr": float(np.mean([likeness.psnr for likeness in found])),
         "ssim": float(np.mean([likeness.ssim for likeness in found])),

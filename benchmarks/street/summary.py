@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from common.keep import Features
+from common.worlds import common_worlds, set_of
 from street.case import NOVEL, VIEWS, Case
 from street.distances import Basis, Worlds, bases_of, compared, distance_rows
+from street.methods import OURS
 
-OURS = "hybrid"
 RESAMPLES = 2000
 LIMITS_S = {"equal_steps": 60.0, "five_times": 300.0}
 """Seconds that a fit was to take at most."""
@@ -19,7 +20,12 @@ AllFeatures = dict[tuple[Case, str, str], Features]
 
 
 def summary(records: list[dict[str, Any]], features: AllFeatures, truth: Worlds) -> dict[str, Any]:
-    """Everything the tables show, as plain values."""
+    """Everything the tables show, as plain values; each table is over the worlds that all its rows have.
+
+    Raises:
+        ValueError: The worlds are of several sets.
+    """
+    name_of_set = set_of(record["seed"] for record in records)
     bases = bases_of(truth)
     groups: dict[Key, list[dict[str, Any]]] = defaultdict(list)
     for record in records:
@@ -31,12 +37,16 @@ def summary(records: list[dict[str, Any]], features: AllFeatures, truth: Worlds)
             r for r in groups.get((geometry, references, "equal_steps"), []) if r["representation"] == OURS
         ]
         found = found if budget == "equal_steps" else ours + found
+        worlds = common_worlds(found, "representation")
+        found = [record for record in found if record["seed"] in worlds]
         distances = _distances((geometry, references, budget), found, features, truth, bases)
         tables.append(
             {
                 "geometry": geometry,
                 "references": references,
                 "budget": budget,
+                "set": name_of_set,
+                "worlds": worlds,
                 "threads": sorted({record["threads"] for record in found}),
                 "means": _means(found),
                 "against_best_other": _paired(found),
@@ -122,13 +132,13 @@ def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
     views but the withheld frames. A world without a frame that counts in a view is left out of it.
     """
     by, result = _seeds(found), {}
+    if OURS not in by or len(by) == 1:
+        return {}
     rng = np.random.default_rng(0)
     for view in (*VIEWS, "novel"):
         shown = NOVEL if view == "novel" else (view,)
-        common = set.intersection(*(set(w) for w in by.values())) if OURS in by and len(by) > 1 else set()
-        worlds = sorted(
-            seed for seed in common if all(by[OURS][seed]["views"][v]["psnr"] is not None for v in shown)
-        )
+        ours = {seed: record["views"] for seed, record in by[OURS].items()}
+        worlds = [seed for seed in ours if all(ours[seed][v]["psnr"] is not None for v in shown)]
         if not worlds:
             continue
         values = {

@@ -86,7 +86,9 @@ def _world_lines(rows: list[dict[str, Any]]) -> str:
     names = ["-".join(about) for about in WORLD_TABLES]
     lines = [["world", *(f"{references}, {poses} poses" for references, poses in WORLD_TABLES)]]
     lines += [[str(row["seed"]), *(number(row.get(name)) for name in names)] for row in rows]
-    means = [mean_of([row.get(name) for row in rows]) for name in names]
+    measured = [name for name in names if any(name in row for row in rows)]
+    whole = [row for row in rows if all(name in row for name in measured)]
+    means = [mean_of([row.get(name) for row in whole]) for name in names]
     lines.append(["mean", *(number(mean) for mean in means)])
     return "## IoU of hybrid's moving mask, world by world\n\n" + grid(lines)
 
@@ -109,7 +111,11 @@ def _seconds_lines(rows: list[dict[str, Any]]) -> str:
 
 
 def _table_lines(found: dict[str, Any]) -> list[str]:
-    parts = [f"## {found['geometry']} geometry, {found['references']} references, {found['budget']}\n"]
+    worlds = ", ".join(map(str, found["worlds"]))
+    parts = [
+        f"## {found['geometry']} geometry, {found['references']} references, {found['budget']}\n",
+        f"Means over these {found['set']} worlds: {worlds}.\n",
+    ]
     cores = " or ".join(str(count) for count in found["threads"])
     timed = ["s over hybrid's beside it"] if found["budget"] == "equal_time" else []
     head = ["representation", "worlds", "steps", f"s on {cores} threads", *timed, *VIEWS]

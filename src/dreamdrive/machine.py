@@ -1,4 +1,4 @@
-"""What this machine offers: cores, memory, and where networks run."""
+"""What this machine offers: cores and memory."""
 
 import os
 from typing import TYPE_CHECKING
@@ -12,13 +12,6 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def best_device() -> "torch.device":
-    """A GPU if torch has one, else the CPU."""
-    import torch
-
-    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
 
 def free_bytes(device: "torch.device | None" = None) -> int | None:

@@ -1,16 +1,15 @@
 """What ``--quality`` means: one row of numbers a name."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
-from dreamdrive.fit import DensifySettings, FitOptions, MotionConfig, Representation, SeedOptions
+from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.scene.deformation import DeformationConfig
-from dreamdrive.scene.hexplane import HexPlaneConfig
-from dreamdrive.scene.vibration import VibrationConfig
+from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig, RepresentationName
 
 QualityName = Literal["draft", "standard", "high"]
+MethodName = Literal["dreamdrive", "paper"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,9 @@ class Options:
         densify: Growing and pruning in the joint fit.
         network: Size of the deformation field; its width is that of every representation.
         representation: ``"hybrid"``, or one of its baselines.
+        device: Where networks and both fits are computed.
         geometry: How cameras and depth are found.
+        method: Whose equations the others are set to, see ``with_method``.
         seed: Seed of everything random.
     """
 
@@ -39,27 +40,51 @@ class Options:
     cast: ActorOptions = field(default_factory=ActorOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
-    representation: Representation = "hybrid"
+    representation: RepresentationName = "hybrid"
+    device: Literal["cpu", "cuda"] = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    method: MethodName = "dreamdrive"
     seed: int = 0
 
     @property
     def motion(self) -> MotionConfig:
         """What the joint fit learns motion by; all networks have the same width."""
-        if self.representation == "hexplane":
-            return HexPlaneConfig(width=self.network.width)
-        if self.representation == "vibration":
-            return VibrationConfig()
-        return self.network
+        motion = REPRESENTATIONS[self.representation].motion
+        if motion is None or motion.config_type is type(self.network):
+            return self.network
+        return motion.config_type.sized(self.network.width)
 
     @property
     def steps(self) -> dict[str, int]:
         """Optimisation steps of each stage: those on Gaussians are the same for all representations.
 
-        ``score`` trains the classifier of the decomposition, which hybrid alone has, and changes no Gaussian.
+        ``score`` trains the classifier of the decomposition and changes no Gaussian.
         """
         fits = {"static": self.static.steps, "fit": self.fit.steps}
-        return {**fits, "score": self.score.steps} if self.representation == "hybrid" else fits
+        scored = REPRESENTATIONS[self.representation].moves == "scored"
+        return {**fits, "score": self.score.steps} if scored else fits
+
+
+def with_method(options: Options, method: MethodName) -> Options:
+    """The options of ``--method``: ``"paper"`` takes eq. 5-14 as printed, ``"dreamdrive"`` is ours.
+
+    The paper's error map is the only target of the scores, unscaled, in all frames; every Gaussian is
+    clustered and votes; F_deform alone, of the size of Deformable-3DGS that the paper follows, moves things;
+    the loss is L1 + SSIM. Its tau has no number there: ours, in units of the unscaled error.
+    """
+    if method == "dreamdrive":
+        return options
+    s, g = options.score, options.group
+    return replace(
+        options,
+        method="paper",
+        score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None),
+        group=replace(g, clusters="density", threshold=g.threshold * s.error_scale, majority=0.5),
+        cast=replace(options.cast, tracks=False),
+        static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
+        fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0),
+        network=replace(options.network, depth=8, width=256),
+    )
 
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.

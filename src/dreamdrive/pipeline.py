@@ -8,8 +8,10 @@ from pathlib import Path
 import torch
 
 from dreamdrive.decompose import Cast, Grouping, cast, error_maps, group, score
+from dreamdrive.device import computing_on
 from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
+from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options, QualityName
 from dreamdrive.progress import StageProgress
 from dreamdrive.run import (
@@ -31,6 +33,7 @@ from dreamdrive.scene.control import Control
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
+from dreamdrive.splat import why_unusable
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ def generate(
         options=options,
     )
     check_place(out, control.path)
-    with only_run(out):
+    with computing_on(request.options.device, why_unusable), only_run(out):
         again = recompute_from is not None
         workspace = open_workspace(out, request.document, force=force, recompute=again)
         if workspace is None:
@@ -122,6 +125,7 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
         InputError: The clip cannot be used.
     """
     o, seed = options, {name: stage_seed(options.seed, name) for name in ("geometry", "static", "fit")}
+    device = torch.device(o.device)
     geometry = run(
         "geometry",
         [o.geometry, o.seed],
@@ -137,16 +141,18 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     )
     static = run(
         "static",
-        [o.static, o.seed],
-        lambda work: fit_static(clip, geometry, seeds, o.static, seed["static"], work),
+        [o.static, o.device, o.seed],
+        lambda work: fit_static(clip, geometry, seeds, o.static, seed["static"], work, device),
         check=partial(check.static, seeds),
         given=given.static,
     )
     parts = decompose(clip, geometry, seeds, static, o, given=given, run=run)
     return run(
         "fit",
-        [o.representation, o.fit, o.cast, o.motion, o.densify, given.tracks],
-        lambda work: fit(clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work),
+        [o.representation, o.fit, o.cast, o.motion, o.densify, o.device, given.tracks],
+        lambda work: fit(
+            clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work, device
+        ),
         check=partial(check.scene, clip),
     )
 
@@ -163,9 +169,10 @@ def decompose(
 ) -> Parts:
     """Tell static from moving (eq. 5-10); the baselines take everything as one or the other."""
     o, fitted, nothing = options, static.gaussians, torch.zeros(0, dtype=torch.int64)
-    if o.representation == "static":
+    moves = REPRESENTATIONS[o.representation].moves
+    if moves == "none":
         return Parts(fitted, fitted.select(nothing), None, ())
-    if o.representation != "hybrid":
+    if moves == "all":
         return Parts(seeds.select(nothing), fitted, None, ())
     labels = given.labels
     if labels is None:

@@ -14,7 +14,7 @@ from tests.scene.scenes import make_baseline, make_scene
 from dreamdrive.data import write_trajectory
 from dreamdrive.drive import MANOEUVRES
 from dreamdrive.scene.folder import save_scene
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -30,7 +30,7 @@ def driving(scene: Scene) -> Scene:
     poses = np.tile(np.eye(4), (3, 1, 1))
     poses[:, 2, 3] = np.arange(3) - 6
     cameras = tuple(c.at(pose) for c, pose in zip(scene.cameras, poses, strict=True))
-    return replace(scene, cameras=cameras, provenance={})
+    return replace(scene, cameras=cameras, provenance=Provenance())
 
 
 def frames(path: Path) -> tuple[int, float]:
@@ -118,9 +118,9 @@ def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_doctor_says_whether_a_gpu_can_be_used(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: "there is no nvcc: install it")
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: "there is no nvcc: install it")
     assert re.search(r"GPU\s+not needed; there is no nvcc: install it", run("doctor").out)
-    monkeypatch.setattr("dreamdrive.splat.cuda.why_unusable", lambda: None)
+    monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: None)
     result = run("doctor")
     assert result.code == 0
     assert re.search(r"GPU\s+backend gsplat can be used; not needed", result.out)

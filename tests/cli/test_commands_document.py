@@ -64,7 +64,7 @@ def _default(block: str) -> str:
 
 def _choices(block: str) -> tuple[str, ...]:
     found = re.search(r"\{(.*?)\}", block)
-    return () if found is None else tuple(found[1].split(","))
+    return () if found is None else tuple(one for one in found[1].split(",") if one != "None")
 
 
 def written() -> dict[str, dict[str, tuple[str, str]]]:

@@ -10,6 +10,7 @@ import pytest
 from tests.cli.conftest import Run
 
 from dreamdrive import pipeline
+from dreamdrive.run import production
 
 
 @pytest.fixture
@@ -54,6 +55,14 @@ def expect(run: Run, out: Path, *arguments: object, message: str) -> None:
 def test_representations_are_known_by_name(run: Run, tmp_path: Path, name: str) -> None:
     missing = tmp_path / "none.mp4"
     expect(run, tmp_path / "out", missing, "--representation", name, message=f"{missing} does not exist")
+
+
+def test_a_gpu_that_is_not_there_is_said_before_any_work(
+    run: Run, tmp_path: Path, clip: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "why_unusable", lambda: "gsplat is not installed: pip install it")
+    said = "error: --device cuda: gsplat is not installed: pip install it, or leave --device out for the CPU"
+    expect(run, tmp_path / "out", clip, "--device", "cuda", message=said)
 
 
 def test_a_representation_of_another_name_is_refused(run: Run, tmp_path: Path) -> None:
@@ -106,7 +115,7 @@ def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
 def test_a_clip_that_memory_cannot_hold_is_refused_before_it_is_read(
     run: Run, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "free_bytes", lambda: 600_000_000)
+    monkeypatch.setattr(production, "free_bytes", lambda: 600_000_000)
     expect(
         run,
         tmp_path / "out",

@@ -25,7 +25,7 @@ def test_the_majority_of_a_cluster_decides_for_all_of_it():
     scores = torch.where(truth, torch.where(doubt < 0.25, 0.3, 0.9), torch.tensor(0.05))
     grouping = group(clip, geometry, seeds, scores, GroupOptions())
     assert (grouping.dynamic == truth).float().mean() > 0.995
-    alone = group(clip, geometry, seeds, scores, GroupOptions(clustering=False))
+    alone = group(clip, geometry, seeds, scores, GroupOptions(clusters="none"))
     assert (alone.dynamic[truth]).float().mean() < 0.8
 
 
@@ -84,21 +84,6 @@ def test_nothing_dynamic_gives_an_empty_cast():
     assert len(whole.gaussians) == 0
     assert whole.actors == ()
     assert whole.tracks is None
-
-
-def test_what_is_always_behind_the_car_ahead_is_not_static_street():
-    street, clip, geometry, seeds = scene()
-    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
-    assert not (grouping.covered & grouping.dynamic).any()
-    # A wall of seeds that follows right behind the car, seen by no frame.
-    box = next(b for b in street.boxes if b.moving)
-    behind = torch.tensor(box.world_from_box[-1, :3, 3] + [0, 0, 30.0], dtype=torch.float32)
-    moved = seeds.select(torch.arange(1))
-    moved = replace(moved, means=behind[None], source_frame=torch.tensor([len(clip) - 1]))
-    both = type(seeds).concatenate(seeds, moved)
-    scores = torch.cat([seeds.features[:, 0], torch.zeros(1)])
-    assert group(clip, geometry, both, scores, GroupOptions()).covered[-1]
-    assert grouping.covered.float().mean() < 0.1
 
 
 def test_a_cluster_without_a_core_is_street():

@@ -50,7 +50,6 @@ def wall() -> Scene:
         cameras=cameras,
         times_s=np.arange(5) / 10,
         held_out=np.zeros(5, dtype=bool),
-        provenance={},
     )
 
 

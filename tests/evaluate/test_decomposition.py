@@ -15,7 +15,7 @@ from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposit
 from dreamdrive.evaluate.true_labels import true_labels
 from dreamdrive.evaluate.truth import Truth
 from dreamdrive.fit import SeedOptions, initialise
-from dreamdrive.scene.deformation import (
+from dreamdrive.motion import (
     DeformationConfig,
     DeformationField,
     Domain,

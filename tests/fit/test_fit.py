@@ -10,7 +10,7 @@ from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.decompose import GroupOptions, cast, group
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
-from dreamdrive.scene.deformation import DeformationConfig
+from dreamdrive.motion import DeformationConfig
 from dreamdrive.splat.scene_view import render_scene
 
 

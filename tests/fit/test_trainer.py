@@ -8,14 +8,14 @@ import torch
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.static import footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Trainer, optimise
 from dreamdrive.fit.views import View, training_views
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
-from dreamdrive.scene.exposure import ExposureNetwork
+from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.splat import one_torch_thread, set_threads, threads
 from splat.plain_step import PlainTrainer
 
@@ -33,7 +33,7 @@ def parts():
     life = torch.stack([torch.linspace(0, float(clip.times_s[-1]), count), torch.full((count,), 0.3)], 1)
     actor = torch.where(torch.arange(count) % 3 == 0, torch.arange(count) % 2, -1)
     seeds = replace(seeds, sh=colour, lifespan=life, actor=actor)
-    return training_views(clip, geometry), seeds, estimate_sky(clip, geometry)
+    return training_views(clip, geometry)[1], seeds, estimate_sky(clip, geometry)
 
 
 def model_of(parts) -> Model:

@@ -30,7 +30,7 @@ class Method:
             fixed_regions=fixed,
             region_names=("bonnet",) if fixed.any() else (),
             detected=("something",),
-            details={"metres_per_unit": self.factor},
+            metres_per_unit=self.factor,
         )
 
 

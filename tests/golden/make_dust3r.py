@@ -140,7 +140,7 @@ def _pictures(to: Path, rng: np.random.Generator) -> None:
             sizes[f"{width}x{height}|376|{'square_ok' if square_ok else 'default'}"] = list(how.size)
     write(to / "dust3r/preprocess_sizes.json", sizes)
     pairs = {}
-    for frames, graph in ((4, "complete"), (7, "swin-2"), (9, "logwin-2-noncyclic"), (5, "oneref-1")):
+    for frames, graph in ((4, "complete"), (7, "swin-2"), (9, "logwin-2-noncyclic"), (5, "swin-1-noncyclic")):
         found = make_pairs(frames, graph).tolist()
         pairs[f"{frames}|{graph}|sym"] = sorted(found) if "win" in graph else found
     write(to / "dust3r/pairs.json", pairs)

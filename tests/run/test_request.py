@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.options import QUALITIES
+from dreamdrive.options import QUALITIES, with_method
 from dreamdrive.run import request
 from dreamdrive.run.request import request_of
 from dreamdrive.scene.control import Control
@@ -56,3 +56,15 @@ def test_changed_options_have_no_name_and_what_is_chosen_beside_the_quality_does
     assert [one.options.seed for one in made] == [3, 3, 3]
     assert made[1].document["options"]["camera_height_m"] == 2.0
     assert made[2].document["options"]["fit"]["steps"] == 7
+
+
+def test_the_papers_method_keeps_the_name_of_the_quality() -> None:
+    paper = with_method(QUALITIES["draft"], "paper")
+    made = request_of(Control(), prior="street-world", options=paper)
+    chosen = made.document["options"]
+    assert (made.quality, chosen["method"], chosen["group"]["clusters"]) == ("draft", "paper", "density")
+    assert (chosen["score"]["target"], chosen["fit"]["loss"], chosen["cast"]["tracks"]) == (
+        "error",
+        "paper",
+        False,
+    )

@@ -5,16 +5,24 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from dreamdrive.motion import (
+    Bounds,
+    DeformationConfig,
+    DeformationField,
+    Domain,
+    HexPlaneConfig,
+    HexPlaneField,
+    Motion,
+    Tracks,
+    Vibration,
+    VibrationConfig,
+)
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import DeformationConfig, DeformationField, Domain, Tracks
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.hexplane import Bounds, HexPlaneConfig, HexPlaneField
-from dreamdrive.scene.motion import Motion
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.vibration import Vibration, VibrationConfig
 
 
 def gaussians(count: int, seed: int, **more: torch.Tensor) -> Gaussians:
@@ -54,7 +62,7 @@ def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
         cameras=tuple(Camera(50.0, 51.0, 16.5, 12.0, 33, 24) for _ in range(3)),
         times_s=np.array([0.0, 0.1, 0.2]) + 1 / 3,
         held_out=np.array([False, True, False]),
-        provenance={"seed": 1, "per_frame": {10: "a", 2: "b"}},
+        provenance=Provenance(input="a.mp4", up=(0.0, -1.0, 0.0)),
     )
 
 

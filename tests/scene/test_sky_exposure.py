@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.exposure import Exposure, ExposureNetwork, recorded_picture, transform_colour
+from dreamdrive.scene.exposure import Exposure, transform_colour
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import set_threads, threads
 from splat import plain_step as plain

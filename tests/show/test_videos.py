@@ -10,14 +10,14 @@ from tests.scene.scenes import make_scene
 from dreamdrive.data import Lens
 from dreamdrive.data.distortion import Distortion
 from dreamdrive.drive.manoeuvres import frame_rate, smooth, up_of
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show.videos import _surround, as_recorded, lens_of, write_held_out
 
 
 def distorted(scene: Scene) -> Scene:
     lens = Lens(Distortion("opencv", (-0.3, 0.05, 0.0, 0.0)), scene.cameras[0])
-    return replace(scene, provenance={"lens": lens.to_json(), "up": [0.0, -0.8, 0.6]})
+    return replace(scene, provenance=Provenance(lens=lens.to_json(), up=(0.0, -0.8, 0.6)))
 
 
 def test_withheld_frames_carry_their_source_index_and_size(tmp_path: Path) -> None:
@@ -43,8 +43,8 @@ def test_views_carry_the_distortion_of_the_source(tmp_path: Path) -> None:
 
 def test_what_a_scene_remembers_of_its_making() -> None:
     scene = make_scene()
-    assert lens_of(replace(scene, provenance={})) is None
-    assert up_of(replace(scene, provenance={})).tolist() == [0, -1, 0]
+    assert lens_of(replace(scene, provenance=Provenance())) is None
+    assert up_of(replace(scene, provenance=Provenance())).tolist() == [0, -1, 0]
     assert up_of(distorted(scene)).tolist() == [0, -0.8, 0.6]
 
 

@@ -16,7 +16,7 @@ from tests.splat.drawn import KINDS, Case, build, cases, random_rotation, select
 from tests.splat.scenes import IMAGES
 from torch import Tensor
 
-from dreamdrive.scene.deformation import multiply_quaternions
+from dreamdrive.motion import multiply_quaternions
 from dreamdrive.scene.render import Render
 from dreamdrive.splat import rasterize, set_threads, threads
 

@@ -15,15 +15,17 @@ _NEEDED_MB = 3000
 def doctor() -> None:
     """Show versions, instruction set, threads and memory, and say what is missing and how to get it."""
     from dreamdrive import __version__
-    from dreamdrive.run import PACKAGES, package_versions
+    from dreamdrive.run import package_versions
 
     table = Table(show_header=False, box=None)
     table.add_row("dreamdrive", __version__)
     table.add_row("python", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
     versions = package_versions()
-    for name in PACKAGES:
-        table.add_row(name, versions[name] or "missing")
-    missing = [f"{name} is missing: pip install {name}" for name in PACKAGES if versions[name] is None]
+    for name, version in versions.items():
+        table.add_row(name, version or "missing")
+    missing = [
+        f"{name} is missing: pip install {name}" for name, version in versions.items() if version is None
+    ]
     native, trouble = _native()
     table.add_row("native core", native)
     memory_mb = available_memory_mb()

@@ -55,8 +55,8 @@ def _of_scene(out: Path, geometry: "Geometry | None") -> "tuple[Estimate, tuple[
 
     scene = open_scene(out)
     about = scene.provenance
-    index = np.array(about.get("source_index") or range(len(scene.cameras)), dtype=np.int64)
-    source, lens = about.get("input"), about.get("lens") is not None
+    index = np.array(about.source_index or range(len(scene.cameras)), dtype=np.int64)
+    source, lens = about.input, about.lens is not None
     if geometry is None:
         missing = (
             f"{out / 'stages' / 'geometry'} is not there: depth, confidence and what fixed the scale cannot "

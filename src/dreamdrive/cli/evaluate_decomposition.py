@@ -51,7 +51,7 @@ def _truth(scene: "Scene", world: Path) -> "Truth":
 
     if not world.exists():
         raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")
-    index = [int(i) for i in scene.provenance.get("source_index") or range(len(scene.cameras))]
+    index = [int(i) for i in scene.provenance.source_index or range(len(scene.cameras))]
     if world.is_dir():
         made = read_world(world)
     else:

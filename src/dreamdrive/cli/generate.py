@@ -41,6 +41,7 @@ def generate(
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     geometry_weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     quality: Literal["draft", "standard", "high"] = "standard",
+    method: Literal["dreamdrive", "paper"] = "dreamdrive",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
@@ -61,6 +62,7 @@ def generate(
         Literal["static", "deformable", "hexplane", "vibration", "hybrid"] | None,
         arg(help_behavior_hint="(default: hybrid)"),
     ] = None,
+    device: Annotated[Literal["cpu", "cuda"] | None, arg(help_behavior_hint="(default: cpu)")] = None,
     seed: Annotated[int, arg(metavar="S")] = 0,
     recompute_from: Annotated[
         Literal["prior", "geometry", "initialise", "static", "score", "group", "fit"] | None,
@@ -72,24 +74,26 @@ def generate(
     """Make a 4D scene and its videos from a recording or a layout.
 
     Args:
-        input: A video, a folder of images or of several cameras (docs/surround.md), a layout as JSON, or a
-            photo for a video model; --prior street-world needs none.
+        input: A video, a folder of images or of several cameras (docs/guides/surround.md), a layout as JSON,
+            or a photo for a video model; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
-            others are video models, see docs/priors.md. Without it the input decides.
+            others are video models, see docs/guides/priors.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
             model that the hub's cache holds. Nothing is ever downloaded.
         geometry_weights: Weights of the geometry's network, where the prior has one too.
         quality: How many steps the fits take.
+        method: dreamdrive is ours; paper takes the equations of the DreamDrive paper as printed.
         frames: Frames of the input to use, counted from 0.
         fps: Rate of the input, before the step of --frames.
         size: Size of the frames; without it 480 wide.
         intrinsics: Calibration of the camera: JSON for the size of the input, COLMAP model, transforms.json.
         poses: Known camera poses: JSON, TUM, KITTI or PandaSet.
         geometry_files: Known cameras, poses and depth, a file or its folder: COLMAP model, nerfstudio's
-            transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see docs/geometry_files.md.
+            transforms.json, cameras.json (ours, PandaSet's), KITTI or TUM poses; see
+            docs/guides/geometry_files.md.
         refine_poses: Let given poses tell only how long the path is, and the frames how it runs: for poses of
             a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.
@@ -106,6 +110,7 @@ def generate(
         options: Options of any stage as TOML, in place of those of the quality: docs/options.md.
         representation: hybrid tells static from moving; the others are its baselines: static Gaussians, a
             deformation network for all of them, feature planes (S3Gaussian), periodic vibration (PVG).
+        device: Where networks and the fits are computed; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md).
         seed: Seed of everything random.
         recompute_from: Compute this stage and all later ones again.
         force: Replace a result of other input or options; files that are not dreamdrive's are kept.
@@ -113,7 +118,7 @@ def generate(
     """
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
-    from dreamdrive.options import QUALITIES
+    from dreamdrive.options import QUALITIES, with_method
     from dreamdrive.pipeline import generate as run
     from dreamdrive.run import lines_of, read_options
     from dreamdrive.scene.control import Control
@@ -135,10 +140,14 @@ def generate(
         hold_out=hold_out,
         seed=seed,
     )
-    chosen = QUALITIES[quality] if options is None else read_options(options, QUALITIES[quality])
+    chosen = with_method(QUALITIES[quality], method)
+    if options is not None:
+        chosen = read_options(options, chosen)
     how = {"method": geometry, "camera_height_m": camera_height, "refine_poses": refine_poses or None}
     how = replace(chosen.geometry, **{name: value for name, value in how.items() if value is not None})
-    chosen = replace(chosen, geometry=how, representation=representation or chosen.representation)
+    given = {"representation": representation, "device": device}
+    given = {name: value for name, value in given.items() if value is not None}
+    chosen = replace(chosen, geometry=how, **given)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(

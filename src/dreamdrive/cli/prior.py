@@ -60,6 +60,7 @@ def sample(
     action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    device: Literal["cpu", "cuda"] = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     force: bool = False,
 ) -> None:
@@ -79,12 +80,14 @@ def sample(
         action: What to do instead, as for generate, such as command=left.
         prompt: What to show, in words.
         steps: Steps of the sampler.
+        device: Where the network runs.
         seed: Seed of everything random.
         force: Replace a folder that is there already.
     """
     use_all_cores()
     from dreamdrive.cli.actions import parse_action
     from dreamdrive.data.recording import rate_hz
+    from dreamdrive.device import computing_on
     from dreamdrive.run import sample as run
     from dreamdrive.scene.control import Control
 
@@ -102,7 +105,7 @@ def sample(
         seed=seed,
     )
     console = Console(highlight=False)
-    with Bars(console) as bars:
+    with computing_on(device), Bars(console) as bars:
         clip = run(
             control,
             out,
@@ -142,6 +145,7 @@ def features(
     sigma: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.3)")] = None,
     channels: Annotated[int | None, arg(metavar="C", help_behavior_hint="(default: 16)")] = None,
     action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    device: Literal["cpu", "cuda"] = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
 ) -> None:
     """Take the features of a recorded clip from the network of Vista or Stable Video Diffusion.
@@ -156,16 +160,18 @@ def features(
         sigma: Noise on the latents, whose own deviation is about 1.
         channels: Principal components to keep.
         action: What the car does, for Vista, as for generate.
+        device: Where the network runs.
         seed: Seed of the noise.
     """
     use_all_cores()
     _check_packages()
     from dreamdrive.cli.actions import parse_action
+    from dreamdrive.device import computing_on
     from dreamdrive.run import clip_features
 
     options = {"block": block, "sigma": sigma, "channels": channels}
     console = Console(highlight=False)
-    with Bars(console) as bars:
+    with computing_on(device), Bars(console) as bars:
         made = clip_features(
             clip,
             out,

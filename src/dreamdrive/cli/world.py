@@ -21,6 +21,7 @@ def make(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     seed: Annotated[int, arg(metavar="S")] = 0,
+    edition: Annotated[int, arg(metavar="N")] = 1,
     layout: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     frames: Annotated[int, arg(metavar="N")] = 24,
     fps: Annotated[float, arg(metavar="F")] = 10.0,
@@ -35,13 +36,14 @@ def make(
     Args:
         out: Folder to write.
         seed: Decides the street.
+        edition: Which edition of streets; each draws the same for ever. A layout names its own.
         layout: Draw this street instead, see docs/layout.md.
         frames: Number of frames.
         fps: Frames a second.
         size: Size of the frames.
         cameras: front is one camera; surround six, each in a folder of its own.
         corrupt: Draw the frames as a video model might have, such as generated or warp=0.5,flicker=1, see
-            docs/consistency.md; the truth stays that of the clean street.
+            docs/reference/corruptions.md; the truth stays that of the clean street.
         one_ray: One ray a pixel, twice as fast, with rough edges.
         force: Replace a world that is there already.
     """
@@ -71,7 +73,8 @@ def make(
     check_free(out, force, MARK)
     count = frames * (len(MOUNTS) if cameras == "surround" else 1)
     _check_memory(count, wanted, free_bytes())
-    street = draw_street(seed, StreetOptions(seconds=frames / fps)) if layout is None else read_layout(layout)
+    drawn = StreetOptions(frames / fps, edition=edition)
+    street = draw_street(seed, drawn) if layout is None else read_layout(layout)
     wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
     console = Console()

@@ -33,7 +33,7 @@ _INTRINSICS = "intrinsics.json"
 
 def rate_hz(clip: Clip) -> float:
     """Frames a second, the median where they are not even."""
-    return float(1 / np.median(np.diff(np.unique(clip.times_s))))
+    return 1 / clip.interval_s
 
 
 def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace: bool = False) -> None:

@@ -17,9 +17,9 @@ from jaxtyping import Float, Int
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
+from dreamdrive.motion import Tracks
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import Tracks
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 
@@ -32,6 +32,7 @@ class ActorOptions:
     (``benchmarks/ablation.py``). Without any tracks withheld frames lose 0.71 dB, novel views 0.23 dB.
 
     Attributes:
+        tracks: False leaves every copy in its place, alive for ever, for F_deform alone to move (eq. 11).
         lifespan_frames: Standard deviation of a copy's life span, in intervals between training frames. Three
             times as long, novel views lose 0.03 dB and standing things seem to move 43 mm farther.
         untracked_frames: The same for what has no track: a copy that stays where it was seen is wrong soon.
@@ -45,6 +46,7 @@ class ActorOptions:
             Gaussians behind it to take on its colours.
     """
 
+    tracks: bool = True
     lifespan_frames: float = 1.25
     untracked_frames: float = 0.5
     lasting: bool = True
@@ -102,6 +104,8 @@ def cast(
         return Cast(
             replace(chosen, lifespan=torch.zeros(0, 2), actor=torch.zeros(0, dtype=torch.int64)), None, ()
         )
+    if not options.tracks:
+        return Cast(chosen, None, ())
     pixels = source_pixels(geometry, gaussians, index)
     cluster = grouping.cluster.numpy()[index]
     frames = chosen.source_frame.numpy()

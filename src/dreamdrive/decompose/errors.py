@@ -48,4 +48,4 @@ def static_picture(
 
 def smoothed(errors: Float[np.ndarray, "f h w"], sigma_px: float) -> Float[np.ndarray, "f h w"]:
     """Error maps blurred over ``sigma_px``: an object fails as an area, a mis-registered edge as a line."""
-    return np.stack([cv2.GaussianBlur(error, (0, 0), sigma_px) for error in errors])
+    return np.stack([cv2.GaussianBlur(error, (0, 0), sigma_px) for error in errors]) if sigma_px else errors

@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from dreamdrive.decompose.errors import smoothed
+from dreamdrive.motion import encode
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import encode
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.splat import one_torch_thread, render

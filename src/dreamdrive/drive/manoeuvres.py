@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -149,8 +148,7 @@ def smooth(path: Trajectory) -> Trajectory:
 
 def up_of(scene: Scene) -> Float[np.ndarray, "3"]:
     """Unit vector away from the road; that of a level camera where no road was found."""
-    up: Any = scene.provenance.get("up")
-    return np.array([0.0, -1.0, 0.0] if up is None else up, dtype=np.float64)
+    return np.array(scene.provenance.up or (0.0, -1.0, 0.0))
 
 
 def _share(values: np.ndarray) -> np.ndarray:

@@ -38,7 +38,7 @@ class GapFigures:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Figures of one video; see docs/consistency.md for what they tell.
+    """Figures of one video; see docs/reference/evaluate_consistency.md for what they tell.
 
     Attributes:
         frames: Number of frames.

@@ -14,7 +14,6 @@ from dreamdrive.evaluate.retrieval import Retrieval, retrieval
 from dreamdrive.evaluate.true_labels import places, true_labels
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import alive_at
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.splat import render_scene
@@ -41,7 +40,7 @@ class FakeMotion:
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Figures of one scene; see docs/decomposition.md for what they tell.
+    """Figures of one scene; see docs/reference/evaluate_decomposition.md for what they tell.
 
     Attributes:
         frames: Number of frames.
@@ -124,7 +123,7 @@ def _look(scene: Scene, views: Sequence[Camera]) -> list[_Seen]:
     lives = _lives(scene)
     seen: list[_Seen] = []
     for frame, (camera, t_s) in enumerate(zip(views, times_s, strict=True)):
-        living = alive_at(scene.dynamic, t_s).numpy()
+        living = scene.dynamic.alive_at(t_s).numpy()
         moves = _moves(centres[:, living], lives[:, living], frame)
         channel = torch.cat([torch.zeros(len(scene.static)), torch.from_numpy(moves.astype(np.float32))])
         view = render_scene(scene, camera, t_s, channels=channel[:, None])

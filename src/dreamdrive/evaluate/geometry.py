@@ -92,7 +92,7 @@ class DepthFigures:
 
 @dataclass(frozen=True)
 class GeometryFigures:
-    """Figures of one scene; see docs/geometry_evaluation.md for what they tell.
+    """Figures of one scene; see docs/reference/evaluate_geometry.md for what they tell.
 
     Attributes:
         frames: Number of frames, all of which count for the path.

@@ -1,9 +1,8 @@
 """Seeds become Gaussians, and Gaussians are fitted to the frames."""
 
-from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier, NoDensifier
-from dreamdrive.fit.hybrid import Parts, Representation, fit
+from dreamdrive.fit.densify import DENSIFIERS, Densifier, DensifySettings, GradientDensifier, NoDensifier
+from dreamdrive.fit.hybrid import Parts, fit
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
-from dreamdrive.fit.motion import MotionConfig
 from dreamdrive.fit.static import StaticFit, fit_static
 from dreamdrive.fit.trainer import FitOptions

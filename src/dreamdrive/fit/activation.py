@@ -9,6 +9,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.device import in_core
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.scene.gaussians import Gaussians
 
@@ -42,6 +43,12 @@ def activate(static: Parameters | None, moved: Gaussians | None) -> Activated:
         static: Gaussians free of time, or None.
         moved: Dynamic Gaussians as they are at the time, without life spans, or None.
     """
+    present = [part for part in (static, moved) if part is not None]
+    if not in_core(present[0].sh):
+        now = [part.gaussians() if isinstance(part, Parameters) else part for part in present]
+        every = Gaussians.concatenate(*(part.without_features() for part in now))
+        scales, opacities = every.log_scales.exp(), every.logit_opacities.sigmoid()
+        return Activated(every.means, every.quaternions, scales, opacities, every.sh)
     tensors: list[Tensor | None] = []
     if static is not None:
         tensors += [static.anchors, *(getattr(static, name) for name in _TENSORS[1:])]

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import torch
 from torch import Tensor
 
 from dreamdrive import _native
+from dreamdrive.device import in_core
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-15
 
@@ -45,6 +47,10 @@ def adam_step(
     moving = {name: leaf for name, leaf in leaves.items() if leaf.grad is not None}
     for name in moving:
         moments[name].steps += 1
+    if not all(map(in_core, moving.values())):
+        for name, leaf in moving.items():
+            _torch_step(leaf, moments[name], tuple(rates[name]))
+        return
     _native.adam(
         [leaf.detach() for leaf in moving.values()],
         [leaf.grad.contiguous() for leaf in moving.values() if leaf.grad is not None],
@@ -59,3 +65,20 @@ def adam_step(
     for leaf in moving.values():
         torch.autograd.graph.increment_version(leaf)
         leaf.grad = None
+
+
+def _torch_step(leaf: Tensor, moments: Moments, rates: tuple[float, ...]) -> None:
+    assert leaf.grad is not None
+    moments.mean.lerp_(leaf.grad, 1 - BETA1)
+    moments.square.mul_(BETA2).addcmul_(leaf.grad, leaf.grad, value=1 - BETA2)
+    root = (moments.square / (1 - BETA2**moments.steps)).sqrt_().add_(EPSILON)
+    step = moments.mean / root / (1 - BETA1**moments.steps)
+    each = rates[0] if len(rates) == 1 else _rates(rates, leaf.device).view(leaf.shape[1:])
+    leaf.sub_(step * each)
+    leaf.grad = None
+
+
+@lru_cache(maxsize=64)
+def _rates(rates: tuple[float, ...], device: torch.device) -> Tensor:
+    """Step sizes on the device; kept, since each copy to it is waited for."""
+    return torch.tensor(rates, dtype=torch.float32, device=device)

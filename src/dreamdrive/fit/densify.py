@@ -1,5 +1,6 @@
 """Growing and pruning of Gaussians while they are fitted."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -7,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.device import CPU
 from dreamdrive.fit.parameters import Parameters
 
 
@@ -27,9 +29,10 @@ class Densifier(Protocol):
 
 @dataclass(frozen=True)
 class DensifySettings:
-    """Constants of ``GradientDensifier``, with the value of 3DGS where it differs.
+    """Which strategy, and the constants of ``GradientDensifier``, with the value of 3DGS where it differs.
 
     Attributes:
+        strategy: Name in ``DENSIFIERS``.
         start: Share of the steps after which growing begins (3DGS: 500 of 30,000).
         stop: Share of the steps after which it ends (3DGS: 15,000 of 30,000).
         every: Steps between two changes.
@@ -43,6 +46,7 @@ class DensifySettings:
         most: Growth stops at this many Gaussians; the largest gradients go first.
     """
 
+    strategy: str = "gradient"
     start: float = 0.15
     stop: float = 0.6
     every: int = 100
@@ -63,14 +67,20 @@ class GradientDensifier:
     All constants are in ``DensifySettings``. Children keep source frame, features, life span and actor.
     """
 
-    def __init__(self, settings: DensifySettings, count: int, half_size_px: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        settings: DensifySettings,
+        count: int,
+        half_size_px: tuple[float, float],
+        device: torch.device = CPU,
+    ) -> None:
         self.settings = settings
-        self._half_size = torch.tensor(half_size_px)
+        self._half_size = torch.tensor(half_size_px, device=device)
         self._reset(count)
 
     def _reset(self, count: int) -> None:
-        self._sum = torch.zeros(count)
-        self._seen = torch.zeros(count)
+        self._sum = torch.zeros(count, device=self._half_size.device)
+        self._seen = torch.zeros_like(self._sum)
 
     def observe(
         self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
@@ -110,14 +120,14 @@ class GradientDensifier:
         large = parameters.log_scales.exp().amax(1) / parameters.unit_m > s.split_px
         clones = torch.nonzero(wanted & ~large).squeeze(1)
         parents = torch.nonzero(wanted & large).squeeze(1)
-        smaller = parameters.log_scales[parents] - float(torch.log(torch.tensor(s.shrink)))
+        smaller = parameters.log_scales[parents] - float(torch.log(torch.tensor(s.shrink, device="cpu")))
         halves = [self._sampled_inside(parameters, parents, generator) for _ in range(2)]
         if len(clones):
             parameters.append_children(clones, {})
         for anchors in halves if len(parents) else []:
             changes = {"anchors": anchors, "offsets": torch.zeros_like(anchors), "log_scales": smaller}
             parameters.append_children(parents, changes)
-        alive = torch.ones(len(parameters), dtype=torch.bool)
+        alive = torch.ones(len(parameters), dtype=torch.bool, device=parents.device)
         alive[parents] = False
         parameters.keep(alive)
 
@@ -126,7 +136,9 @@ class GradientDensifier:
         parameters: Parameters, index: Tensor, generator: torch.Generator
     ) -> Float[Tensor, "m 3"]:
         """A random point of each Gaussian at ``index``."""
-        local = torch.randn(len(index), 3, generator=generator) * parameters.log_scales[index].exp()
+        # Drawn where the generator is: the same numbers on every device.
+        drawn = torch.randn(len(index), 3, generator=generator, device=generator.device)
+        local = drawn.to(index.device) * parameters.log_scales[index].exp()
         w, xyz = parameters.quaternions[index].split([1, 3], dim=1)
         norm = torch.linalg.vector_norm(parameters.quaternions[index], dim=1, keepdim=True)
         w, xyz = w / norm, xyz / norm
@@ -137,6 +149,9 @@ class GradientDensifier:
 class NoDensifier:
     """Keep the set as it was seeded."""
 
+    def __init__(self, *unused: object) -> None:
+        pass
+
     def observe(
         self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
     ) -> None:
@@ -144,3 +159,10 @@ class NoDensifier:
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
         """Nothing is changed."""
+
+
+DENSIFIERS: dict[str, Callable[[DensifySettings, int, tuple[float, float], torch.device], Densifier]] = {
+    "gradient": GradientDensifier,
+    "none": NoDensifier,
+}
+"""Every strategy by name, made from settings, number of Gaussians, half the image in pixels, device."""

@@ -1,27 +1,23 @@
 """The joint fit of static and dynamic Gaussians (eq. 11-14), and its baselines."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import torch
 
-from dreamdrive.fit.densify import DensifySettings, GradientDensifier
-from dreamdrive.fit.motion import MotionConfig, start_motion
+from dreamdrive.device import CPU
+from dreamdrive.fit.densify import DENSIFIERS, DensifySettings
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
 from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
+from dreamdrive.motion import MotionConfig, Start, Tracks, start_motion
 from dreamdrive.progress import Progress
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.deformation import Tracks
-from dreamdrive.scene.exposure import ExposureNetwork
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
-from dreamdrive.scene.vibration import Vibration
-
-Representation = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
 
 
 @dataclass(frozen=True)
@@ -51,6 +47,7 @@ def fit(
     densify: DensifySettings,
     seed: int,
     progress: Progress,
+    device: torch.device = CPU,
 ) -> Scene:
     """Optimise Gaussians, motion and exposure jointly (eq. 13-14).
 
@@ -66,30 +63,29 @@ def fit(
         densify: When and what to grow and prune.
         seed: Order of the frames, weights, places of split Gaussians.
         progress: Called with steps done and steps in all.
+        device: Where it is computed; the scene is on the CPU.
     """
-    views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
+    views = training_views(clip, geometry, device)
     moving, dynamic = None, parts.dynamic
     if len(dynamic):
-        moving, dynamic = start_motion(clip, geometry, dynamic, parts.tracks, motion, seed)
-    rates = LearningRates()
-    if isinstance(moving, Vibration):
-        rates = replace(rates, interval_s=moving.config.interval_s)
+        moving, dynamic = start_motion(motion, Start(clip, geometry, dynamic, parts.tracks, seed))
+    rates = LearningRates(interval_s=clip.interval_s)
     model = Model(
-        static=_parameters(parts.static, rates),
-        dynamic=_parameters(dynamic, rates),
-        deformation=moving,
+        static=_parameters(parts.static.to(device), rates),
+        dynamic=_parameters(dynamic.to(device), rates),
+        deformation=None if moving is None else moving.to(device),
         sky=start.sky,
-        exposure=ExposureNetwork(len(clip), seed),
+        exposure=ExposureNetwork(len(clip), seed).to(device),
     )
     half_size = (clip.size[0] / 2, clip.size[1] / 2)
-    densifiers = [GradientDensifier(densify, len(p), half_size) for p in model.parts()]
+    densifiers = [DENSIFIERS[densify.strategy](densify, len(p), half_size, device) for p in model.parts()]
     optimise(model, views, densifiers, options, seed, progress)
     empty = parts.static.select(torch.zeros(0, dtype=torch.int64))
     dynamic = model.dynamic.frozen() if model.dynamic is not None else empty
     return Scene(
         static=model.static.frozen() if model.static is not None else empty,
         dynamic=dynamic,
-        deformation=None if moving is None else moving.requires_grad_(False),
+        deformation=None if moving is None else moving.requires_grad_(False).to(CPU),
         actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
         sky=start.sky,
         exposure=model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera),

@@ -8,12 +8,15 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
-from dreamdrive.splat import check_dtype
+from dreamdrive.device import in_core
+from dreamdrive.splat import check_dtype, ssim_map_reference
 
 LossName = Literal["field", "paper"]
 # Weights of L1 and of 1 - SSIM. "paper" is eq. 14 as printed, unweighted; "field" is what 3DGS and its
 # descendants use.
 WEIGHTS: dict[LossName, tuple[float, float]] = {"field": (0.8, 0.2), "paper": (1.0, 1.0)}
+LEAST = 1e-3
+"""What alpha and depths count as at least."""
 
 
 def render_loss(
@@ -37,7 +40,12 @@ def render_loss(
     if reference.requires_grad:
         raise ValueError("reference: the render loss has no gradient for it; detach it")
     if mask is None:
-        mask = torch.ones(image.shape[:2], dtype=torch.bool)
+        mask = torch.ones(image.shape[:2], dtype=torch.bool, device=image.device)
+    if not in_core(image):
+        image = torch.where(mask[..., None], image, reference)
+        of_l1, of_ssim = WEIGHTS[name]
+        similarity = ssim_map_reference(image, reference).mean()
+        return of_l1 * (image - reference).abs().mean() + of_ssim * (1 - similarity)
     return _RenderLoss.apply(image, reference, mask, *WEIGHTS[name])  # pyright: ignore[reportReturnType]
 
 
@@ -78,7 +86,7 @@ def geometry_loss(
 
     ``disparity_weight`` times the mean of |alpha / depth_sum - 1 / reference_m| in 1/m, weighted by
     ``weight`` (whose sum counts as 1 at least), plus ``sky_weight`` times the mean over all pixels of alpha
-    in the sky. Alpha and depths count as 0.001 at least.
+    in the sky. Alpha and depths count as ``LEAST`` at least.
 
     Args:
         depth_sum: Depth composited by weight, not divided by alpha.
@@ -89,6 +97,11 @@ def geometry_loss(
         disparity_weight: Weight of the first term.
         sky_weight: Weight of the second.
     """
+    if not in_core(alpha):
+        inverse = alpha.clamp(min=LEAST) / depth_sum.clamp(min=LEAST)
+        off = torch.where(weight > 0, inverse - 1 / reference_m.clamp(min=LEAST), 0.0).abs()
+        disparity = (weight * off).sum() / weight.sum().clamp(min=1.0)
+        return disparity_weight * disparity + sky_weight * (alpha * sky).mean()
     return _GeometryLoss.apply(depth_sum, alpha, reference_m, weight, sky, disparity_weight, sky_weight)  # pyright: ignore[reportReturnType]
 
 

@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.device import CPU
 from dreamdrive.fit.adam import Moments, adam_step
 from dreamdrive.scene.gaussians import Gaussians
 
@@ -62,7 +63,6 @@ class Parameters:
     """
 
     def __init__(self, gaussians: Gaussians, unit_m: Float[Tensor, " n"], rates: LearningRates) -> None:
-        count = len(gaussians)
         self.rates = rates
         self.anchors = gaussians.means.clone()
         self.unit_m = unit_m.clone()
@@ -70,7 +70,7 @@ class Parameters:
         self.features = gaussians.features
         self.lifespan = gaussians.lifespan
         self.actor = gaussians.actor
-        self.offsets = torch.zeros(count, 3)
+        self.offsets = torch.zeros_like(self.anchors)
         self.quaternions = gaussians.quaternions.clone()
         self.log_scales = gaussians.log_scales.clone()
         self.logit_opacities = gaussians.logit_opacities.clone()
@@ -125,9 +125,9 @@ class Parameters:
         )
 
     def frozen(self) -> Gaussians:
-        """A detached copy."""
+        """A detached copy on the CPU."""
         now = self.gaussians().tensors()
-        return Gaussians(**{name: value.detach().clone() for name, value in now.items()})
+        return Gaussians(**{name: value.detach().to(CPU, copy=True) for name, value in now.items()})
 
     def set_progress(self, done: float) -> None:
         """Decay the step of the positions; ``done`` runs from 0 to 1."""

@@ -4,14 +4,16 @@ from dataclasses import dataclass
 
 import torch
 
+from dreamdrive.device import CPU
 from dreamdrive.fit.densify import NoDensifier
+from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.exposure import Exposure, ExposureNetwork
+from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
@@ -33,7 +35,13 @@ class StaticFit:
 
 
 def fit_static(
-    clip: Clip, geometry: Geometry, gaussians: Gaussians, options: FitOptions, seed: int, progress: Progress
+    clip: Clip,
+    geometry: Geometry,
+    gaussians: Gaussians,
+    options: FitOptions,
+    seed: int,
+    progress: Progress,
+    device: torch.device = CPU,
 ) -> StaticFit:
     """Optimise all seeds as static (eq. 5), without densification, so that rows keep their meaning.
 
@@ -44,10 +52,12 @@ def fit_static(
         options: Length, rates and weights.
         seed: Order of the frames.
         progress: Called with steps done and steps in all.
+        device: Where it is computed; the result is on the CPU.
     """
-    views = {1: training_views(clip, geometry), 2: training_views(clip, geometry, 2)}
-    static = Parameters(gaussians, footprints(gaussians), LearningRates())
-    model = Model(static, None, None, estimate_sky(clip, geometry), ExposureNetwork(len(clip), seed))
+    views = training_views(clip, geometry, device)
+    static = Parameters(gaussians.to(device), footprints(gaussians).to(device), LearningRates())
+    exposure = ExposureNetwork(len(clip), seed).to(device)
+    model = Model(static, None, None, estimate_sky(clip, geometry), exposure)
     optimise(model, views, [NoDensifier()], options, seed, progress)
     return StaticFit(
         static.frozen(), model.sky, model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera)

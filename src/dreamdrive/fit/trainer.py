@@ -10,15 +10,14 @@ from torch import Tensor
 from dreamdrive import _native
 from dreamdrive.fit.activation import Activated, activate
 from dreamdrive.fit.densify import Densifier
+from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.fit.losses import LossName, geometry_loss, render_loss
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.fit.views import View
+from dreamdrive.motion import Motion
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import alive_at
-from dreamdrive.scene.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import one_torch_thread, rasterize
@@ -101,11 +100,16 @@ class Model:
         if self.dynamic is None or self.deformation is None:
             return None
         whole = self.dynamic.gaussians().without_features()
-        rows = alive_at(whole, t_s)
+        rows = whole.alive_at(t_s)
         # A copy of all rows, and another of their gradients, would be a twentieth of a step.
         living = whole if len(rows) == len(whole) else whole.select(rows)
         moved = self.deformation.training_at(living, t_s, generator)
         return Moved(moved, rows, self.deformation.penalty(living, moved))
+
+    @property
+    def device(self) -> torch.device:
+        """Where it is computed."""
+        return self.exposure.embedding.device
 
     def parts(self) -> list[Parameters]:
         """The present parameter sets, in the order in which they are splatted."""
@@ -135,7 +139,7 @@ class Trainer:
         self.generator = generator
         self._optimiser = _shared_optimiser(model, options)
 
-    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> None:
+    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> Float[Tensor, ""]:
         """Render a frame, compare, learn and densify.
 
         Args:
@@ -143,12 +147,15 @@ class Trainer:
             view: The frame.
             sky: What its camera sees of the sky alone.
             shrink: By how much the frame is shrunk.
+
+        Returns:
+            The loss before the step, on the device.
         """
         model, options = self.model, self.options
         done = step / options.steps
         moved = model.moved(view.time_s, self.generator)
         activated = activate(model.static, None if moved is None else moved.gaussians)
-        offsets_px = torch.zeros(len(activated.means), 2, requires_grad=True)
+        offsets_px = torch.zeros(len(activated.means), 2, device=model.device, requires_grad=True)
         rendered = _splat(activated, view.camera, offsets_px, None if done >= options.sh_after else 0)
         loss = _loss(model, rendered, view, sky, options, done)
         if moved is not None and moved.penalty is not None:
@@ -159,6 +166,7 @@ class Trainer:
         self._observe(None if moved is None else moved.rows, offsets_px, rendered, shrink)
         for part, densifier in zip(model.parts(), self.densifiers, strict=True):
             densifier.update(part, step, options.steps, self.generator)
+        return loss.detach()
 
     def _observe(
         self, rows: Int[Tensor, " m"] | None, offsets_px: Tensor, rendered: Render, shrink: int
@@ -175,6 +183,8 @@ class Trainer:
             next(densifiers).observe(rows, gradient[static:], rendered.visible[static:])
 
 
+# SSIM takes differences of squares, for which the ten bits of TF32 are too few.
+@torch.backends.cudnn.flags(enabled=True, allow_tf32=False)
 @one_torch_thread()
 def optimise(
     model: Model,
@@ -197,15 +207,16 @@ def optimise(
     _native.keep_freed_memory()
     # Of their own, so that how many Gaussians are split leaves the order of the frames as it is: with one for
     # both, a change of one thing in the input changed everything else in the scene.
-    frame_order = torch.Generator().manual_seed(seed)
-    trainer = Trainer(model, densifiers, options, torch.Generator().manual_seed(seed))
+    frame_order = torch.Generator("cpu").manual_seed(seed)
+    trainer = Trainer(model, densifiers, options, torch.Generator("cpu").manual_seed(seed))
     skies = {
-        shrink: [model.sky.colour(v.camera).contiguous() for v in shrunk] for shrink, shrunk in views.items()
+        shrink: [model.sky.colour(v.camera).contiguous().to(model.device) for v in shrunk]
+        for shrink, shrunk in views.items()
     }
     order: list[int] = []
     for step in range(options.steps):
         if not order:
-            order = torch.randperm(len(views[1]), generator=frame_order).tolist()
+            order = torch.randperm(len(views[1]), generator=frame_order, device="cpu").tolist()
         shrink = 2 if step / options.steps < options.half_size_share else 1
         which = order.pop()
         trainer.step(step, views[shrink][which], skies[shrink][which], shrink)
@@ -221,7 +232,7 @@ def _splat(
         activated.scales,
         activated.opacities,
         activated.sh,
-        torch.as_tensor(camera.camera_from_world, dtype=torch.float32),
+        torch.as_tensor(camera.camera_from_world, dtype=torch.float32, device=activated.means.device),
         fx_px=camera.fx_px,
         fy_px=camera.fy_px,
         cx_px=camera.cx_px,

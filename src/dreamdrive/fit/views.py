@@ -1,6 +1,6 @@
 """The frames a fit may see, as tensors, at full and at half size."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from dreamdrive.device import CPU
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -37,10 +38,16 @@ class View:
     depth_m: Float[Tensor, "h w"]
     depth_weight: Float[Tensor, "h w"]
 
+    def to(self, device: torch.device) -> "View":
+        """The same with its tensors on a device."""
+        names = ("image", "mask", "sky", "depth_m", "depth_weight")
+        return replace(self, **{name: getattr(self, name).to(device) for name in names})
 
-def training_views(clip: Clip, geometry: Geometry, shrink: int = 1) -> list[View]:
-    """All frames that are not held out, area-averaged by ``shrink``."""
-    return [_view(clip, geometry, i, shrink) for i in np.flatnonzero(~clip.held_out).tolist()]
+
+def training_views(clip: Clip, geometry: Geometry, device: torch.device = CPU) -> dict[int, list[View]]:
+    """All frames that are not held out, on a device, by how much they are shrunk: 1 and 2."""
+    seen = np.flatnonzero(~clip.held_out).tolist()
+    return {shrink: [_view(clip, geometry, i, shrink).to(device) for i in seen] for shrink in (1, 2)}
 
 
 def _view(clip: Clip, geometry: Geometry, index: int, shrink: int) -> View:

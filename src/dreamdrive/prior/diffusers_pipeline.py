@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
-from dreamdrive.machine import best_device
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.running import check_finite, enough_memory, first_line
 from dreamdrive.progress import Progress
@@ -48,7 +48,7 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
     Raises:
         InputError: A part is missing, is of another kind or has no weights as ``.safetensors``.
     """
-    gpu = best_device().type == "cuda"
+    gpu = chosen_device().type == "cuda"
     try:
         pipeline = kind.from_pretrained(
             folder,

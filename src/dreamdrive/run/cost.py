@@ -9,7 +9,7 @@ from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import Source, open_source
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
-from dreamdrive.fit import Representation
+from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options
 from dreamdrive.prior import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
@@ -43,14 +43,6 @@ class _Measured:
 
 
 MEASURED = _Measured()
-_FIT: dict[Representation, float] = {
-    "static": 0.9,
-    "hybrid": 1.0,
-    "deformable": 2.2,
-    "hexplane": 2.5,
-    "vibration": 1.0,
-}
-"""The time of a step of the joint fit for one of hybrid, measured in the same way on 12 frames of 320x180."""
 
 LONG = 60
 """Frames from which on a clip is called long."""
@@ -136,7 +128,7 @@ def seconds_of(planned: Planned, options: Options, cores: int) -> float:
     more = frames / m.usual_frames
     geometry = frames * (m.frame + m.frame_megapixel * pixels) * more**m.frame_growth
     step = m.step + m.step_megapixel * pixels * more**m.step_growth
-    fits = step * (options.static.steps + options.fit.steps * _FIT[options.representation])
+    fits = step * (options.static.steps + options.fit.steps * REPRESENTATIONS[options.representation].step)
     videos = frames * (m.video + m.video_megapixel * pixels)
     work = m.start + geometry + fits + m.score_megapixel * frames * pixels + videos
     return work * (m.serial + (1 - m.serial) / max(1, cores))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import UInt8
@@ -22,7 +22,7 @@ from dreamdrive.run.workspace import REPORT, Workspace
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.folder import save_scene
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.show import Scored, draw_geometry, lens_of, write_held_out, write_png, write_videos
 
 T = TypeVar("T")
@@ -119,8 +119,9 @@ def start(
     planned = plan(request.control, request.prior)
     if planned is not None:
         check_memory(planned, free_bytes())
-        for sentence in announcement(planned, request.options, available_cores()):
-            say(sentence)
+        if request.options.device == "cpu":  # where the times were measured
+            for sentence in announcement(planned, request.options, available_cores()):
+                say(sentence)
     return Production(
         workspace.stages,
         recompute_from,
@@ -132,12 +133,11 @@ def start(
     )
 
 
-def _about(path: Path | None, clip: Clip, geometry: Geometry) -> dict[str, Any]:
-    """What a scene remembers of its making."""
-    return {
-        "input": None if path is None else path.name,
-        "source_index": clip.source_index.tolist(),
-        "lens": clip.provenance.get("lens"),
-        "up": None if geometry.ground is None else geometry.ground.normal_world.tolist(),
-        "scale": geometry.scale.source,
-    }
+def _about(path: Path | None, clip: Clip, geometry: Geometry) -> Provenance:
+    return Provenance(
+        input=None if path is None else path.name,
+        source_index=tuple(clip.source_index.tolist()),
+        lens=clip.provenance.get("lens"),
+        up=None if geometry.ground is None else tuple(geometry.ground.normal_world.tolist()),
+        scale=geometry.scale.source,
+    )

@@ -75,6 +75,7 @@ def describe(
         "rough": list(rough_because(facts)),
         "limits": list(limits_of(facts)),
         "notes": list(clip.provenance.get("notes", [])),
+        "features": sorted(clip.features),
         "geometry": geometry.details,
         "held_out": _by_source_index(clip, held_out),
         "held_out_mean": _mean(held_out),

@@ -9,7 +9,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions, backend_of
 from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.models import find_weights
-from dreamdrive.options import QUALITIES, Options, QualityName
+from dreamdrive.options import QUALITIES, Options, QualityName, with_method
 from dreamdrive.prior import choose_prior, prior_of
 from dreamdrive.progress import Work
 from dreamdrive.run.stages import digest, file_digest
@@ -95,16 +95,18 @@ def request_of(
     geometry = replace(whole.geometry, weights=network)
     backend_of(geometry.method, network)
     control = _with_lens(control, geometry_files)
-    quality = next((name for name, one in QUALITIES.items() if one == _plain(whole)), "custom")
+    quality = _quality_of(whole)
     options = replace(whole, geometry=geometry, seed=control.seed)
     return Request(
         control, prior, geometry_files, options, quality, _digests(control, geometry_files, network)
     )
 
 
-def _plain(options: Options) -> Options:
-    """The options without what is chosen beside the quality."""
-    return replace(options, geometry=GeometryOptions(), representation="hybrid", seed=0)
+def _quality_of(options: Options) -> str:
+    """The name of the options, whatever is chosen beside the quality."""
+    plain = replace(options, geometry=GeometryOptions(), representation="hybrid", device="cpu", seed=0)
+    named = {name: with_method(one, options.method) for name, one in QUALITIES.items()}
+    return next((name for name, one in named.items() if one == plain), "custom")
 
 
 def _with_networks(

@@ -92,6 +92,11 @@ class Clip:
         return self.frames.shape[2], self.frames.shape[1]
 
     @property
+    def interval_s(self) -> float:
+        """Seconds between two frames, the median where they are not even."""
+        return float(np.median(np.diff(np.unique(self.times_s))))
+
+    @property
     def step(self) -> Int[np.ndarray, " f"]:
         """Number of earlier frames of the same camera, for each frame (F,)."""
         step = np.zeros(len(self), dtype=np.int64)

@@ -20,13 +20,11 @@ from dreamdrive.files.json_file import of_type, parse_json
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.scene.camera import FARTHEST_M
-from dreamdrive.scene.deformation import DeformationField
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.stored_index import MAX_PIXELS, About, StoredIndex, increasing
-from dreamdrive.scene.stored_motion import described, rebuilt
+from dreamdrive.scene.stored_index import MAX_PIXELS, StoredIndex, increasing
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -37,6 +35,8 @@ CONVENTIONS = (
 )
 _INDEX = "scene.json"
 _BLOCK = "main"
+_FIRST_MOTION = "network"
+"""The only kind of motion in format version 1, which does not name it."""
 
 
 def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
@@ -55,7 +55,7 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
         "format": FORMAT,
         "version": _version(scene),
         "conventions": CONVENTIONS,
-        "provenance": scene.provenance,
+        "provenance": asdict(scene.provenance),
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
         "parts": {name: hashlib.sha256(data).hexdigest() for name, data in parts.items()},
         **_values(scene),
@@ -79,7 +79,6 @@ def load_scene(path: Path) -> Scene:
     """
     index = _read_index(path)
     stored = of_type(index, StoredIndex, str(path / _INDEX))
-    of_type(stored.provenance, About, f"{path / _INDEX}: provenance")
     parts = {name: _read_part(path, name, digest) for name, digest in stored.parts.items()}
 
     def part(name: str) -> dict[str, Tensor] | None:
@@ -95,7 +94,7 @@ def load_scene(path: Path) -> Scene:
 
 def _version(scene: Scene) -> int:
     """The oldest format that holds the scene: version 1 knows deformation fields alone."""
-    return 1 if isinstance(scene.deformation, DeformationField | None) else VERSION
+    return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION
 
 
 def _encode(tensors: dict[str, Tensor]) -> bytes:
@@ -130,11 +129,23 @@ def _values(scene: Scene) -> dict[str, Any]:
         "times_s": scene.times_s.tolist(),
         "held_out": scene.held_out.tolist(),
         **({} if scene.camera is None else {"camera": scene.camera.tolist()}),
-        "deformation": None if scene.deformation is None else described(scene.deformation),
+        "deformation": None if scene.deformation is None else _described(scene.deformation),
         "sky": None
         if scene.sky is None
         else {n: getattr(scene.sky, n) for n in ("azimuth_rad", "elevation_rad")},
     }
+
+
+def _described(motion: SceneMotion) -> dict[str, Any]:
+    kind = {} if motion.kind == _FIRST_MOTION else {"kind": motion.kind}
+    return {**kind, **asdict(motion.config)}
+
+
+def _rebuilt(values: dict[str, Any], state: dict[str, Tensor]) -> SceneMotion:
+    # Here, since what moves is built on the nouns of this package.
+    from dreamdrive.motion import rebuilt
+
+    return rebuilt(values.get("kind", _FIRST_MOTION), {k: v for k, v in values.items() if k != "kind"}, state)
 
 
 def _checksum(index: dict[str, Any]) -> str:
@@ -190,7 +201,7 @@ def _rebuild(stored: StoredIndex, part: Callable[[str], dict[str, Tensor] | None
     return Scene(
         static=build(Gaussians, static),
         dynamic=build(Gaussians, dynamic),
-        deformation=None if motion is None else rebuilt(stored.deformation or {}, motion),
+        deformation=None if motion is None else _rebuilt(stored.deformation or {}, motion),
         actors=tuple(actor.actor() for actor in stored.actors),
         sky=None if sky is None else build(Sky, {**sky, **_asdict(stored.sky)}),
         exposure=None if exposure is None else _exposure(exposure),
@@ -226,22 +237,10 @@ def _check(scene: Scene) -> None:
             raise ValueError(f"Gaussians come from frames beyond the {count} of the scene")
         if float(part.means.abs().max()) > FARTHEST_M:
             raise ValueError(f"Gaussians lie more than {FARTHEST_M:g} m away")
-    _check_tracked(scene)
-    source, up = scene.provenance.get("source_index"), scene.provenance.get("up")
+    if scene.deformation is not None and len(scene.dynamic):
+        scene.deformation.check(scene.dynamic)
+    source, up = scene.provenance.source_index, scene.provenance.up
     if source is not None and len(source) != count:
         raise ValueError(f"source_index names {len(source)} frames of {count}")
     if up is not None and abs(float(np.linalg.norm(up)) - 1) > 1e-3:
         raise ValueError(f"up is {up}, not a unit vector")
-
-
-def _check_tracked(scene: Scene) -> None:
-    motion, actor = scene.deformation, scene.dynamic.actor
-    if (
-        not isinstance(motion, DeformationField)
-        or not motion.config.actors
-        or actor is None
-        or not len(actor)
-    ):
-        return
-    if not -1 <= int(actor.min()) <= int(actor.max()) < motion.config.actors:
-        raise ValueError(f"Gaussians belong to actors beyond the {motion.config.actors} with a track")

@@ -1,5 +1,6 @@
 """3D Gaussians."""
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -61,9 +62,36 @@ class Gaussians:
         rows = torch.nonzero(index).squeeze(1) if index.dtype == torch.bool else index
         return replace(self, **{name: value.index_select(0, rows) for name, value in self.tensors().items()})
 
+    def to(self, device: torch.device) -> "Gaussians":
+        """The same on a device."""
+        return replace(self, **{name: value.to(device) for name, value in self.tensors().items()})
+
     def without_features(self) -> "Gaussians":
         """The same without Z_ref, which rendering has no use for and would be copied about with."""
         return replace(self, features=None)
+
+    def alive_at(self, t_s: float) -> Int[Tensor, " m"]:
+        """Rows that a life span leaves at least 1/255 of their opacity at ``t_s``: no other can be seen."""
+        if self.lifespan is None:
+            return torch.arange(len(self), device=self.means.device)
+        centre_s, deviation_s = self.lifespan.unbind(-1)
+        reach = math.sqrt(2 * math.log(255.0))
+        return torch.nonzero((t_s - centre_s).abs() <= reach * deviation_s).squeeze(1)
+
+    def faded_at(self, t_s: float) -> "Gaussians":
+        """The same with the life spans turned into opacity at ``t_s``; the result has none.
+
+        opacity' = opacity * exp(-e), e = (t - centre)^2 / (2 deviation^2), on logits without forming
+        1 - opacity: logit' = logit - e - log(1 + exp(logit) (1 - exp(-e))).
+        """
+        if self.lifespan is None:
+            return self
+        centre_s, deviation_s = self.lifespan.unbind(-1)
+        exponent = 0.5 * ((t_s - centre_s) / deviation_s.clamp(min=1e-6)) ** 2
+        # exp(80) still fits float32; an opacity of logit 80 is 1 to the last bit.
+        logit = self.logit_opacities.clamp(max=80.0)
+        logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
+        return replace(self, logit_opacities=logit, lifespan=None)
 
     @staticmethod
     def concatenate(*parts: "Gaussians") -> "Gaussians":

@@ -12,6 +12,8 @@ from jaxtyping import Float
 from msgspec import Meta
 from scipy.interpolate import CubicSpline
 
+from dreamdrive.errors import InputError
+
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000)]
 Size = Annotated[float, Meta(gt=0, le=1000)]
 Seconds = Annotated[float, Meta(ge=-1_000_000, le=1_000_000)]
@@ -31,6 +33,9 @@ BoxKind = Literal["car", "van", "truck", "bicycle", "pedestrian"]
 PropKind = Literal["tree", "lamp", "sign"]
 
 FORMAT = 1
+EDITIONS = (1,)
+"""What draws streets. An edition draws the same for ever: whoever changes a picture adds one, as figures of
+different editions cannot be compared."""
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -154,6 +159,7 @@ class Layout(_Part, frozen=True):
         props: Trees, lamps, signs.
         light: Weather.
         seed: Decides what nothing above decides, such as the grain of the asphalt.
+        edition: Which of ``EDITIONS`` draws it.
         format: Version of this description.
     """
 
@@ -165,7 +171,13 @@ class Layout(_Part, frozen=True):
     props: Annotated[list[Prop], Meta(max_length=10_000)] = []
     light: Light = Light()
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    edition: int = msgspec.field(default_factory=lambda: 1)  # not a default, which is not written
     format: Literal[1] = FORMAT
+
+    def __post_init__(self) -> None:
+        if self.edition not in EDITIONS:
+            known = ", ".join(map(str, EDITIONS))
+            raise InputError(f"edition {self.edition} of drawn streets is unknown; there is: {known}")
 
 
 def track_function(track: list[TrackPoint]) -> Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, "t 3"]]:

@@ -1,20 +1,63 @@
 """The product: a street over time as Gaussians."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.deformation import alive_at, faded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.motion import Motion
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.trajectory import Trajectory
+
+
+@runtime_checkable
+class SceneMotion(Protocol):
+    """What a scene asks of what moves its Gaussians; ``dreamdrive.motion`` holds all there are.
+
+    Attributes:
+        kind: Its name on disk.
+        config: A dataclass that rebuilds it together with its ``state_dict``.
+    """
+
+    kind: ClassVar[str]
+    config: Any
+
+    def apply_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
+        """The Gaussians as they are at ``t_s``; the result has no life spans left."""
+        ...
+
+    def check(self, gaussians: Gaussians) -> None:
+        """Raise ``ValueError`` where these are not Gaussians that it can move."""
+        ...
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """What it has learned, by name."""
+        ...
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a scene was made from; each may be unknown.
+
+    Attributes:
+        input: Name of the recording.
+        source_index: Index of each view in it, in file or decode order.
+        lens: Distortion of its camera, as ``data.lens.Lens`` writes it.
+        up: Unit vector away from the road, in the world.
+        scale: What metres rest on, in words.
+    """
+
+    input: str | None = None
+    source_index: tuple[int, ...] | None = None
+    lens: dict[str, Any] | None = None
+    up: tuple[float, float, float] | None = None
+    scale: str | None = None
 
 
 @dataclass(frozen=True)
@@ -33,21 +76,21 @@ class Scene:
         cameras: The recorded views (F,).
         times_s: Their times (F,).
         held_out: Which of them no fit has seen (F,).
-        provenance: What the scene was made from, as JSON values.
+        provenance: What the scene was made from.
         camera: Which camera of a rig each view is of (F,), the first one's being the drive; None where there
             is one camera only.
     """
 
     static: Gaussians
     dynamic: Gaussians
-    deformation: Motion | None
+    deformation: SceneMotion | None
     actors: tuple[Actor, ...]
     sky: Sky | None
     exposure: Exposure | None
     cameras: tuple[Camera, ...]
     times_s: Float[np.ndarray, " f"]
     held_out: Bool[np.ndarray, " f"]
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: Provenance = field(default_factory=Provenance)
     camera: Int[np.ndarray, " f"] | None = None
 
     def __post_init__(self) -> None:
@@ -74,14 +117,14 @@ class Scene:
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:
         """The static Gaussians without features; the time matters only to those with a life span."""
-        return faded(self.static.without_features(), t_s)
+        return self.static.without_features().faded_at(t_s)
 
     @torch.no_grad()
     def dynamic_at(self, t_s: float) -> Gaussians:
         """The dynamic Gaussians that live at ``t_s``, where they are then, without features."""
-        living = self.dynamic.without_features().select(alive_at(self.dynamic, t_s))
+        living = self.dynamic.without_features().select(self.dynamic.alive_at(t_s))
         if self.deformation is None:
-            return faded(living, t_s)
+            return living.faded_at(t_s)
         return self.deformation.apply_at(living, t_s)
 
     def at(self, t_s: float) -> Gaussians:

@@ -1,6 +1,6 @@
 """What ``scene.json`` holds, with the bounds within which it is believed."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import FARTHEST_M, Camera
+from dreamdrive.scene.scene import Provenance
 
 MAX_PIXELS = 64_000_000
 """Most pixels of a view."""
@@ -62,15 +63,6 @@ class StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     elevation_rad: tuple[float, float]
 
 
-class About(msgspec.Struct, frozen=True):
-    """What of a scene's provenance is used; the rest is for people."""
-
-    up: tuple[float, float, float] | None = None
-    source_index: list[int] | None = None
-    lens: dict[str, Any] | None = None
-    input: str | None = None
-
-
 class StoredIndex(msgspec.Struct, frozen=True):
     """All of ``scene.json`` that a scene is made of."""
 
@@ -79,7 +71,7 @@ class StoredIndex(msgspec.Struct, frozen=True):
     cameras: Annotated[list[StoredCamera], Meta(min_length=1)]
     times_s: list[float]
     held_out: list[bool]
-    provenance: dict[str, Any]
+    provenance: Provenance
     camera: list[Annotated[int, Meta(ge=0, le=10**4)]] | None = None
     deformation: dict[str, int | float | str] | None = None
     sky: StoredSky | None = None

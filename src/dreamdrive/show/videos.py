@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -136,7 +135,7 @@ def as_recorded(
 
 def lens_of(scene: Scene) -> Lens | None:
     """The lens of the recording, where its distortion is known."""
-    values: Any = scene.provenance.get("lens")
+    values = scene.provenance.lens
     try:
         return None if values is None else Lens.from_json(values)
     except (KeyError, TypeError, ValueError) as error:

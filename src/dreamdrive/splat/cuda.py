@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from dreamdrive.device import why_no_cuda
 from dreamdrive.errors import InputError
 from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
@@ -28,12 +29,10 @@ def why_unusable() -> str | None:
 
     Nothing is compiled: that the kernels cannot be built shows at first use.
     """
-    if torch.version.cuda is None:
-        return f"torch {torch.__version__} is built without CUDA: install a build with it"
+    if (trouble := why_no_cuda()) is not None:
+        return trouble
     if importlib.util.find_spec("gsplat") is None:
         return "gsplat is not installed: pip install 'dreamdrive[gpu]'"
-    if not torch.cuda.is_available():
-        return "torch finds no CUDA device: nvidia-smi has to list one"
     if importlib.util.find_spec("gsplat.csrc") is None and not _has_compiler():
         return (
             "gsplat is installed without compiled kernels and there is no nvcc to compile them: "

@@ -41,7 +41,7 @@ def rasterize(
     sh_degree: int | None = None,
     antialiased: bool = False,
     inspect: bool = False,
-    backend: str = "native",
+    backend: str | None = None,
 ) -> Render:
     """Splat Gaussians as a pinhole sees them; differentiable in every tensor given.
 
@@ -73,12 +73,14 @@ def rasterize(
         antialiased: Multiply each opacity by sqrt(det / det') of the projected covariance before and after
             the 0.3 px^2 are added, so that small Gaussians do not gain weight from afar (Mip-Splatting).
         inspect: Fill ``median_depth_m``, ``weight_sum_px`` and ``weight_most`` of the result.
-        backend: "native" (compiled, float32) or "reference" (plain torch, tiny scenes) on the CPU;
-            "gsplat" (float32) on a CUDA device, see ``splat.cuda`` for where it differs.
+        backend: "native" (compiled, float32, on the CPU), "gsplat" (float32, on a CUDA device, see
+            ``splat.cuda`` for where it differs) or "reference" (plain torch, tiny scenes). Without it the
+            device of the means decides between the first two.
 
     Raises:
         ValueError: An argument has the wrong shape, type or device, or holds NaN; the message names it.
     """
+    backend = backend or ("native" if means.is_cpu else "gsplat")
     if backend not in BACKENDS:
         raise ValueError(f"backend: expected one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
     check_shapes(

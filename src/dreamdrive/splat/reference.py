@@ -83,7 +83,8 @@ def project(
     jacobian = torch.stack([fx / z, zero, -fx * tx / z, zero, fy / z, -fy * ty / z], -1).reshape(-1, 2, 3)
     axes = rotation_matrices(arguments.quaternions[index]) * arguments.scales[index, None, :]
     factor = jacobian @ rotation @ axes
-    covariance = factor @ factor.transpose(-1, -2) + BLUR_PX2 * torch.eye(2, dtype=factor.dtype)
+    blur = BLUR_PX2 * torch.eye(2, dtype=factor.dtype, device=factor.device)
+    covariance = factor @ factor.transpose(-1, -2) + blur
     if arguments.antialiased:
         bare = torch.linalg.det(factor @ factor.transpose(-1, -2)).clamp(min=1e-30)
         opacity = opacity * torch.sqrt(bare / torch.linalg.det(covariance))
@@ -120,9 +121,9 @@ def offsets_from(
 ) -> tuple[Float[Tensor, "p m"], Float[Tensor, "p m"]]:
     """From each centre to each pixel centre (rows first), along x and along y."""
     width, height = size_px
-    grid_y, grid_x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
-    dx = grid_x.reshape(-1, 1).to(centre.dtype) - centre[:, 0]
-    dy = grid_y.reshape(-1, 1).to(centre.dtype) - centre[:, 1]
+    y, x = (torch.arange(n, dtype=centre.dtype, device=centre.device) + 0.5 for n in (height, width))
+    grid_y, grid_x = torch.meshgrid(y, x, indexing="ij")
+    dx, dy = grid_x.reshape(-1, 1) - centre[:, 0], grid_y.reshape(-1, 1) - centre[:, 1]
     if absolute is None:
         return dx, dy
     zeros = (cast(Tensor, _Absolute.apply(absolute[:, k], len(dx))) for k in (0, 1))
@@ -162,7 +163,7 @@ def rasterize_reference(arguments: SplatArguments) -> Render:
     channels = arguments.channels
     if channels is None:
         channels = arguments.means.new_zeros(len(arguments.means), 0)
-    visible = torch.zeros(len(arguments.means), dtype=torch.bool)
+    visible = torch.zeros(len(arguments.means), dtype=torch.bool, device=index.device)
     visible[index[reaching]] = True
     inspected: dict[str, Tensor] = {}
     if arguments.inspect:

@@ -17,7 +17,7 @@ def render(
     channels: Float[Tensor, "n c"] | None = None,
     screen_offsets_px: Float[Tensor, "n 2"] | None = None,
     sh_degree: int | None = None,
-    backend: str = "native",
+    backend: str | None = None,
 ) -> Render:
     """Splat Gaussians with their stored (logarithmic, logit) parameters; see ``rasterize``.
 

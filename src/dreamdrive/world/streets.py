@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.layout import Building, Ego, Layout, Light, Prop
+from dreamdrive.scene.layout import EDITIONS, Building, Ego, Layout, Light, Prop
 from dreamdrive.world.road import (
     LANE_M,
     MOST_M_S,
@@ -36,6 +36,7 @@ class StreetOptions:
         movers: Number of moving road users.
         parked: Number of parked vehicles.
         camera_height_m: Height of the camera.
+        edition: By which edition it is drawn, see ``scene.layout.EDITIONS``.
     """
 
     seconds: float = 2.4
@@ -43,6 +44,7 @@ class StreetOptions:
     movers: int | None = None
     parked: int | None = None
     camera_height_m: float = 1.5
+    edition: int = max(EDITIONS)
 
 
 def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
@@ -52,7 +54,7 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
     vehicles look the same as moving ones.
 
     Raises:
-        InputError: The drive is longer than ``MOST_SECONDS``.
+        InputError: The drive is longer than ``MOST_SECONDS``, or the edition is unknown.
     """
     if (
         options.seconds <= 0
@@ -83,6 +85,7 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
         props=_props(rng, net, houses, traffic.footprints()),
         light=_light(rng),
         seed=seed,
+        edition=options.edition,
     )
 
 

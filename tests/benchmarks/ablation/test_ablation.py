@@ -1,50 +1,37 @@
 """The ablation: what its variants change, and means against all parts."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
+from tests.scene.scenes import make_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 from ablation import errors as errors_module
-from ablation import groups, variants
+from ablation import features, groups
 from ablation import main as ablation
 from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
 from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
-
-PARTS = ("features", "representation", "vote", "errors")
-
-
-@dataclass(frozen=True)
-class SimpleSeeds:
-    features: torch.Tensor
-
-
-@dataclass(frozen=True)
-class SimpleStart:
-    seeds: SimpleSeeds
+from dreamdrive.scene.features import OF_GEOMETRY
+from street import methods
 
 
 def test_each_variant_changes_something_of_its_own_and_hybrid_nothing() -> None:
-    def same(variant) -> bool:
-        options = asdict(variant.change(ablation.QUALITY)) == asdict(ablation.QUALITY)
-        options &= variant.vote is variants.own_vote and variant.errors is variants.own_errors
-        return options and variant.features == "all" and variant.representation == "hybrid"
-
-    assert [name for name, variant in ablation.VARIANTS.items() if same(variant)] == ["hybrid"]
-    everything = [
-        (asdict(variant.change(ablation.QUALITY)), *(getattr(variant, name) for name in PARTS))
-        for variant in ablation.VARIANTS.values()
-    ]
-    assert all(everything.count(one) == 1 for one in everything)
+    everything = {
+        name: (asdict(variant.change(methods.QUALITY)), dict(variant.around))
+        for name, variant in ablation.VARIANTS.items()
+    }
+    untouched = (asdict(methods.QUALITY), {})
+    assert [name for name, what in everything.items() if what == untouched] == ["hybrid"]
+    assert all(list(everything.values()).count(what) == 1 for what in everything.values())
 
 
 def test_all_steps_are_equal() -> None:
-    steps = {variant.change(ablation.QUALITY).fit.steps for variant in ablation.VARIANTS.values()}
-    assert steps == {ablation.QUALITY.fit.steps}
+    steps = {variant.change(methods.QUALITY).fit.steps for variant in ablation.VARIANTS.values()}
+    assert steps == {methods.QUALITY.fit.steps}
 
 
 def test_every_fit_has_a_file_of_its_own() -> None:
@@ -71,17 +58,17 @@ def test_changes_are_world_by_world() -> None:
 
 
 def test_features_are_cut_as_each_variant_says() -> None:
-    features = torch.arange(1.0, 13).reshape(2, 6)
-    begin = SimpleStart(SimpleSeeds(features))
-    seen = {
-        name: ablation.begun(begin, variants.Variant("", features=name), None).seeds.features
-        for name in ("all", "evidence", "appearance", "none")
-    }
-    assert (seen["all"] == features).all()
-    assert (seen["evidence"] + seen["appearance"] == features).all()
-    assert (seen["evidence"][:, 2:] == 0).all()
-    assert (seen["evidence"][:, :2] != 0).all()
-    assert (seen["none"] == 0).all()
+    channels = torch.arange(1.0, 2 * (OF_GEOMETRY + 4) + 1).reshape(2, -1)
+    seeds = make_scene().static.select(torch.arange(2))
+    seeds = replace(seeds, features=channels)
+    evidence, appearance, nothing = (
+        cut({}, methods.QUALITY, lambda: seeds).features
+        for cut in (features.with_evidence, features.with_appearance, features.without_features)
+    )
+    assert (evidence + appearance == channels).all()
+    assert (evidence[:, OF_GEOMETRY:] == 0).all()
+    assert (evidence[:, :OF_GEOMETRY] != 0).all()
+    assert (nothing == 0).all()
 
 
 def two_cars(rng: np.random.Generator, per_frame: int) -> tuple[np.ndarray, np.ndarray]:
@@ -130,8 +117,8 @@ def test_space_time_does_not_count_withheld_frames() -> None:
     seeds = SimpleNamespace(
         means=torch.zeros(3, 3), source_frame=torch.tensor([0, 2, 3]), features=torch.ones(3, 2)
     )
-    begin = SimpleNamespace(seeds=seeds, clip=SimpleNamespace(held_out=np.array([False, True, False, False])))
-    found = groups.space_time(begin, np.array([0.1, 0.5, 0.9]), np.array([0, 1, 2]))
+    clip = SimpleNamespace(held_out=np.array([False, True, False, False]))
+    found = groups.space_time(clip, seeds, np.array([0.1, 0.5, 0.9]), np.array([0, 1, 2]))
     np.testing.assert_allclose(found[:, 3], [0, 1, 2])
     np.testing.assert_allclose(found[:, 4], [0.2, 1.0, 1.8])
 
@@ -150,8 +137,8 @@ def test_every_error_is_largest_where_things_move(name: str) -> None:
     clip, geometry = street_clip(street, hold_out=8), true_geometry(street)
     seeds = initialise(clip, geometry, SeedOptions())
     fitted = fit_static(clip, geometry, seeds, FitOptions(steps=40), 0, lambda *_: None)
-    begin = SimpleNamespace(clip=clip, geometry=geometry, seeds=seeds, static=fitted)
-    errors = getattr(errors_module, name)(begin, None)
+    before = {"prior": clip, "geometry": geometry, "initialise": seeds, "static": fitted}
+    errors = getattr(errors_module, name)(before, methods.QUALITY)
     seen = ~clip.held_out
     assert (errors >= 0).all()
     assert (errors <= 1).all()

@@ -13,7 +13,8 @@ from tests.scene.scenes import make_scene
 
 from common import keep
 from common.report import as_json
-from street import consistency, renderer
+from dreamdrive.options import Options
+from street import consistency, methods, renderer
 from street import fit as fits
 from street import jobs as jobs_of
 from street import main as street
@@ -29,7 +30,7 @@ def test_quick_is_two_worlds_one_geometry_three_representations() -> None:
     wanted = list(street.jobs(options("--quick")))
     assert {job.case.seed for job in wanted} == {0, 1}
     assert {job.case.geometry for job in wanted} == {"true"}
-    assert len({job.representation for job in wanted}) == 3
+    assert len({job.method for job in wanted}) == 3
     assert len(wanted) == 2 * 3 * 2
 
 
@@ -48,22 +49,22 @@ def test_a_full_run_has_every_row_once_the_most_telling_first() -> None:
         "five_times-true-corrupted",
     ]
     assert len([job for job in wanted if job.budget == "equal_steps"]) == 5 * 8 * 5
-    assert all(job.representation != "hybrid" for job in wanted if job.budget != "equal_steps")
+    assert all(job.method != "hybrid" for job in wanted if job.budget != "equal_steps")
 
 
 def test_steps_at_equal_time_follow_from_both_timed_now(monkeypatch: pytest.MonkeyPatch) -> None:
-    quality = jobs_of.QUALITY
+    wanted = methods.options_of("hexplane")
     asked: list[tuple[str, int]] = []
     costs = {"hybrid": fits.Cost(30, 5.0, 0.1, 1), "hexplane": fits.Cost(30, 8.0, 0.25, 1)}
 
-    def timed(begin: None, representation: str, given) -> object:
-        asked.append((representation, given.fit.steps))
-        return fits.Fitted(None, costs.get(representation))
+    def timed(begin: None, given: Options) -> object:
+        asked.append((given.representation, given.fit.steps))
+        return fits.Fitted(None, costs.get(given.representation))
 
     monkeypatch.setattr(fits, "fit_case", timed)
-    plan = fits.equal_time(None, "hexplane", quality)
+    plan = fits.equal_time(None, wanted)
     # Hybrid: 2 s once and 0.1 s a step; hexplane: half a second once and 0.25 s a step.
-    whole = 2 + 0.1 * quality.fit.steps
+    whole = 2 + 0.1 * wanted.fit.steps
     assert asked[1:] == [("hybrid", fits.PROBE_STEPS), ("hexplane", fits.PROBE_STEPS)]
     assert plan["hybrid_s"] == pytest.approx(whole)
     assert plan["steps"] == pytest.approx((whole - 0.5) / 0.25, abs=0.5)
@@ -83,21 +84,52 @@ def test_a_fit_of_other_options_counts_as_not_there(
 ) -> None:
     given = options("--runs", str(tmp_path), "--resume")
     toolbox = street.Toolbox()
-    wanted = {
-        (job.representation, job.budget): job for job in street.jobs(given) if job.case.name == "0-true-clean"
-    }
+    wanted = {(job.method, job.budget): job for job in street.jobs(given) if job.case.name == "0-true-clean"}
     for job in wanted.values():
         keep.save(job.result, job.key(toolbox), {}, {})
     assert all(street.is_done(job, toolbox) for job in wanted.values())
-    score = replace(keys.QUALITY.score, steps=7)
-    monkeypatch.setattr(keys, "QUALITY", replace(keys.QUALITY, score=score))
-    street.clear(list(wanted.values()), given, toolbox)
-    # Scores are hybrid's alone, and of what is fitted in the time of hybrid.
-    left = {name for name, job in wanted.items() if job.result.exists()}
-    assert left == {(name, "equal_steps") for name in street.REPRESENTATIONS if name != "hybrid"}
-    monkeypatch.setattr(keys, "QUALITY", replace(keys.QUALITY, fit=replace(keys.QUALITY.fit, steps=7)))
+    score = replace(methods.QUALITY.score, steps=7)
+    monkeypatch.setattr(methods, "QUALITY", replace(methods.QUALITY, score=score))
     street.clear(list(wanted.values()), given, toolbox)
     assert not any(job.result.exists() for job in wanted.values())
+
+
+def test_a_fit_of_another_program_counts_as_not_there(
+    keys: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = next(iter(street.jobs(options())))
+    before = job.fit_key
+    monkeypatch.setattr(fits, "program_digest", lambda: "another")
+    assert job.fit_key != before
+
+
+def test_methods_differ_and_take_equal_steps() -> None:
+    every = [methods.options_of(name) for name in methods.METHODS]
+    assert len({fits.key_of("case", each) for each in every}) == len(every)
+    assert {(each.static.steps, each.fit.steps) for each in every} == {
+        (methods.QUALITY.static.steps, methods.QUALITY.fit.steps)
+    }
+    planes = methods.options_of("hexplane-4x32").motion
+    assert (planes.levels, planes.features) == (4, 32)
+
+
+def test_worlds_of_two_sets_have_no_mean(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        options("--seeds", "0", "1000")
+    assert "worlds of several sets: development, test" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="several sets"):
+        street.summary([record(seed, "hybrid", 20.0) for seed in (7, 1000)], {}, {})
+    assert options("--worlds", "test").seeds == list(range(1000, 1016))
+
+
+def test_means_are_over_the_worlds_that_all_rows_have() -> None:
+    records = [record(seed, "hybrid", 20.0 + seed) for seed in range(3)]
+    records += [record(seed, "static", 19.0 + seed) for seed in (0, 2)]
+    found = street.summary(records, {}, {})
+    (table,) = found["tables"]
+    assert table["worlds"] == [0, 2]
+    assert [row["held_out_psnr"] for row in table["means"]] == pytest.approx([21, 20])
+    assert "these development worlds: 0, 2." in street.markdown({"tables": [table]})
 
 
 def test_other_views_are_measured_again_and_not_fitted_again(
@@ -175,7 +207,7 @@ def test_the_recording_follows_the_fits_at_equal_steps(monkeypatch: pytest.Monke
     monkeypatch.setattr(jobs_of, "recording", lambda: Path("clip"))
     given = options()
     clips = jobs_of.recorded(given)
-    assert [job.representation for job in clips] == list(street.REPRESENTATIONS)
+    assert [job.method for job in clips] == list(street.REPRESENTATIONS)
     everything = jobs_of.in_order(list(street.jobs(given)), clips)
     places = [number for number, job in enumerate(everything) if job in clips]
     assert places == list(range(5 * 8 * 5, 5 * 8 * 5 + 5))
@@ -248,7 +280,7 @@ def test_the_grid_has_a_head_and_a_column_for_each_representation_there_is(
 def test_the_report_of_a_full_run_is_small_enough_to_commit() -> None:
     records = [
         {
-            **record(0, job.representation, 21.123456789),
+            **record(0, job.method, 21.123456789),
             "consistency": {"a": dict.fromkeys(range(27), 1 / 3)},
         }
         for job in street.jobs(options())

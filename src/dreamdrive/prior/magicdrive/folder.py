@@ -13,9 +13,9 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
-from dreamdrive.machine import best_device
 from dreamdrive.models import check_sizes, fill, read_state, sha256
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
@@ -101,7 +101,7 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
         check_sizes(config, f"--weights {folder / part / _PARTS[part][0]}")
     settings = read_settings(configs["unet"], configs["controlnet"])
     _check_variant(settings, temporal)
-    device = device or best_device()
+    device = device or chosen_device()
     dtype = torch.float16 if device.type == "cuda" else torch.float32
     with torch.device("meta"):
         unet = _built("unet", lambda: multiview_unet(configs["unet"], settings))

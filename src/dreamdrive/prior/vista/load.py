@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from dreamdrive.machine import best_device, free_bytes
+from dreamdrive.device import chosen_device
+from dreamdrive.machine import free_bytes
 from dreamdrive.prior.vista.kinds import Kind
 from dreamdrive.prior.vista.memory import Free, Job, check_memory
 from dreamdrive.prior.vista.networks import Networks
@@ -15,7 +16,7 @@ def open_networks(weights: Path, kind: Kind | None) -> Networks:
     Raises:
         InputError: The weights cannot be used.
     """
-    device = best_device()
+    device = chosen_device()
     return Networks(open_weights(weights, kind), device, half=device.type == "cuda")
 
 

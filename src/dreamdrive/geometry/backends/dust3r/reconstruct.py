@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align import (
     Aligned,
@@ -34,7 +35,6 @@ from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mas
 from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.moving import FLAGGED
-from dreamdrive.machine import best_device
 from dreamdrive.progress import Progress, Work
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -93,7 +93,7 @@ def reconstruct(
 
 def _seen(clip: Clip, weights: Path, progress: Progress) -> tuple[PairMaps, Fitting]:
     """What the network says of pairs of frames; it is gone from memory afterwards."""
-    device = best_device()
+    device = chosen_device()
     network = load_dust3r(weights, bfloat16=device.type == "cuda").to(device)
     how = fitting(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]

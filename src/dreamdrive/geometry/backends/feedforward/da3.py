@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from torch import nn
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
@@ -18,7 +19,6 @@ from dreamdrive.geometry.backends.feedforward.pictures import standardise
 from dreamdrive.geometry.backends.feedforward.poses import world_from_camera
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
-from dreamdrive.machine import best_device
 
 EXPECTED = (
     "the hub's folder of a Depth Anything 3 model (config.json, model.safetensors), such as "
@@ -75,7 +75,7 @@ def _make(config: Any, name: str) -> nn.Module:
 
 
 def _look(network: nn.Module, views: Views) -> Seen:
-    out = network(standardise(views.pictures).to(best_device())[None])
+    out = network(standardise(views.pictures).to(chosen_device())[None])
     return Seen(
         world_from_camera=world_from_camera(out["extrinsics"][0]),
         intrinsics=out["intrinsics"][0].cpu().numpy().astype(np.float64),

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from torch import Tensor, nn
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
-from dreamdrive.machine import best_device
 from dreamdrive.models import as_state, check_sizes, fill, read_state, read_torch
 
 Upstream = TypeVar("Upstream", bound=nn.Module)
@@ -96,4 +96,4 @@ def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]
             f"{stored.source}: the installed package does not build this network "
             f"({type(error).__name__}: {error}); expected {stored.expected}"
         ) from error
-    return fill(network, state, stored.source, stored.expected).to(best_device())
+    return fill(network, state, stored.source, stored.expected).to(chosen_device())

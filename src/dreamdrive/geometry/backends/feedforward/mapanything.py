@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
@@ -20,7 +21,6 @@ from dreamdrive.geometry.backends.feedforward.pictures import standardise
 from dreamdrive.geometry.backends.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
-from dreamdrive.machine import best_device
 
 EXPECTED = (
     "the hub's folder of a MapAnything model (config.json, model.safetensors), such as "
@@ -91,14 +91,14 @@ def _shown(views: Views) -> list[dict[str, Any]]:
     if views.camera is not None:
         matrix = views.camera.matrix
         matrix[:2, 2] -= 0.5
-        known["intrinsics"] = torch.from_numpy(matrix).float()[None].to(best_device())
+        known["intrinsics"] = torch.from_numpy(matrix).float()[None].to(chosen_device())
     shown = [
-        {"img": picture[None].to(best_device()), "data_norm_type": [_NORMALISED], **known}
+        {"img": picture[None].to(chosen_device()), "data_norm_type": [_NORMALISED], **known}
         for picture in standardise(views.pictures)
     ]
     if views.world_from_camera is not None:
-        poses = torch.from_numpy(views.world_from_camera).float().to(best_device())
-        metric = torch.tensor([views.metric], device=best_device())
+        poses = torch.from_numpy(views.world_from_camera).float().to(chosen_device())
+        metric = torch.tensor([views.metric], device=chosen_device())
         for table, pose in zip(shown, poses, strict=True):
             table |= {"camera_poses": pose[None], "is_metric_scale": metric}
     return shown

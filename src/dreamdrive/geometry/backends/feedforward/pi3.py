@@ -12,13 +12,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from dreamdrive.device import chosen_device
 from dreamdrive.geometry.backends.dust3r.align import robust_px
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.poses import nearest_rigid
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
-from dreamdrive.machine import best_device
 from dreamdrive.scene.camera import Camera
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
@@ -44,7 +44,7 @@ def load_pi3(path: Path) -> Network:
 
 
 def _look(network: nn.Module, conditioned: bool, views: Views) -> Seen:
-    pictures = views.pictures.to(best_device())[None]
+    pictures = views.pictures.to(chosen_device())[None]
     out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
     known = views.camera if conditioned else None
     points = out["local_points"][0].cpu().numpy()
@@ -64,9 +64,9 @@ def _conditions(views: Views) -> dict[str, Tensor]:
         return {}
     count = len(views.pictures)
     matrices = torch.from_numpy(views.camera.matrix).float().expand(count, 3, 3)
-    known = {"intrinsics": matrices[None].to(best_device())}
+    known = {"intrinsics": matrices[None].to(chosen_device())}
     if views.world_from_camera is not None:
-        known["poses"] = torch.from_numpy(views.world_from_camera).float()[None].to(best_device())
+        known["poses"] = torch.from_numpy(views.world_from_camera).float()[None].to(chosen_device())
     return known
 
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from torch import nn
 
+from dreamdrive.device import chosen_device
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.poses import world_from_camera
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
-from dreamdrive.machine import best_device
 
 EXPECTED = "VGGT's model.safetensors or model.pt or their folder, such as facebook/VGGT-1B"
 INSTALL = "pip install --no-deps git+https://github.com/facebookresearch/vggt, then pip install einops"
@@ -43,7 +43,7 @@ def load_vggt(path: Path) -> Network:
 
 
 def _look(network: nn.Module, encoding: Any, views: Views) -> Seen:
-    out = network(views.pictures.to(best_device())[None])
+    out = network(views.pictures.to(chosen_device())[None])
     size = tuple(views.pictures.shape[-2:])
     camera_from_world, intrinsics = encoding.pose_encoding_to_extri_intri(out["pose_enc"], size)
     return Seen(

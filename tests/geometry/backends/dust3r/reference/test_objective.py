@@ -132,8 +132,8 @@ def test_rates_fall_from_the_first_to_the_last(schedule: Schedule) -> None:
         descend(_Sum(), each, steps, schedule=schedule, of=10, rate=0.1, last_rate=0.01)
     t = np.arange(10) / 10
     rate = 0.01 + 0.09 * ((1 + np.cos(np.pi * t)) / 2 if schedule == "cosine" else 1 - t)
-    assert 5 - float(start.im_focals) == pytest.approx(rate.sum(), rel=1e-5)
-    assert 5 - float(half.im_focals) == pytest.approx(rate[:5].sum(), rel=1e-5)
+    assert 5 - start.im_focals.item() == pytest.approx(rate.sum(), rel=1e-5)
+    assert 5 - half.im_focals.item() == pytest.approx(rate[:5].sum(), rel=1e-5)
 
 
 class _Sum(Objective):
