@@ -11,14 +11,17 @@ _HEAD, _CLIP_HEAD = 64, 80
 """Widths of an attention head in the UNet and in the image encoder, which no weight tells."""
 
 
-def config_of(part: Part, shapes: Shapes) -> dict[str, Any]:
+def config_of(part: Part, shapes: Shapes, head: int = _HEAD) -> dict[str, Any]:
     """The configuration of a part from its tensors by the names of diffusers and transformers.
+
+    ``head`` is the width of an attention head in the UNet.
 
     Raises:
         KeyError: Tensors that tell the size are missing.
     """
-    makes = {"unet": _unet, "vae": _autoencoder, "image_encoder": _image_encoder}
-    return makes[part](shapes)
+    if part == "unet":
+        return _unet(shapes, head)
+    return _autoencoder(shapes) if part == "vae" else _image_encoder(shapes)
 
 
 def _levels(shapes: Shapes, prefix: str) -> int:
@@ -27,7 +30,7 @@ def _levels(shapes: Shapes, prefix: str) -> int:
     )
 
 
-def _unet(shapes: Shapes) -> dict[str, Any]:
+def _unet(shapes: Shapes, head: int) -> dict[str, Any]:
     levels = _levels(shapes, "down_blocks.")
     widths = [shapes[f"down_blocks.{i}.resnets.0.spatial_res_block.conv1.weight"][0] for i in range(levels)]
     attends = [any(key.startswith(f"down_blocks.{i}.attentions.") for key in shapes) for i in range(levels)]
@@ -43,7 +46,7 @@ def _unet(shapes: Shapes) -> dict[str, Any]:
         "layers_per_block": _levels(shapes, "down_blocks.0.resnets."),
         "transformer_layers_per_block": _levels(shapes, "mid_block.attentions.0.transformer_blocks."),
         "cross_attention_dim": context,
-        "num_attention_heads": [width // _HEAD for width in widths],
+        "num_attention_heads": [width // head for width in widths],
         "addition_time_embed_dim": ids // 3,
         "projection_class_embeddings_input_dim": ids,
         "num_frames": 25,
