@@ -12,7 +12,6 @@ from tests.data.pictures import texture
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import read_features
-from dreamdrive.prior import vista
 from dreamdrive.prior.vista import features
 from dreamdrive.scene.action import Command
 
@@ -76,7 +75,7 @@ def test_features_of_a_recording_are_written(
         seen.update(more, options=options, frames=frames)
         return features.VideoFeatures("vista:one", np.ones((len(frames), 2, 4, 3), np.float16), ("so",))
 
-    monkeypatch.setattr(vista, "video_features", look)
+    monkeypatch.setattr(features, "video_features", look)
     (tmp_path / "weights").mkdir()
     (tmp_path / "drive").mkdir()
     for index in range(3):

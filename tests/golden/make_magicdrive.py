@@ -13,10 +13,11 @@ from torch import Tensor
 
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock
 from dreamdrive.prior.magicdrive.boxes import box_corners
+from dreamdrive.prior.magicdrive.condition import Conditions
 from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_settings
 from dreamdrive.prior.magicdrive.embed import MapEncoder, fourier
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet
-from dreamdrive.prior.magicdrive.sample import Conditions, sample, unipc
+from dreamdrive.prior.magicdrive.sample import sample, unipc
 from dreamdrive.world.mesh import upright
 
 SCHEDULER = {"num_train_timesteps": 1000, "beta_start": 0.00085, "beta_end": 0.012}

@@ -13,7 +13,7 @@ from tests.prior.tiny_pipelines import write_cosmos
 from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import choose_prior, cosmos
-from dreamdrive.prior.relative_poses import relative_poses
+from dreamdrive.prior.cosmos import relative_poses
 from dreamdrive.scene.action import Command
 from dreamdrive.scene.control import Control
 

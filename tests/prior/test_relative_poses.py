@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.prior.paths import circle
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.relative_poses import PER_METRE, relative_poses
+from dreamdrive.prior.cosmos import PER_METRE, relative_poses
 
 
 def accumulated(rows: np.ndarray) -> np.ndarray:

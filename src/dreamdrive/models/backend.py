@@ -36,19 +36,15 @@ class Backend:
         return f"the package {self.package} is missing: {self.install}"
 
     def check_start(self, stage: str, weights: Path | None) -> None:
-        """Whether it could start.
-
-        Args:
-            stage: Which stage it does, for messages.
-            weights: The given file or folder.
+        """Whether it could start; ``stage`` is which one it does, for messages.
 
         Raises:
             InputError: Weights or the package are missing, or weights are given to what has no network.
         """
-        if self.weights is None:
-            if weights is not None:
-                raise InputError(f"{stage} {self.name} has no network and takes no weights; got {weights}")
+        if self.weights is None and weights is None:
             return
+        if self.weights is None:
+            raise InputError(f"{stage} {self.name} has no network and takes no weights; got {weights}")
         if weights is None:
             raise InputError(
                 f"{stage} {self.name} needs --weights PATH, {self.weights} (licence: {self.licence})"

@@ -1,4 +1,7 @@
-"""Weights from a file into a network, or a message that says what is wrong with the file."""
+"""Weights from a file into a network, or a message that says what is wrong with the file.
+
+In messages ``source`` or ``where`` is where something was read, and ``expected`` which file is expected.
+"""
 
 import hashlib
 import os
@@ -31,23 +34,18 @@ _WIDEST, _DEEPEST = 65_536, 1000
 _LAYERS = re.compile("layers|depth|blocks_num|num_blocks")
 _STRETCHED = 1_000_000
 """Numbers that a tensor may show although fewer are stored."""
+_BUILDING = (TypeError, ValueError, AttributeError, LookupError, OverflowError, MemoryError, AssertionError)
+"""What a damaged pickle raises, which builds what its classes do not take."""
+_READING = (RuntimeError, pickle.UnpicklingError, zipfile.BadZipFile, EOFError, OSError, struct.error)
 _REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
 def load_network(
-    make: Callable[[], Network],
-    path: Path,
-    expected: str,
-    *,
-    ignored: tuple[str, ...] = (),
+    make: Callable[[], Network], path: Path, expected: str, *, ignored: tuple[str, ...] = ()
 ) -> Network:
-    """Build a network and fill it from a state dict on disk, for inference.
+    """Build a network and fill it from a state dict of its own keys on disk, for inference.
 
-    Args:
-        make: Builds the network.
-        path: A file with a state dict of the network's own keys; nothing else in it is ever executed.
-        expected: Which file is expected, for messages.
-        ignored: Beginnings of keys of parts that are not used.
+    Keys that begin as one of ``ignored`` are of parts that are not used. Nothing in the file is executed.
 
     Raises:
         InputError: The file is missing, unreadable or holds something else.
@@ -61,14 +59,8 @@ def fill_network(
 ) -> Network:
     """Build a network from a state dict of its keys, for inference in float32.
 
-    Args:
-        make: Builds the network.
-        state: Tensors by key; counters of batches may be missing.
-        source: Where the tensors come from, for messages.
-        expected: Which file is expected, for messages.
-
     Raises:
-        InputError: Keys are missing or left over, or shapes differ.
+        InputError: See ``fill``; or no network is of such sizes.
     """
     try:
         with torch.device("meta"):
@@ -81,13 +73,9 @@ def fill_network(
 
 
 def fill(network: Network, state: dict[str, Tensor], source: str, expected: str) -> Network:
-    """Fill a network that is already built, for inference in float32.
+    """Put weights in place of those of a network that is already built, for inference in float32.
 
-    Args:
-        network: The network; its parameters and buffers are replaced.
-        state: Tensors by key; counters of batches may be missing, and all but one name of a shared tensor.
-        source: Where the tensors come from, for messages.
-        expected: Which file is expected, for messages.
+    Of the keys, counters of batches may be missing, and all but one name of a shared tensor.
 
     Raises:
         InputError: Keys are missing or left over, shapes or types differ, or numbers are not finite.
@@ -123,13 +111,8 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
 def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
     """What ``torch.save`` wrote, if it consists of tensors, plain values and the allowed classes.
 
-    Args:
-        path: The file; nothing in it is ever executed.
-        expected: Which file is expected, for messages.
-        allowed: Further classes that objects in the file may have.
-
     Raises:
-        InputError: The file is missing or unreadable, or holds objects of other classes.
+        InputError: The file is missing or unreadable, or holds objects of other classes; none is executed.
     """
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {expected}")
@@ -138,24 +121,7 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
         with warnings.catch_warnings(), torch.serialization.safe_globals(list(allowed)):
             warnings.simplefilter("ignore", UserWarning)  # of TorchScript, which then fails
             return torch.load(path, map_location="cpu", weights_only=True)
-    except (
-        RuntimeError,
-        pickle.UnpicklingError,
-        zipfile.BadZipFile,
-        EOFError,
-        OSError,
-        ValueError,
-        KeyError,
-        # A damaged pickle builds what its classes do not take.
-        TypeError,
-        AttributeError,
-        IndexError,
-        OverflowError,
-        MemoryError,
-        AssertionError,
-        NotImplementedError,
-        struct.error,
-    ) as error:
+    except (*_READING, *_BUILDING) as error:
         refused = _REFUSED.search(str(error))
         about = f"; it asks for {refused.group(1)}, which is not executed" if refused else ""
         about = f"; {briefly(error)}" if isinstance(error, zipfile.BadZipFile) else about
@@ -166,12 +132,7 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
 
 
 def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
-    """A state dict, if that is what ``content`` is.
-
-    Args:
-        content: What was read.
-        source: Where it comes from, for messages.
-        expected: Which file is expected, for messages.
+    """A state dict, if that is what was read.
 
     Raises:
         InputError: It is something else.
@@ -187,14 +148,19 @@ def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
 def check_sizes(values: object, where: str) -> None:
     """Whether whole numbers in a configuration are sizes that networks have, before one is built of them.
 
-    Args:
-        values: JSON values.
-        where: Where they come from, for messages.
-
     Raises:
         InputError: One is larger; of layers and depths there may be fewer.
     """
-    _check_sizes(values, where, "", _WIDEST)
+    waiting: list[tuple[object, str, int]] = [(values, "", _WIDEST)]
+    while waiting:
+        value, name, limit = waiting.pop()
+        if isinstance(value, dict):
+            for key, each in cast("dict[str, object]", value).items():
+                waiting.append((each, key, _DEEPEST if _LAYERS.search(key) else _WIDEST))
+        elif isinstance(value, list):
+            waiting += [(each, name, limit) for each in cast("list[object]", value)]
+        elif isinstance(value, int) and abs(value) > limit:
+            raise InputError(f"{where}: {name} is {value}; expected at most {limit}")
 
 
 def sha256(path: Path) -> str:
@@ -208,17 +174,6 @@ def sha256(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
-
-
-def _check_sizes(values: object, where: str, name: str, limit: int) -> None:
-    if isinstance(values, dict):
-        for key, value in cast("dict[str, object]", values).items():
-            _check_sizes(value, where, key, _DEEPEST if _LAYERS.search(key) else _WIDEST)
-    elif isinstance(values, list):
-        for value in cast("list[object]", values):
-            _check_sizes(value, where, name, limit)
-    elif isinstance(values, int) and abs(values) > limit:
-        raise InputError(f"{where}: {name} is {values}; expected at most {limit}")
 
 
 def _check_archive(path: Path) -> None:
@@ -283,12 +238,7 @@ def _shared(wanted: dict[str, Tensor], state: dict[str, Tensor]) -> dict[str, Te
 
 
 def misfits(wanted: Mapping[str, Sequence[int]], given: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
-    """What is wrong with tensors, by what it is; empty where they are those of the network.
-
-    Args:
-        wanted: Shapes of the network's tensors, by key.
-        given: Shapes of those that are there.
-    """
+    """What is wrong with shapes of tensors by key, by what it is; empty where all are as wanted."""
     found = {
         "missing": sorted(set(wanted) - set(given)),
         "unknown": sorted(set(given) - set(wanted)),

@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation
 
@@ -14,16 +15,12 @@ _STANDING_M_S = 0.05
 
 
 def path_of(action: Waypoints | Steering, times_s: Float[np.ndarray, " t"]) -> Trajectory:
-    """The path of the camera at some times, the first of them 0, on a level road.
+    """The path of the camera at increasing times, the first of them 0, on a level road.
 
     Waypoints are joined by cubic pieces that do not overshoot (Fritsch and Carlson 1980), from a start
     straight ahead, and the camera looks along the path. Speed and turn run the same way between their four
     values; the first of them holds before it. What was asked for last goes on: the velocity of waypoints,
     speed and turn of steering.
-
-    Args:
-        action: Where to go.
-        times_s: Times (T,), increasing from 0.
 
     Raises:
         ValueError: The times do not start at 0.
@@ -61,16 +58,11 @@ def _steered(action: Steering, times_s: np.ndarray) -> Float[np.ndarray, "t 4 4"
     curve = PchipInterpolator(knots, np.vstack([steered[:1], steered]))
     fine = np.linspace(0.0, times_s[-1], max(2, int(np.ceil(times_s[-1] * _STEPS_A_SECOND)) + 1))
     speed, per_m = curve(np.minimum(fine, AT_S[-1])).T
-    left_rad = _integral(speed * per_m, fine)
+    left_rad = cumulative_trapezoid(speed * per_m, fine, initial=0)
     velocity = speed[:, None] * np.column_stack([-np.sin(left_rad), np.cos(left_rad)])
-    at = np.column_stack([_integral(velocity[:, axis], fine) for axis in range(2)])
-    columns = [np.interp(times_s, fine, values) for values in (at[:, 0], at[:, 1], left_rad)]
-    return _poses(np.column_stack(columns[:2]), columns[2])
-
-
-def _integral(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(times_s)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    at = cumulative_trapezoid(velocity, fine, axis=0, initial=0)
+    right, ahead, left = (np.interp(times_s, fine, values) for values in (*at.T, left_rad))
+    return _poses(np.column_stack([right, ahead]), left)
 
 
 def _poses(at_m: Float[np.ndarray, "t 2"], left_rad: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t 4 4"]:

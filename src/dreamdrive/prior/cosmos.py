@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
-from dreamdrive.prior.diffusers_pipeline import PROMPT, Wanted, make_clip, photo_of, wanted_frames
+from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.path_to_action import from_first
 from dreamdrive.prior.protocol import Prior
-from dreamdrive.prior.relative_poses import relative_poses
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
@@ -34,6 +33,8 @@ TIERS: dict[tuple[int, int], int] = {
     **dict.fromkeys([(1280, 720), (1104, 832), (960, 960)], 720),
 }
 """The sizes that the model was trained for, by width and height, with the tier that names each to it."""
+PER_METRE = 1.35
+"""Units of Cosmos' translations in a metre, as in NVIDIA's public examples of the domain ``av``."""
 _FLOW_SHIFT = 10.0
 _A_LATENT = 4
 """Frames that the model holds in one latent, after the first."""
@@ -49,8 +50,7 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
         InputError: The photo, the path, the size or the weights cannot be used.
     """
     path = _path(control)
-    size, wanted = _size(control), _wanted(control)
-    count = wanted.count
+    size, (count, index) = _size(control), _wanted(control)
     rows = relative_poses(path, count - 1, RATE_HZ)
     photo = photo_of(control, size, "cosmos")
     pipeline = _load(control)
@@ -59,13 +59,13 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
         pipeline,
         steps,
         progress,
+        seed=control.seed,
         prompt=control.prompt or PROMPT,
         action=_condition(photo.rgb, rows, TIERS[size]),
         fps=RATE_HZ,
         guidance_scale=1.0,
         use_system_prompt=False,
         enable_safety_check=False,
-        generator=diffusers_pipeline.generator(control.seed),
     )
     times_s = np.arange(count) / RATE_HZ
     provenance = {
@@ -80,9 +80,8 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
             "NVIDIA's guardrail, which checks prompt and frames, was off.",
         ],
     }
-    return make_clip(
-        control, wanted, photo, made.video, RATE_HZ, provenance, Trajectory(path.at(times_s), times_s)
-    )
+    asked = Trajectory(path.at(times_s), times_s)
+    return make_clip(control, (count, index), photo, made.video, RATE_HZ, provenance, asked)
 
 
 def _path(control: Control) -> Trajectory:
@@ -101,15 +100,34 @@ def _size(control: Control) -> tuple[int, int]:
     return size
 
 
-def _wanted(control: Control) -> Wanted:
-    wanted = wanted_frames(control, FRAMES)
-    count = wanted.count
+def _wanted(control: Control) -> tuple[int, Int[np.ndarray, " f"]]:
+    count, index = wanted_frames(control, FRAMES)
     if not 1 < count <= FRAMES or (count - 1) % _A_LATENT:
         raise InputError(
             f"--frames {control.frames}: Cosmos 3 makes {_A_LATENT}n + 1 frames, at most {FRAMES}; "
             "choose such a STOP"
         )
-    return wanted
+    return count, index
+
+
+def relative_poses(path: Trajectory, steps: int, rate_hz: float) -> Float[np.ndarray, "n 9"]:
+    """The first steps of a path; positions are linear between its poses, rotations slerped.
+
+    Row i holds ``inv(T_i) @ T_(i+1)``, camera to world with x right, y down, z ahead: the translation in
+    metres times ``PER_METRE``, then the first and the second column of the rotation (Zhou et al. 2019).
+
+    Raises:
+        InputError: The path is shorter than that.
+    """
+    length_s, wanted_s = float(path.times_s[-1] - path.times_s[0]), steps / rate_hz
+    if length_s < wanted_s - 1e-6:
+        raise InputError(
+            f"trajectory: it lasts {length_s:.3g} s; expected at least {wanted_s:.3g} s "
+            f"({steps + 1} frames at {rate_hz:g} Hz)"
+        )
+    poses = path.at(path.times_s[0] + np.arange(steps + 1) / rate_hz)
+    step = np.linalg.inv(poses[:-1]) @ poses[1:]
+    return np.concatenate([PER_METRE * step[:, :3, 3], step[:, :3, 0], step[:, :3, 1]], axis=1)
 
 
 def _load(control: Control) -> Any:

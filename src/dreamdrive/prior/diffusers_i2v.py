@@ -34,20 +34,11 @@ _SMALLEST_STEP_PX = 16
 
 @dataclass(frozen=True)
 class Kind:
-    """A class of pipelines.
-
-    Attributes:
-        make: The class itself.
-        defaults: Its arguments with their defaults.
-    """
+    """A class of pipelines, and its arguments with their defaults."""
 
     make: Any
     defaults: Mapping[str, Any]
-
-    @property
-    def name(self) -> str:
-        """Its name in diffusers."""
-        return str(self.make.__name__)
+    name: str
 
 
 def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
@@ -72,9 +63,9 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
         pipeline,
         steps,
         progress,
+        seed=control.seed,
         image=Image.fromarray(photo.rgb),
-        num_frames=wanted.count,
-        generator=diffusers_pipeline.generator(control.seed),
+        num_frames=wanted[0],
         **given,
     )
     provenance = {
@@ -125,7 +116,7 @@ def find_kind(folder: Path) -> Kind:
     # These pipelines clean their prompt with ftfy, and fail where it is not there.
     if hasattr(sys.modules[made.__module__], "is_ftfy_available") and find_spec("ftfy") is None:
         raise InputError(f"{name} needs the package ftfy: pip install ftfy")
-    return Kind(made, {each.name: each.default for each in parameters.values()})
+    return Kind(made, {each.name: each.default for each in parameters.values()}, name)
 
 
 def _arguments(kind: Kind, control: Control, rate_hz: float) -> dict[str, Any]:

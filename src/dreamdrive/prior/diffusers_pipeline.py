@@ -1,6 +1,5 @@
 """What all pipelines of diffusers have in common: how they are loaded, and how their video becomes a clip."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +43,10 @@ def class_name(folder: Path) -> str:
 def load(kind: Any, folder: Path, **options: Any) -> Any:
     """A pipeline from its folder, on the GPU where there is one; nothing is downloaded or unpickled.
 
-    Args:
-        kind: Its class.
-        folder: The folder, with weights as ``.safetensors``.
-        options: Further arguments of ``from_pretrained``.
+    ``options`` are further arguments of ``from_pretrained``.
 
     Raises:
-        InputError: A part is missing or of another kind.
+        InputError: A part is missing, is of another kind or has no weights as ``.safetensors``.
     """
     gpu = chosen_device().type == "cuda"
     try:
@@ -72,14 +68,8 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
     return pipeline
 
 
-def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
-    """What a pipeline returns.
-
-    Args:
-        pipeline: The pipeline.
-        steps: Steps of its sampler.
-        progress: Told of every step.
-        arguments: Of the call.
+def run(pipeline: Any, steps: int, progress: Progress, *, seed: int, **arguments: Any) -> Any:
+    """What a pipeline returns; its noise is drawn on the CPU, so that a seed is the same everywhere.
 
     Raises:
         InputError: It refuses an argument, or the GPU has not the memory.
@@ -92,7 +82,11 @@ def run(pipeline: Any, steps: int, progress: Progress, **arguments: Any) -> Any:
     try:
         with enough_memory("choose a smaller --size or fewer --frames"):
             return pipeline(
-                num_inference_steps=steps, callback_on_step_end=tell, output_type="np", **arguments
+                num_inference_steps=steps,
+                generator=torch.Generator("cpu").manual_seed(seed),
+                callback_on_step_end=tell,
+                output_type="np",
+                **arguments,
             )
     except ValueError as error:
         name = type(pipeline).__name__
@@ -110,25 +104,8 @@ def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
     return read_photo(control.path, size, control.intrinsics, control.hfov_deg)
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Which frames of a video are made, and which of them kept.
-
-    Attributes:
-        count: Frames to make.
-        index: Those to keep (F,).
-    """
-
-    count: int
-    index: Int[np.ndarray, " f"]
-
-
-def wanted_frames(control: Control, usual: int) -> Wanted:
-    """What ``--frames`` and ``--hold-out`` ask for, before anything is loaded or made.
-
-    Args:
-        control: The options.
-        usual: How many frames the model makes unless told.
+def wanted_frames(control: Control, usual: int) -> tuple[int, Int[np.ndarray, " f"]]:
+    """How many frames to make, ``usual`` unless told, and which to keep, before anything is loaded or made.
 
     Raises:
         InputError: Fewer than two frames are selected, or none can be withheld of those.
@@ -139,47 +116,44 @@ def wanted_frames(control: Control, usual: int) -> Wanted:
     if len(index) < 2:
         raise InputError(f"--frames {control.frames} selects a single frame; expected two or more")
     held_out_mask(len(index), control.hold_out)
-    return Wanted(count, index)
+    return count, index
 
 
 def make_clip(
     control: Control,
-    wanted: Wanted,
+    wanted: tuple[int, Int[np.ndarray, " f"]],
     photo: Photo,
     video: Float[np.ndarray, "t h w 3"],
     rate_hz: float,
     provenance: dict[str, Any],
     asked: Trajectory | None = None,
 ) -> Clip:
-    """The clip of a video that a model made from a photo.
+    """The clip of a video, RGB in [0, 1], that a model made from a photo, its frame 0.
 
-    Args:
-        control: Which frames are withheld.
-        wanted: Which frames were asked for; some models make fewer, as a whole number of latents.
-        photo: What it started from.
-        video: RGB in [0, 1], frame 0 the photo.
-        rate_hz: Frames a second.
-        provenance: What to remember; its notes come after those of the photo.
-        asked: The path that was asked for, one pose a frame of the video.
+    ``wanted`` is what ``wanted_frames`` gave; some models make fewer, as a whole number of latents. ``asked``
+    is the path that was asked for, one pose a frame of the video.
 
     Raises:
         InputError: The frames are not finite, or too few were made.
     """
     check_finite(video, "frames")
-    index = wanted.index[wanted.index < len(video)]
-    notes = list(provenance["notes"])
-    if len(index) < len(wanted.index):
-        notes.append(f"The model made {len(video)} frames instead of {wanted.count}; the others are missing.")
+    count, kept = wanted
+    index = kept[kept < len(video)]
+    notes = [*photo.notes, *provenance["notes"]]
+    made = f"the model made {len(video)} frames instead of {count}"
+    if len(index) < len(kept):
+        notes.append(f"{made.capitalize()}; the others are missing.")
     if len(index) < 2:
-        raise InputError(
-            f"--frames {control.frames}: the model made {len(video)} frames instead of {wanted.count}, and "
-            f"{len(index)} of those that were asked for"
-        )
+        raise InputError(f"--frames {control.frames}: {made}, and {len(index)} of those that were asked for")
     frames = np.rint(np.clip(video[index], 0, 1) * 255).astype(np.uint8)
     height, width = frames.shape[1:3]
     times_s = (index - index[0]) / rate_hz
     valid = np.ones(frames.shape[:3], dtype=bool)
     same = (width, height) == (photo.camera.width_px, photo.camera.height_px)
+    requested = None
+    if asked is not None:
+        poses = asked.world_from_camera[index]
+        requested = Trajectory(np.linalg.inv(poses[0]) @ poses, times_s)
     return Clip(
         frames=frames,
         times_s=times_s,
@@ -190,16 +164,6 @@ def make_clip(
         source_index=index,
         features={"appearance": appearance(frames, valid)},
         known=Known(intrinsics=photo.calibrated and same),
-        requested=None if asked is None else _selected(asked, index, times_s),
-        provenance={**provenance, "notes": [*photo.notes, *notes]},
+        requested=requested,
+        provenance={**provenance, "notes": notes},
     )
-
-
-def _selected(asked: Trajectory, index: np.ndarray, times_s: np.ndarray) -> Trajectory:
-    poses = asked.world_from_camera[index]
-    return Trajectory(np.linalg.inv(poses[0]) @ poses, times_s)
-
-
-def generator(seed: int) -> torch.Generator:
-    """On the CPU, so that a seed gives the same noise on every machine."""
-    return torch.Generator("cpu").manual_seed(seed)

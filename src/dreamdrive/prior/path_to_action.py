@@ -83,12 +83,7 @@ def command(path: Trajectory) -> Command:
 
 
 def goal(path: Trajectory, camera: Camera, height_m: float = CAMERA_HEIGHT_M) -> Goal:
-    """Where the first frame shows the road under the end of the path.
-
-    Args:
-        path: The wanted path.
-        camera: Pinhole of the first frame; its pose does not count.
-        height_m: Height of the camera above a level road.
+    """Where the first frame shows the road under the end of the path; the camera's pose does not count.
 
     Raises:
         InputError: That place is behind the camera or outside the frame.

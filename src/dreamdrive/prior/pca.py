@@ -12,17 +12,11 @@ CHANNELS = 16
 def reduce(
     features: Sequence[Float[np.ndarray, "h w c"]], channels: int = CHANNELS
 ) -> Float16[np.ndarray, "f h w d"]:
-    """The directions in which features vary most, over all pixels and frames of a clip.
+    """The directions in which features vary most, over all pixels and frames of a clip, in half precision.
 
     The first component has variance 1, the others keep their share of it; signs are such that the largest
-    entry of a direction is positive, so that the same features always give the same numbers.
-
-    Args:
-        features: Of each frame.
-        channels: How many components to keep; at most as many as there are.
-
-    Returns:
-        The components, half precision.
+    entry of a direction is positive, so that the same features always give the same numbers. There are at
+    most as many components as features.
 
     Raises:
         ValueError: There are no frames, or no channels are asked for.

@@ -1,7 +1,7 @@
 """What every prior offers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from dreamdrive.errors import InputError
 from dreamdrive.models import Backend
@@ -10,18 +10,8 @@ from dreamdrive.scene.action import check_action
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-
-@runtime_checkable
-class Make(Protocol):
-    """F_VDM (eq. 3): from what the user asks for to frames with features Z_ref."""
-
-    def __call__(self, control: Control, progress: Progress) -> Clip:
-        """Make the clip.
-
-        Raises:
-            InputError: The prior cannot work with this control.
-        """
-        ...
+Make = Callable[[Control, Progress], Clip]
+"""F_VDM (eq. 3): from what the user asks for to frames with features Z_ref; InputError where it cannot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,10 +45,6 @@ class Prior(Backend):
         self.check_start("prior", control.weights)
 
     def __call__(self, control: Control, progress: Progress = silent) -> Clip:
-        """Make the clip.
-
-        Raises:
-            InputError: See ``check``; or the input, an option or the weights cannot be used.
-        """
+        """Make the clip; InputError as of ``check``, or where input, options or weights cannot be used."""
         self.check(control)
         return self.make(control, progress)

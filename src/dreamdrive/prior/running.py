@@ -1,5 +1,6 @@
 """What priors have in common while their networks run."""
 
+import itertools
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
@@ -17,10 +18,7 @@ PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
 
 @contextmanager
 def enough_memory(advice: str) -> Generator[None]:
-    """Work that may find the GPU too small.
-
-    Args:
-        advice: What to do then, for the message.
+    """Work that may find the GPU too small; ``advice`` is what to do then, for the message.
 
     Raises:
         InputError: The GPU has not the memory.
@@ -32,11 +30,7 @@ def enough_memory(advice: str) -> Generator[None]:
 
 
 def check_finite(values: Tensor | Shaped[np.ndarray, "..."], what: str) -> None:
-    """Refuse what damaged weights, or numbers too large for their type, lead to.
-
-    Args:
-        values: What a network made.
-        what: What to call it in the message.
+    """Refuse what damaged weights, or numbers too large for their type, lead to; ``what`` the network made.
 
     Raises:
         InputError: A number is NaN or infinite.
@@ -51,14 +45,8 @@ def check_finite(values: Tensor | Shaped[np.ndarray, "..."], what: str) -> None:
 
 def counted(progress: Progress, total: int) -> Callable[[], None]:
     """A function to call after each of ``total`` steps."""
-    done = 0
-
-    def tell() -> None:
-        nonlocal done
-        done += 1
-        progress(done, total)
-
-    return tell
+    steps = itertools.count(1)
+    return lambda: progress(next(steps), total)
 
 
 def first_line(error: Exception) -> str:

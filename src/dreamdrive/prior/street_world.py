@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
 
 from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.select import Selection, held_out_mask
@@ -14,7 +13,7 @@ from dreamdrive.prior.protocol import Prior
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
-from dreamdrive.world import Drive, StreetOptions, draw_street, drive
+from dreamdrive.world import StreetOptions, draw_street, drive
 
 FRAMES = 24
 """Length of the drive unless ``control.frames`` says where to stop."""
@@ -24,20 +23,13 @@ SIZE = (320, 192)
 """Width and height unless told."""
 
 
-def street_world(control: Control, progress: Progress = silent, *, truth: bool = False) -> Clip:
-    """A clip of simulated frames; Z_ref is ``features["appearance"]``.
+def street_world(control: Control, progress: Progress = silent) -> Clip:
+    """A clip of simulated frames, as a calibrated dashcam gives it; Z_ref is ``features["appearance"]``.
 
     The street is that of the layout ``control.path``, or one that ``control.seed`` decides.
 
-    Args:
-        control: Layout or seed, frames, rate, size, withheld frames.
-        progress: Told of every frame.
-        truth: Whether the exact poses, depth and sky are handed over. Without them the clip is what a
-            calibrated dashcam would give, and the reconstruction has to find them.
-
     Raises:
-        InputError: The layout is wrong, the size is odd, or the frames
-            cannot be selected.
+        InputError: The layout is wrong, the size is odd, or the frames cannot be selected.
     """
     size = control.size or SIZE
     if size[0] % 2 or size[1] % 2:
@@ -54,39 +46,26 @@ def street_world(control: Control, progress: Progress = silent, *, truth: bool =
     else:
         layout = read_layout(control.path)
         source = f"the layout {control.path.name}"
-    clip = _clip(drive(layout, count, fps, size, progress=progress), np.array(wanted), truth)
+    made, index = drive(layout, count, fps, size, progress=progress), np.array(wanted)
+    frames, valid = made.frames[index], np.ones((len(index), *size[::-1]), dtype=bool)
     provenance = {
         "prior": "street-world",
         "seed": control.seed,
         "notes": [
-            f"The references are simulated: frames of {source}, handed over with "
-            f"{'exact poses and depth' if truth else 'exact intrinsics only'}."
+            f"The references are simulated: frames of {source}, handed over with exact intrinsics only."
         ],
     }
-    held_out = held_out_mask(len(wanted), control.hold_out)
-    clip = replace(clip, held_out=held_out, provenance=provenance)
-    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
-
-
-def _clip(made: Drive, index: np.ndarray, truth: bool) -> Clip:
-    """Some frames of a drive; time 0 and the world are those of the first of them."""
-    first = made.cameras[index[0]]
-    known = Known(intrinsics=True)
-    if truth:
-        poses = first.camera_from_world @ made.trajectory.world_from_camera[index]
-        poses[0] = np.eye(4)
-        known = Known(poses, intrinsics=True, depth_m=made.depth_m[index], sky=made.sky[index])
-    frames = made.frames[index]
-    nothing: Bool[np.ndarray, " f"] = np.zeros(len(index), dtype=bool)
     return Clip(
         frames=frames,
         times_s=made.times_s[index] - made.times_s[index[0]],
         camera=np.zeros(len(index), dtype=np.int64),
-        rig=(first.at(np.eye(4)),),
-        valid=np.ones(frames.shape[:3], dtype=bool),
-        held_out=nothing,
+        rig=(made.cameras[index[0]].at(np.eye(4)),),
+        valid=valid,
+        held_out=held_out_mask(len(index), control.hold_out),
         source_index=index,
-        known=known,
+        features={"appearance": appearance(frames, valid)},
+        known=Known(intrinsics=True),
+        provenance=provenance,
     )
 
 

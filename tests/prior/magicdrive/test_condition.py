@@ -5,6 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+import torch
 from tests.golden.reading import arrays, close
 
 from dreamdrive.errors import InputError
@@ -37,6 +38,7 @@ from dreamdrive.world.mesh import upright
 
 EAST = Ego([TrackPoint(0.0, 0.0, 0.0, 0.0), TrackPoint(1.0, 10.0, 0.0, 0.0)])
 NOW = np.zeros(1)
+WORDS = torch.zeros(1, 1, 1)
 
 
 def rectangle(x0: float, x1: float, y0: float, y1: float) -> list[tuple[float, float]]:
@@ -150,7 +152,7 @@ def standing(kind: str, x: float, y: float) -> Box:
 
 
 def listed_by(box: Box) -> set[str]:
-    present = see(Layout(EAST, boxes=[box]), NOW, 20).present[0].any(axis=-1)
+    present = see(Layout(EAST, boxes=[box]), NOW, 20, WORDS).present[0].any(axis=-1)
     return {camera.name for camera, there in zip(NUSCENES, present, strict=True) if there}
 
 
@@ -162,7 +164,7 @@ def test_a_camera_lists_the_boxes_before_it() -> None:
 
 def test_lists_are_filled_up_to_the_longest() -> None:
     boxes = [standing("van", 30, 0), standing("pedestrian", 25, 3), standing("truck", -30, 0)]
-    seen = see(Layout(EAST, boxes=boxes), np.array([0.0, 1.0]), 20)
+    seen = see(Layout(EAST, boxes=boxes), np.array([0.0, 1.0]), 20, WORDS)
     assert seen.present.shape == (2, 6, 2)
     assert seen.present[0].sum(axis=-1).tolist() == [2, 2, 1, 1, 1, 2]
     assert [CLASSES[kind] for kind in seen.classes[0, 0]] == ["car", "pedestrian"]
@@ -171,16 +173,16 @@ def test_lists_are_filled_up_to_the_longest() -> None:
     # Half a metre a sample: 10 m driven, so the van is 10 m nearer.
     moved = seen.corners_m[0, 0, 0] - seen.corners_m[1, 0, 0]
     np.testing.assert_allclose(moved, np.tile([0.0, 10.0, 0.0], (8, 1)), atol=0.05)
-    assert see(Layout(EAST), NOW, 20).present.shape == (1, 6, 0)
+    assert see(Layout(EAST), NOW, 20, WORDS).present.shape == (1, 6, 0)
 
 
 def test_cameras_are_told_for_the_full_picture_in_half_precision() -> None:
-    cameras = see(Layout(EAST), NOW, 20).cameras[0]
+    cameras = see(Layout(EAST), NOW, 20, WORDS).cameras[0]
     np.testing.assert_array_equal(cameras[0, :, :3], [[1266, 0, 816], [0, 1266, 491], [0, 0, 1]])
     np.testing.assert_allclose(
         cameras[0, :, 3:], [[1, 0, 0, 0], [0, 0, 1, 0.76], [0, -1, 0, -0.33]], atol=1e-3
     )
-    np.testing.assert_array_equal(cameras, cameras.astype(np.float16))
+    np.testing.assert_array_equal(cameras, cameras.half())
 
 
 @pytest.mark.parametrize(

@@ -16,11 +16,12 @@ from tests.prior.magicdrive.tiny import SIZE, Written, official_configs
 from torch import Tensor
 
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock, sparse_causal
+from dreamdrive.prior.magicdrive.condition import Conditions
 from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_settings
 from dreamdrive.prior.magicdrive.embed import MapEncoder, fourier
 from dreamdrive.prior.magicdrive.memory import needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised, multiview_unet
-from dreamdrive.prior.magicdrive.sample import Conditions, sample, unipc
+from dreamdrive.prior.magicdrive.sample import sample, unipc
 
 FEATURES = 1e-5
 """Limit of features and tokens, of the largest value: sines of metres times 8, rounded to 1e-6."""

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import torch
 
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.networks import Networks
-from dreamdrive.prior.vista.rollout import Seen
 from dreamdrive.prior.vista.stored import open_weights
 
 

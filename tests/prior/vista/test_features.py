@@ -9,9 +9,8 @@ import torch
 from tests.prior.vista.tiny import FRAMES
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.features import FeatureOptions, spans_of, video_features
-from dreamdrive.prior.vista.rollout import Seen
 from dreamdrive.scene.action import Command, Goal
 
 

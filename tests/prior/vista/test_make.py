@@ -19,9 +19,8 @@ from dreamdrive.prior import PRIORS
 from dreamdrive.prior.action_to_path import path_of
 from dreamdrive.prior.path_to_action import waypoints
 from dreamdrive.prior.vista.condition import numbers_of
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.memory import Job
-from dreamdrive.prior.vista.rollout import Seen
 from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control

@@ -8,10 +8,9 @@ from tests.golden.reading import Table, cases, close, tensors
 from tests.prior.vista.networks import Given, golden_unet, unet_config
 from torch import Tensor
 
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.networks import Networks
-from dreamdrive.prior.vista.rollout import Seen
 from dreamdrive.prior.vista.sampler import (
     Branches,
     Fixed,

@@ -1,3 +1,3 @@
 """MagicDrive: pictures of six cameras from a layout. Its networks are loaded when a clip is made."""
 
-from dreamdrive.prior.magicdrive.prior import MAGICDRIVE, MAGICDRIVE_T, magicdrive, magicdrive_t
+from dreamdrive.prior.magicdrive.prior import MAGICDRIVE, MAGICDRIVE_T

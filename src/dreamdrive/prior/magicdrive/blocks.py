@@ -39,12 +39,8 @@ def sparse_causal(frames: int) -> list[list[int]]:
 class CrossViewBlock(nn.Module):
     """A block of Stable Diffusion with attention to the two neighbouring cameras before its feed-forward.
 
-    Rows are ordered by clip, frame, camera; the cameras form a ring. Names of the children are those of the
-    published state dict.
-
-    Args:
-        block: The plain block, whose layers it takes over.
-        views: Cameras in the ring.
+    It takes over the layers of the plain block. Rows are ordered by clip, frame, camera; the cameras form a
+    ring. Names of the children are those of the published state dict.
     """
 
     def __init__(self, block: BasicTransformerBlock, views: int) -> None:
@@ -59,12 +55,7 @@ class CrossViewBlock(nn.Module):
     def forward(
         self, hidden_states: Float[Tensor, "b d c"], encoder_hidden_states: Tensor, **_: Any
     ) -> Float[Tensor, "b d c"]:
-        """Self-attention, tokens, neighbours, feed-forward, each with a residual.
-
-        Args:
-            hidden_states: Features of the pixels of all pictures.
-            encoder_hidden_states: Tokens of each picture (b, l, e).
-        """
+        """Self-attention, tokens (b, l, e), neighbours, feed-forward, each with a residual."""
         x = hidden_states
         x = x + self.look_within(self.norm1(x))
         x = x + self.attn2(self.norm2(x), encoder_hidden_states=encoder_hidden_states)
@@ -84,13 +75,7 @@ class CrossViewBlock(nn.Module):
 
 
 class TemporalBlock(CrossViewBlock):
-    """A cross-view block that also looks along time, as MagicDrive-t does.
-
-    Args:
-        block: The plain block, whose layers it takes over.
-        views: Cameras in the ring.
-        temporal: How it looks along time.
-    """
+    """A cross-view block that also looks along time, as MagicDrive-t does."""
 
     def __init__(self, block: BasicTransformerBlock, views: int, temporal: Temporal) -> None:
         super().__init__(block, views)

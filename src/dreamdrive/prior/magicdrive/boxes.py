@@ -35,12 +35,7 @@ _UNIT = np.array(
 def box_corners(
     lidar_from_box: Float[np.ndarray, "b 4 4"], size_m: Float[np.ndarray, "b 3"]
 ) -> Float[np.ndarray, "b 8 3"]:
-    """Corners of boxes.
-
-    Args:
-        lidar_from_box: Poses of the middle of their footprints.
-        size_m: Length, width and height.
-    """
+    """Corners of boxes by the poses of the middle of their footprints, and length, width and height."""
     local = _UNIT * size_m[:, None]
     return local @ np.swapaxes(lidar_from_box[:, :3, :3], 1, 2) + lidar_from_box[:, None, :3, 3]
 
@@ -69,11 +64,6 @@ def as_published(corners_m: Float[np.ndarray, "b 8 3"]) -> Float[np.ndarray, "b 
 def listed(
     corners_m: Float[np.ndarray, "b 8 3"], camera_from_lidar: Float[np.ndarray, "n 4 4"]
 ) -> Bool[np.ndarray, "n b"]:
-    """Which camera lists which box: those with a corner before it, inside the picture or not.
-
-    Args:
-        corners_m: True corners.
-        camera_from_lidar: The cameras.
-    """
+    """Which camera lists which box: those with a true corner before it, inside the picture or not."""
     depth = np.einsum("nd,bkd->nbk", camera_from_lidar[:, 2, :3], corners_m)
     return (depth + camera_from_lidar[:, 2, 3, None, None] > 0).any(axis=-1)

@@ -86,9 +86,6 @@ def full_intrinsics(camera: Mounted) -> Float[np.ndarray, "3 3"]:
 def rig(size: tuple[int, int]) -> tuple[Camera, ...]:
     """Pinholes of the pictures that the network makes, their poses relative to the front camera.
 
-    Args:
-        size: Width and height of the pictures.
-
     Raises:
         InputError: There is no such part of the full picture.
     """

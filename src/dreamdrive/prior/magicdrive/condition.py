@@ -1,9 +1,11 @@
 """From a layout to what MagicDrive's networks read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float, Float32, Int
+from torch import Tensor
 
 from dreamdrive.prior.magicdrive.boxes import as_published, layout_boxes, listed
 from dreamdrive.prior.magicdrive.cameras import (
@@ -23,68 +25,75 @@ DESCRIPTION = "City street, parked cars, houses, sunny"
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Time steps of a layout; t steps, n cameras, k boxes at most.
+class Conditions:
+    """What time steps shall show; b time steps, n cameras, k boxes at most.
 
     Attributes:
-        raster: The map (0 or 1).
-        cameras: Intrinsics of the full picture, camera to LiDAR.
-        corners_m: Corners in the LiDAR frame as the networks were taught, 0 where no box is.
-        classes: Classes, 0 where no box is.
+        raster: The map around the car (0 or 1), right and forward.
+        cameras: Intrinsics in pixels of the full picture, camera to LiDAR in metres.
+        corners_m: Corners of the boxes in the LiDAR frame as the networks were taught, 0 where no box is.
+        classes: Classes of the boxes, 0 where no box is.
         present: Whether there is a box.
+        text: Tokens of the words.
     """
 
-    raster: Float32[np.ndarray, "t c x y"]
-    cameras: Float32[np.ndarray, "t n 3 7"]
-    corners_m: Float32[np.ndarray, "t n k 8 3"]
-    classes: Int[np.ndarray, "t n k"]
-    present: Bool[np.ndarray, "t n k"]
+    raster: Float[Tensor, "b c x y"]
+    cameras: Float[Tensor, "b n 3 7"]
+    corners_m: Float[Tensor, "b n k 8 3"]
+    classes: Int[Tensor, "b n k"]
+    present: Bool[Tensor, "b n k"]
+    text: Float[Tensor, "b l e"]
+
+    def without(
+        self, null_camera: Float[Tensor, "3 7"], no_words: Float[Tensor, "b l e"], *, zero_map: bool = False
+    ) -> "Conditions":
+        """Those of the unconditional branch: no words, no camera, no boxes; the map stays, unless told."""
+        return replace(
+            self,
+            raster=torch.zeros_like(self.raster) if zero_map else self.raster,
+            cameras=null_camera.expand_as(self.cameras),
+            corners_m=torch.zeros_like(self.corners_m),
+            classes=torch.zeros_like(self.classes),
+            present=torch.zeros_like(self.present),
+            text=no_words,
+        )
 
 
-def see(layout: Layout, times_s: Float[np.ndarray, " t"], cells: int) -> Seen:
-    """What the cameras are told at given times.
+def see(
+    layout: Layout, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
+) -> Conditions:
+    """What the cameras are told at given times of the layout, on the device of the words' tokens.
 
     Each camera has its list of boxes, filled up to the longest list of all; all numbers are rounded to half
-    precision, in which the networks were taught: sine of 8 times a focal length tells the difference.
-
-    Args:
-        layout: Map, boxes and path.
-        times_s: Times of the layout.
-        cells: Cells along each side of the raster.
+    precision, in which the networks were taught: sine of 8 times a focal length tells the difference. The
+    raster has ``cells`` along each side.
     """
     lidar_from_car = np.linalg.inv(car_from_lidar())
     lidar_from_camera = np.stack([lidar_from_car @ car_from_camera(each) for each in NUSCENES])
-    rasters: list[np.ndarray] = []
-    lists: list[list[tuple[np.ndarray, np.ndarray]]] = []
-    for time_s, car in zip(times_s, map_from_car(layout.ego, times_s), strict=True):
+    count = len(times_s)
+    shape = (count, len(NUSCENES), len(layout.boxes))
+    corners, classes = np.zeros((*shape, 8, 3)), np.zeros(shape, dtype=np.int64)
+    present, rasters = np.zeros(shape, dtype=bool), list[np.ndarray]()
+    for step, (time_s, car) in enumerate(zip(times_s, map_from_car(layout.ego, times_s), strict=True)):
         lidar_from_map = lidar_from_car @ np.linalg.inv(car)
         rasters.append(draw_map(layout, lidar_from_map, cells))
-        corners, classes = layout_boxes(layout, lidar_from_map, float(time_s))
-        told = as_published(corners)
-        masks = listed(corners, np.linalg.inv(lidar_from_camera))
-        lists.append([(told[mask], classes[mask]) for mask in masks])
-    matrices = [
-        np.concatenate([full_intrinsics(each), pose[:3]], axis=1)
-        for each, pose in zip(NUSCENES, lidar_from_camera, strict=True)
-    ]
-    cameras = np.repeat(np.stack(matrices)[None], len(times_s), axis=0)
-    return Seen(np.stack(rasters), _rounded(cameras), *_filled(lists))
-
-
-def _filled(
-    lists: list[list[tuple[np.ndarray, np.ndarray]]],
-) -> tuple[Float32[np.ndarray, "t n k 8 3"], Int[np.ndarray, "t n k"], Bool[np.ndarray, "t n k"]]:
-    """Lists of corners and classes, by time step and camera, as arrays."""
-    longest = max(len(classes) for cameras in lists for _, classes in cameras)
-    shape = (len(lists), len(lists[0]), longest)
-    corners, classes = np.zeros((*shape, 8, 3)), np.zeros(shape, dtype=np.int64)
-    present = np.zeros(shape, dtype=bool)
-    for step, cameras in enumerate(lists):
-        for camera, (places, kinds) in enumerate(cameras):
-            corners[step, camera, : len(kinds)] = places
-            classes[step, camera, : len(kinds)] = kinds
-            present[step, camera, : len(kinds)] = True
-    return _rounded(corners), classes, present
+        places, kinds = layout_boxes(layout, lidar_from_map, float(time_s))
+        told = as_published(places)
+        for camera, mask in enumerate(listed(places, np.linalg.inv(lidar_from_camera))):
+            own = (step, camera, slice(mask.sum()))
+            corners[own], classes[own], present[own] = told[mask], kinds[mask], True
+    longest = present.sum(axis=-1).max(initial=0)
+    intrinsics = np.stack([full_intrinsics(each) for each in NUSCENES])
+    matrices = np.concatenate([intrinsics, lidar_from_camera[:, :3]], axis=-1)
+    given = (
+        np.stack(rasters),
+        _rounded(np.repeat(matrices[None], count, axis=0)),
+        _rounded(corners[:, :, :longest]),
+        classes[:, :, :longest],
+        present[:, :, :longest],
+    )
+    tensors = [torch.from_numpy(np.ascontiguousarray(each)).to(words.device) for each in given]
+    return Conditions(*tensors, text=words.expand(count, -1, -1))
 
 
 def _rounded(values: np.ndarray) -> Float32[np.ndarray, "..."]:

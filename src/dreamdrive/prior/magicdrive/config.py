@@ -81,11 +81,7 @@ class Settings:
 
 
 def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
-    """What the folders say beyond what diffusers' classes take.
-
-    Args:
-        unet: Table of ``unet/config.json``.
-        controlnet: Table of ``controlnet/config.json``.
+    """What ``config.json`` of unet and controlnet say beyond what diffusers' classes take.
 
     Raises:
         InputError: Plain Stable Diffusion, or a variant that is not built here.

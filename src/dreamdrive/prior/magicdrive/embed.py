@@ -23,10 +23,7 @@ def fourier(points: Float[Tensor, "*b 3"]) -> Float[Tensor, "*b 27"]:
 class BoxEmbedder(nn.Module):
     """One token a box, from its corners and its class (MagicDrive's ``ContinuousBBoxWithTextEmbedding``).
 
-    Args:
-        classes: Number of classes.
-        class_width: Width of a class's token, which is a text encoder's output for its name.
-        widths: Widths of the four layers; the last is that of the token.
+    A class's token is a text encoder's output for its name; the last of the widths is that of a box's token.
     """
 
     def __init__(self, classes: int, class_width: int, widths: tuple[int, int, int, int]) -> None:
@@ -50,12 +47,9 @@ class BoxEmbedder(nn.Module):
         classes: Int[Tensor, "*b"],
         present: Bool[Tensor, "*b"],
     ) -> Float[Tensor, "*b c"]:
-        """Tokens of boxes.
+        """Tokens of boxes; those that are not present get the token of no box, which attention sees as well.
 
-        Args:
-            corners_m: Corners in the LiDAR frame, in float32 whatever the network's type is.
-            classes: Index of the class; anything where no box is.
-            present: Whether there is a box; the others get the token of no box, which attention sees as well.
+        Corners are in the LiDAR frame, in float32 whatever the network's type is.
         """
         there = present[..., None]
         features = fourier(corners_m.float()).flatten(-2).to(self.null_pos_feature.dtype)
@@ -67,14 +61,10 @@ class BoxEmbedder(nn.Module):
 
 
 class MapEncoder(nn.Module):
-    """From the raster of the map to the first feature map of the ControlNet.
+    """From the raster of the map to the first feature map of the ControlNet, through four levels.
 
-    Args:
-        channels: Channels of the raster.
-        widths: Widths of its four levels.
-        out: Width of the feature map.
-        pooled: Height and width that the result is averaged to, of MagicDrive's 272x736 model; None for the
-            others, which get 28x50 from 200x200 cells and 53x100 from 400x400 by their paddings.
+    Of MagicDrive's 272x736 model, the result is averaged to the height and width ``pooled``; the others get
+    28x50 from 200x200 cells and 53x100 from 400x400 by their paddings.
     """
 
     def __init__(

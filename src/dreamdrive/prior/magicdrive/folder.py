@@ -1,5 +1,6 @@
 """MagicDrive's weights: its own ``unet`` and ``controlnet`` beside the parts of Stable Diffusion 1.5."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,25 +31,17 @@ _PARTS = {
     "tokenizer": ("vocab.json", ("merges.txt",)),
     "scheduler": ("scheduler_config.json", ()),
 }
-_OLD_NAMES = {".query.": ".to_q.", ".key.": ".to_k.", ".value.": ".to_v.", ".proj_attn.": ".to_out.0."}
+_OLD_NAME = re.compile(r"(?<=\.)(query|key|value|proj_attn)(?=\.)")
+_NEW_NAMES = {"query": "to_q", "key": "to_k", "value": "to_v", "proj_attn": "to_out.0"}
 """Of the attention in autoencoders that were written before 2023, as that of Stable Diffusion 1.5."""
-_POSITIONS = "embeddings.position_ids"
-"""Counts from 0; files of older text encoders hold it."""
 
 
 @dataclass(frozen=True)
 class Parts:
     """All networks of a folder, ready to run.
 
-    Attributes:
-        settings: What the folder was trained for.
-        unet: Denoises, looking across cameras.
-        controlnet: Reads map, cameras and boxes.
-        vae: Decodes.
-        words: Gives the tokens of a text.
-        scheduler: Table of ``scheduler_config.json``.
-        digests: Hashes of the files that are MagicDrive's own.
-        device: Where the networks are.
+    ``scheduler`` is the table of ``scheduler_config.json``, ``digests`` are of the files that are
+    MagicDrive's own, and ``words`` gives the tokens of a text.
     """
 
     settings: Settings
@@ -91,15 +84,12 @@ def vae_stride(vae: AutoencoderKL) -> int:
 
 
 def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = None) -> Parts:
-    """Load a folder; nothing in it is executed, nothing is fetched.
+    """Load a folder (see ``EXPECTED``); nothing in it is executed, nothing is fetched.
 
-    Args:
-        folder: See ``EXPECTED``.
-        temporal: Whether the weights have to be those of the temporal variant.
-        device: Where the networks run; on a GPU in half precision, elsewhere in float32.
+    On a GPU the networks run in half precision, elsewhere in float32.
 
     Raises:
-        InputError: Parts are missing or damaged, are of another model, or do not fit into memory.
+        InputError: Parts are missing or damaged, are of another model or variant, or do not fit into memory.
     """
     files = _find_parts(folder)
     configs = {
@@ -211,18 +201,11 @@ def _core(network: nn.Module) -> nn.Module:
 def _state(file: Path, part: str) -> dict[str, Tensor]:
     state = read_state(file, EXPECTED)
     if part == "vae":
-        return {_renamed(key): value for key, value in state.items()}
+        return {_OLD_NAME.sub(lambda match: _NEW_NAMES[match[1]], key): v for key, v in state.items()}
     if part == "text_encoder":
         state = {key.removeprefix("text_model."): value for key, value in state.items()}
-        state.pop(_POSITIONS, None)
+        state.pop("embeddings.position_ids", None)  # files of older text encoders hold these counts from 0
     return state
-
-
-def _renamed(key: str) -> str:
-    for old, new in _OLD_NAMES.items():
-        if "attentions" in key:
-            key = key.replace(old, new)
-    return key
 
 
 def _tokenizer(folder: Path) -> CLIPTokenizer:

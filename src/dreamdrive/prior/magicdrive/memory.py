@@ -21,11 +21,7 @@ DECODE_PICTURES = 2
 def needed_bytes(networks: list[nn.Module], settings: Settings, width: int, element_bytes: int) -> int:
     """Estimate of the peak: all weights, and the larger of one denoising branch and one chunk of the decoder.
 
-    Args:
-        networks: All of them; their parameters may be on the meta device.
-        settings: Pictures' size, cameras, frames.
-        width: Channels of the UNet's first level.
-        element_bytes: Of one number, 2 or 4.
+    ``width`` is that of the UNet's first level; parameters may be on the meta device.
     """
     pixels = settings.size[0] * settings.size[1]
     parameters = sum(each.numel() for network in networks for each in network.parameters())

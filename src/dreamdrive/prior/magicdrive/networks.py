@@ -26,12 +26,7 @@ def plain_settings(model: type, config: dict[str, Any]) -> dict[str, Any]:
 
 
 class BevControlNet(ControlNetModel):
-    """The plain ControlNet with the map in place of a picture, and tokens of cameras and boxes.
-
-    Args:
-        config: Table of ``controlnet/config.json``.
-        settings: What it says beyond diffusers' class.
-    """
+    """The plain ControlNet with the map in place of a picture, and tokens of cameras and boxes."""
 
     def __init__(self, config: dict[str, Any], settings: Settings) -> None:
         super().__init__(**plain_settings(ControlNetModel, config))
@@ -65,12 +60,7 @@ class BevControlNet(ControlNetModel):
     ) -> Float[Tensor, "bn t c"]:
         """The sequence of each picture, for both networks: its camera, the words, its boxes.
 
-        Args:
-            text: The words, common to the cameras.
-            cameras: Intrinsics of the full picture in pixels, camera to LiDAR in metres.
-            corners_m: Corners of each camera's boxes in the LiDAR frame.
-            classes: Their classes.
-            present: Whether there is a box; k is 0 where no camera has any.
+        Units are those of ``Conditions``; k is 0 where no camera has any box.
         """
         camera = self.camera_tokens(cameras)[:, :, None]
         words = text[:, None].expand(-1, self.views, -1, -1)
@@ -98,12 +88,7 @@ class BevControlNet(ControlNetModel):
 
 
 def multiview_unet(config: dict[str, Any], settings: Settings) -> UNet2DConditionModel:
-    """The UNet of Stable Diffusion whose transformer blocks look at neighbouring cameras.
-
-    Args:
-        config: Table of ``unet/config.json``.
-        settings: What it says beyond diffusers' class.
-    """
+    """The UNet of Stable Diffusion whose transformer blocks look at neighbouring cameras."""
     unet = UNet2DConditionModel(**plain_settings(UNet2DConditionModel, config))
     for layer in unet.modules():
         if isinstance(layer, Transformer2DModel):

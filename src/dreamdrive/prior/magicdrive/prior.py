@@ -1,11 +1,12 @@
 """The priors ``magicdrive`` and ``magicdrive-t``: six cameras from a layout (Gao et al., ICLR 2024)."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.select import Selection, held_out_mask
@@ -34,72 +35,54 @@ MOST_STEPS = 1000
 CAMERAS = len(NUSCENES)
 
 
-def magicdrive(control: Control, progress: Progress = silent) -> Clip:
-    """Six pictures of every time step, each time step sampled by itself.
+def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool = False) -> Clip:
+    """Six pictures of every time step, each of them sampled by itself, or all together.
 
-    Args:
-        control: Layout, weights, time steps and their rate, description, sampler steps, seed, withheld time
-            steps.
-        progress: Told of every sampler step and every decoded time step.
+    Always sampled together is the whole length of the weights, at 12 Hz from the layout's time 0.
 
     Raises:
         InputError: The layout or the weights cannot be used, or they do not fit into memory.
     """
-    selection = Selection.parse(control.frames)
-    if selection.stop is None:
-        selection = replace(selection, stop=max(TIME_STEPS, selection.start + TIME_STEPS))
-    wanted = selection.resolve(TIME_STEPS if selection.needs_count else None, "the drive")
-    rate = RATE_HZ if control.fps is None else control.fps
-    if not rate > 0:
-        raise InputError(f"--fps {rate:g}: expected more than 0")
-    return _make(control, progress, np.array(wanted), rate, temporal=False)
-
-
-def magicdrive_t(control: Control, progress: Progress = silent) -> Clip:
-    """Six pictures of every time step, all time steps sampled together.
-
-    Args:
-        control: Layout, weights, time steps, description, sampler steps, seed, withheld time steps. Always
-            sampled is the whole length of the weights, at 12 Hz from the layout's time 0.
-        progress: Told of every sampler step and every decoded time step.
-
-    Raises:
-        InputError: The layout or the weights cannot be used, or they do not fit into memory.
-    """
-    return _make(control, progress, None, RATE_HZ, temporal=True)
-
-
-def _make(
-    control: Control, progress: Progress, wanted: np.ndarray | None, rate_hz: float, *, temporal: bool
-) -> Clip:
-    """The clip; ``wanted`` are the time steps, None where the weights say how many there are."""
     layout, weights = _inputs(control)
-    if wanted is not None:
-        held_out_mask(len(wanted), control.hold_out)  # complains before anything is loaded
+    wanted = None if temporal else _time_steps(control, None)
+    rate_hz = RATE_HZ if control.fps is None else control.fps
+    if not rate_hz > 0:
+        raise InputError(f"--fps {rate_hz:g}: expected more than 0")
     try:
         from dreamdrive.prior.magicdrive.folder import read_parts
         from dreamdrive.prior.magicdrive.run import Run, generate
     except ImportError as error:
         raise InputError(f"the prior magicdrive cannot start ({error}): {INSTALL}") from None
-    with enough_memory(_GPU):
+    with enough_memory("take the weights for 400x224, which need least, or a GPU with more memory"):
         parts = read_parts(weights, temporal=temporal)
-        if wanted is None:
-            selection = Selection.parse(control.frames)
-            wanted = np.array(selection.resolve(parts.settings.frames, "the clip of these weights"))
+        wanted = _time_steps(control, parts.settings.frames) if wanted is None else wanted
         steps = STEPS if control.steps is None else control.steps
         run = Run(layout, parts, prompt_of(control.prompt), steps, control.seed, rate_hz)
-        held_out = np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS)
         frames, latents = generate(run, wanted, progress)
-    clip = Clip(
+    valid = np.ones(frames.shape[:3], dtype=bool)
+    return Clip(
         frames=frames,
-        valid=np.ones(frames.shape[:3], dtype=bool),
-        held_out=held_out,
+        valid=valid,
+        held_out=np.repeat(held_out_mask(len(wanted), control.hold_out), CAMERAS),
         latents=latents,
         source_index=np.repeat(wanted, CAMERAS),
+        features={"appearance": appearance(frames, valid)},
         provenance=_provenance(control, layout, temporal) | run.about(),
         **_cameras(layout, wanted / rate_hz, parts.settings.size, temporal),
     )
-    return clip.with_features(appearance=appearance(clip.frames, clip.valid))
+
+
+def _time_steps(control: Control, count: int | None) -> Int[np.ndarray, " t"]:
+    """The time steps to make, of as many as there are, if that is given by the weights."""
+    selection = Selection.parse(control.frames)
+    if count is not None:
+        wanted = selection.resolve(count, "the clip of these weights")
+    else:
+        if selection.stop is None:
+            selection = replace(selection, stop=max(TIME_STEPS, selection.start + TIME_STEPS))
+        wanted = selection.resolve(TIME_STEPS if selection.needs_count else None, "the drive")
+    held_out_mask(len(wanted), control.hold_out)  # complains before anything is loaded or made
+    return np.array(wanted)
 
 
 def _inputs(control: Control) -> tuple[Layout, Path]:
@@ -166,35 +149,27 @@ _ALONE = (
     "to the next, and what the layout leaves open (houses, colours, sky) changes from step to step. No "
     "motion can be seen in such frames: the poses are those that they were asked for."
 )
-_GPU = "take the weights for 400x224, which need least, or a GPU with more memory"
-_LICENCE = (
-    "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); Stable "
-    "Diffusion 1.5 CreativeML Open RAIL-M"
-)
-_TAKES = frozenset({"path", "frames", "prompt", "steps", "hold_out"})
-_GIVES = "six cameras at each time step, the intrinsics, mountings and path asked for, latents"
 
 MAGICDRIVE = Prior(
     name="magicdrive",
     make=magicdrive,
-    takes=_TAKES | {"fps"},
-    gives=_GIVES,
+    takes=frozenset({"path", "frames", "prompt", "steps", "hold_out", "fps"}),
+    gives="six cameras at each time step, the intrinsics, mountings and path asked for, latents",
     about="six cameras from a layout by MagicDrive, each time step by itself",
-    licence=_LICENCE,
+    licence=(
+        "ours; code and weights of MagicDrive Apache-2.0, trained on nuScenes (not for commercial use); "
+        "Stable Diffusion 1.5 CreativeML Open RAIL-M"
+    ),
     memory="for 400x224 about 7.5 GB on a CPU (float32), 4.3 GB on a GPU (half precision)",
     weights=EXPECTED,
     package=PACKAGE,
     install=INSTALL,
 )
-MAGICDRIVE_T = Prior(
+MAGICDRIVE_T = replace(
+    MAGICDRIVE,
     name="magicdrive-t",
-    make=magicdrive_t,
-    takes=_TAKES,
-    gives=_GIVES,
+    make=partial(magicdrive, temporal=True),
+    takes=MAGICDRIVE.takes - {"fps"},
     about="six cameras from a layout by MagicDrive-t, 16 time steps together",
-    licence=_LICENCE,
     memory="about 13 GB on a CPU (float32), 7 GB on a GPU (half precision)",
-    weights=EXPECTED,
-    package=PACKAGE,
-    install=INSTALL,
 )

@@ -40,11 +40,7 @@ _LINE_CELLS = 2
 
 
 def check_map(layout: Layout, name: str) -> None:
-    """Refuse a map without which the pictures would show no street.
-
-    Raises:
-        InputError: There is no road.
-    """
+    """Refuse a map without a road, without which the pictures would show no street."""
     if not any(area.kind == "road" for area in layout.areas):
         raise InputError(f"{name}: no area is of kind road, which MagicDrive's map needs; add one to $.areas")
 
@@ -52,15 +48,9 @@ def check_map(layout: Layout, name: str) -> None:
 def draw_map(
     layout: Layout, lidar_from_map: Float[np.ndarray, "4 4"], cells: int
 ) -> Float32[np.ndarray, "8 x y"]:
-    """The raster of one time step.
+    """The raster of one time step: areas and lines, 0 or 1 for each channel; nothing that moves is drawn.
 
-    Args:
-        layout: Its areas and lines; nothing that moves is drawn.
-        lidar_from_map: Where the LiDAR is.
-        cells: Cells along each side of the square.
-
-    Returns:
-        0 or 1 for each channel; rows from left to right of the car, columns from back to front.
+    Rows go from left to right of the car, columns from back to front.
     """
     layers = {name: np.zeros((cells, cells), dtype=np.uint8) for name in CHANNELS}
     surfaces = {name for names in AREAS.values() for name in names}

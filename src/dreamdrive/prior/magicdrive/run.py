@@ -9,9 +9,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dreamdrive.prior.magicdrive.condition import Seen, see
+from dreamdrive.prior.magicdrive.condition import see
 from dreamdrive.prior.magicdrive.folder import Parts
-from dreamdrive.prior.magicdrive.sample import GUIDANCE, Conditions, decode, sample, unipc
+from dreamdrive.prior.magicdrive.sample import GUIDANCE, decode, sample, unipc
 from dreamdrive.prior.running import check_finite, counted
 from dreamdrive.progress import Progress
 from dreamdrive.scene.layout import Layout
@@ -19,16 +19,7 @@ from dreamdrive.scene.layout import Layout
 
 @dataclass(frozen=True)
 class Run:
-    """What one run samples.
-
-    Attributes:
-        layout: Map, boxes and path.
-        parts: The networks.
-        prompt: The sentence.
-        steps: Steps of the sampler.
-        seed: Of the start noise.
-        rate_hz: Time steps in a second.
-    """
+    """What one run samples: time steps at ``rate_hz``, from start noise of the seed."""
 
     layout: Layout
     parts: Parts
@@ -56,11 +47,6 @@ def generate(
 
     The temporal variant samples all time steps of its length, others each wanted one by itself.
 
-    Args:
-        run: What is sampled.
-        wanted: Indices of the time steps.
-        progress: Told of every sampler step and every decoded time step.
-
     Raises:
         InputError: Latents or frames are not finite.
     """
@@ -68,10 +54,7 @@ def generate(
     sampled = wanted if together == 1 else np.arange(together)
     tell = counted(progress, len(sampled) // together * run.steps + len(wanted))
     parts = run.parts
-    clips = [
-        _sampled(run, see(run.layout, steps / run.rate_hz, parts.settings.map_shape[1]), tell)
-        for steps in sampled.reshape(-1, together)
-    ]
+    clips = [_sampled(run, steps / run.rate_hz, tell) for steps in sampled.reshape(-1, together)]
     by_time = torch.cat(clips).unflatten(0, (-1, parts.settings.views))
     check_finite(by_time, "latents")
     kept = by_time[np.searchsorted(sampled, wanted).tolist()]
@@ -82,10 +65,12 @@ def generate(
     return np.concatenate(pictures), kept.flatten(0, 1).permute(0, 2, 3, 1).cpu().numpy()
 
 
-def _sampled(run: Run, seen: Seen, tell: Callable[[], None]) -> Float[Tensor, "bn c h w"]:
+def _sampled(
+    run: Run, times_s: Float[np.ndarray, " t"], tell: Callable[[], None]
+) -> Float[Tensor, "bn c h w"]:
     """Latents of time steps that are sampled together."""
     parts = run.parts
-    conditions = _conditions(run, seen)
+    conditions = see(run.layout, times_s, parts.settings.map_shape[1], parts.words(run.prompt))
     no_words = parts.words("").expand_as(conditions.text)
     branches = conditions, conditions.without(parts.controlnet.null_camera, no_words)
     scheduler = unipc(parts.scheduler, run.steps, parts.device)
@@ -104,15 +89,3 @@ def start_noise(run: Run) -> Float[Tensor, "bn c h w"]:
     count = settings.frames * settings.views
     noise = torch.randn((1 if settings.temporal is None else count, *shape), generator=random)
     return noise.expand(count, -1, -1, -1)
-
-
-def _conditions(run: Run, seen: Seen) -> Conditions:
-    device = run.parts.device
-    return Conditions(
-        raster=torch.from_numpy(seen.raster).to(device),
-        cameras=torch.from_numpy(seen.cameras).to(device),
-        corners_m=torch.from_numpy(seen.corners_m).to(device),
-        classes=torch.from_numpy(seen.classes).to(device),
-        present=torch.from_numpy(seen.present).to(device),
-        text=run.parts.words(run.prompt).expand(len(seen.raster), -1, -1),
-    )

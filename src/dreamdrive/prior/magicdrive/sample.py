@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -10,9 +9,10 @@ import torch
 from diffusers.models.autoencoders.autoencoder_kl import AutoencoderKL
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from diffusers.schedulers.scheduling_unipc_multistep import UniPCMultistepScheduler
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from dreamdrive.prior.magicdrive.condition import Conditions
 from dreamdrive.prior.magicdrive.memory import DECODE_PICTURES
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised
 from dreamdrive.prior.running import check_finite
@@ -26,41 +26,6 @@ _SCHEDULE = (
     "trained_betas",
     "prediction_type",
 )
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What time steps shall show; b time steps, n cameras, k boxes at most.
-
-    Attributes:
-        raster: The map around the car, right and forward.
-        cameras: Intrinsics in pixels of the full picture, camera to LiDAR in metres.
-        corners_m: Corners of the boxes in the LiDAR frame.
-        classes: Classes of the boxes.
-        present: Whether there is a box.
-        text: Tokens of the words.
-    """
-
-    raster: Float[Tensor, "b c x y"]
-    cameras: Float[Tensor, "b n 3 7"]
-    corners_m: Float[Tensor, "b n k 8 3"]
-    classes: Int[Tensor, "b n k"]
-    present: Bool[Tensor, "b n k"]
-    text: Float[Tensor, "b l e"]
-
-    def without(
-        self, null_camera: Float[Tensor, "3 7"], no_words: Float[Tensor, "b l e"], *, zero_map: bool = False
-    ) -> "Conditions":
-        """Those of the unconditional branch: no words, no camera, no boxes; the map stays, unless told."""
-        return replace(
-            self,
-            raster=torch.zeros_like(self.raster) if zero_map else self.raster,
-            cameras=null_camera.expand_as(self.cameras),
-            corners_m=torch.zeros_like(self.corners_m),
-            classes=torch.zeros_like(self.classes),
-            present=torch.zeros_like(self.present),
-            text=no_words,
-        )
 
 
 def unipc(table: dict[str, Any], steps: int, device: torch.device | str = "cpu") -> UniPCMultistepScheduler:
@@ -85,24 +50,17 @@ def sample(
     branches: tuple[Conditions, Conditions],
     noise: Float[Tensor, "bn c h w"],
     scheduler: UniPCMultistepScheduler,
-    guidance: float = GUIDANCE,
     done: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "bn c h w"]:
-    """Latents of all cameras of the time steps.
+    """Latents of all cameras of the time steps, from the conditions and those of the unconditional branch.
 
-    Args:
-        unet: Denoises.
-        controlnet: Reads the conditions.
-        branches: The conditions and those of the unconditional branch.
-        noise: Of every picture, in float32, which the steps are taken in.
-        scheduler: Set to its steps.
-        guidance: How far to go beyond the conditional branch's wish.
-        done: Called after every step.
+    The noise of every picture is in float32, which the steps are taken in; ``done`` is called after each.
     """
     dtype = unet.dtype
     rasters = [branch.raster.to(dtype) for branch in branches]
     tokens = [
-        controlnet.tokens(b.text.to(dtype), b.cameras, b.corners_m, b.classes, b.present) for b in branches
+        controlnet.tokens(each.text.to(dtype), each.cameras, each.corners_m, each.classes, each.present)
+        for each in branches
     ]
     latents = noise
     for time in scheduler.timesteps:
@@ -111,7 +69,7 @@ def sample(
             denoised(unet, seen, time, words, controlnet.residuals(seen, time, words, raster)).float()
             for words, raster in zip(tokens, rasters, strict=True)
         )
-        guided = free + guidance * (wanted - free)
+        guided = free + GUIDANCE * (wanted - free)
         latents = cast(Tensor, scheduler.step(guided, time, latents, return_dict=False)[0])
         done()
     return latents

@@ -1,37 +1,15 @@
 """Video models as priors: Stable Video Diffusion and Vista, one network on diffusers' classes."""
 
+from dataclasses import replace
+from functools import partial
+
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.prior.vista.kinds import KINDS, KindName
-from dreamdrive.progress import Progress, silent
+from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
-
-_TAKES = frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"})
-_MEMORY = (
-    "at 1024x576 8.3 GB for the UNet in half precision (16.5 GB on a CPU, and hours) and 42.9 GB for "
-    "the decoder, at 576x320 4.9 and 13.7 GB (reckoned, not measured); a run that does not fit is refused "
-    "before it starts"
-)
-
-
-def svd(control: Control, progress: Progress = silent) -> Clip:
-    """A photo goes on for 25 frames by Stable Video Diffusion; see ``make.make_clip``.
-
-    Raises:
-        InputError: See ``make.make_clip``.
-    """
-    return _make("svd", control, progress)
-
-
-def vista(control: Control, progress: Progress = silent) -> Clip:
-    """A street goes on from a photo or leading frames by Vista; see ``make.make_clip``.
-
-    Raises:
-        InputError: See ``make.make_clip``.
-    """
-    return _make("vista", control, progress)
 
 
 def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
@@ -44,31 +22,33 @@ def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
 
 SVD = Prior(
     name="svd",
-    make=svd,
-    takes=_TAKES,
+    make=partial(_make, "svd"),
+    takes=frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"}),
     gives="25 frames at 7 Hz, latents, features; no poses",
     about="a photo goes on for 25 frames (Stable Video Diffusion)",
     licence=(
         "code of diffusers Apache-2.0; weights under Stability AI's licence for Stable Video Diffusion, "
         "which limits commercial use"
     ),
-    memory=_MEMORY,
+    memory=(
+        "at 1024x576 8.3 GB for the UNet in half precision (16.5 GB on a CPU, and hours) and 42.9 GB for "
+        "the decoder, at 576x320 4.9 and 13.7 GB (reckoned, not measured); a run that does not fit is "
+        "refused before it starts"
+    ),
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",
     package=PACKAGE,
     install=INSTALL,
 )
-VISTA = Prior(
+VISTA = replace(
+    SVD,
     name="vista",
-    make=vista,
-    takes=_TAKES | {"action", "trajectory"},
+    make=partial(_make, "vista"),
+    takes=SVD.takes | {"action", "trajectory"},
     gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
     about="a street goes on from a photo or up to three frames, as told by an action (Vista)",
     licence=(
         "Vista's code and weights Apache-2.0 by its authors; the weights derive from Stable Video Diffusion, "
         "whose licence by Stability AI limits commercial use"
     ),
-    memory=_MEMORY,
     weights="vista.safetensors of OpenDriveLab/Vista, or a folder that dreamdrive prior convert made of it",
-    package=PACKAGE,
-    install=INSTALL,
 )

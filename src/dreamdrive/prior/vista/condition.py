@@ -51,10 +51,9 @@ def numbers_of(action: Action) -> dict[str, list[float]]:
 
 
 def embed_action(numbers: Mapping[str, Sequence[float]]) -> Float[Tensor, " a"]:
-    """The columns of the context that hold the action (2432,).
+    """The columns (2432,) of the context that hold the action, from numbers by kind.
 
-    Args:
-        numbers: By kind; a kind that is not given is zeros, which is not the same as the number zero.
+    A kind that is not given is zeros, which is not the same as the number zero.
     """
     columns = torch.zeros(ACTION_COLUMNS)
     start = 0
@@ -78,14 +77,10 @@ def columns_by_round(action: Action | None, count: int) -> list[Float[Tensor, " 
 
 
 def clip_pixels(image: Float[Tensor, "1 3 h w"], side_px: int = 224) -> Float[Tensor, "1 3 s s"]:
-    """A frame as CLIP sees it: squeezed to a square, with CLIP's mean and deviation.
+    """A frame in [-1, 1] as CLIP sees it: squeezed to a square, with CLIP's mean and deviation.
 
     Each side is blurred by as much as it shrinks, then sampled bicubically with the corners in the corners.
     Diffusers' pipeline of SVD has the same, but to import it asks for torchvision.
-
-    Args:
-        image: In [-1, 1].
-        side_px: Of the square.
     """
     for axis in (3, 2):
         image = _blur(image, max((image.shape[axis] / side_px - 1) / 2, 1e-3), axis)

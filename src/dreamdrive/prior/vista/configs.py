@@ -7,18 +7,14 @@ from dreamdrive.prior.vista.keys import Part
 
 Shapes = Mapping[str, tuple[int, ...]]
 """Shapes of a part's tensors by name."""
-HEAD = 64
-"""Width of an attention head in the UNet; 80 in the image encoder of SVD and Vista."""
-_CLIP_HEAD = 80
+_HEAD, _CLIP_HEAD = 64, 80
+"""Widths of an attention head in the UNet and in the image encoder, which no weight tells."""
 
 
-def config_of(part: Part, shapes: Shapes, head: int = HEAD) -> dict[str, Any]:
-    """The configuration of a part.
+def config_of(part: Part, shapes: Shapes, head: int = _HEAD) -> dict[str, Any]:
+    """The configuration of a part from its tensors by the names of diffusers and transformers.
 
-    Args:
-        part: Which.
-        shapes: Its tensors as diffusers and transformers name them; enough must be there.
-        head: Width of an attention head in the UNet, which no weight tells.
+    ``head`` is the width of an attention head in the UNet.
 
     Raises:
         KeyError: Tensors that tell the size are missing.

@@ -32,13 +32,7 @@ _CLASSES: dict[Part, dict[str, str]] = {
 
 @dataclass(frozen=True)
 class Converted:
-    """What was made.
-
-    Attributes:
-        stored: What it was made from.
-        ignored: How many tensors were left out, by what they are.
-        notes: What to say of the file, a sentence each.
-    """
+    """What was made of which file; how many tensors were left out, by what they are; what to say of it."""
 
     stored: Stored
     ignored: dict[str, int]
@@ -106,14 +100,7 @@ def write_tensors(
 ) -> None:
     """Write a ``.safetensors``: length and text of the header, then the numbers, as each tensor is read.
 
-    The library's own writer wants all tensors at once.
-
-    Args:
-        path: The file.
-        shapes: Of the tensors.
-        read: Gives one by its name.
-        dtype: To store them in.
-        tell: Told how many are written.
+    The library's own writer wants all tensors at once. ``tell`` is told how many are written.
 
     Raises:
         InputError: A number is too large for the type, or not finite.

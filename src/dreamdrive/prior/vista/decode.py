@@ -22,12 +22,9 @@ def chunks(count: int, chunk: int) -> list[range]:
 def decode_in_chunks(
     decode: Decode, latents: Float[Tensor, "t c h w"], chunk: int = CHUNK
 ) -> Float[Tensor, "t 3 h2 w2"]:
-    """Frames of latents; what two chunks have in common is the mean of both.
+    """Frames of latents, as the autoencoder made them; what two chunks have in common is the mean of both.
 
-    Args:
-        decode: The decoder, which mixes the frames that it is given at once.
-        latents: As the autoencoder made them.
-        chunk: Frames at once, at least 1.
+    The decoder mixes the ``chunk`` frames that it is given at once.
     """
     made: Tensor | None = None
     reached = 0

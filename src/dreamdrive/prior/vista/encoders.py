@@ -45,11 +45,7 @@ def notes_of(stored: Stored) -> list[str]:
 def encoder_difference(path: Path) -> float | None:
     """How far the encoders of a single file are apart: the largest difference over a tensor's largest number.
 
-    Args:
-        path: The file.
-
-    Returns:
-        The largest of all tensors; None where there is no second encoder.
+    None where there is no second encoder.
 
     Raises:
         InputError: They have different tensors.

@@ -1,5 +1,7 @@
 """The stored networks as what sampling, decoding and features ask for. Importing this loads diffusers."""
 
+from dataclasses import dataclass
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -7,23 +9,32 @@ from torch import Tensor
 from dreamdrive.prior.vista.condition import clip_pixels
 from dreamdrive.prior.vista.kinds import MOTION_BUCKET
 from dreamdrive.prior.vista.networks import Networks
-from dreamdrive.prior.vista.rollout import Images, Model, Seen
 from dreamdrive.prior.vista.sampler import Branches, Velocity
+
+Images = Float[Tensor, "n 3 h w"]
+"""Frames in [-1, 1]."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The conditions of one round.
+
+    Attributes:
+        image: Description of its first frame (D,).
+        latent: That frame as the autoencoder has it, not scaled (C, h, w).
+        action: Columns of the action (A,); None without one, as in SVD.
+    """
+
+    image: Float[Tensor, " d"]
+    latent: Float[Tensor, "c h w"]
+    action: Float[Tensor, " a"] | None
 
 
 class Engine:
-    """Networks at work; what it takes and gives lies on the CPU but for what a velocity sees.
-
-    Attributes:
-        networks: One at a time is in memory.
-    """
+    """Networks at work, one at a time in memory; all but what a velocity sees lies on the CPU."""
 
     def __init__(self, networks: Networks) -> None:
         self.networks = networks
-
-    def model(self) -> Model:
-        """What a rollout asks for."""
-        return Model(self.encode, self.decode, self.describe, self.velocity)
 
     def encode(self, images: Images) -> Float[Tensor, "n c y x"]:
         """Latents of frames in [-1, 1]: the mode, not scaled; one frame at a time."""
@@ -38,8 +49,9 @@ class Engine:
 
     def describe(self, images: Images) -> Float[Tensor, " d"]:
         """What CLIP says of one frame in [-1, 1]."""
-        encoder, side_px = self.networks.image_encoder(), self.networks.stored.parts["image_encoder"].config
-        return encoder(clip_pixels(images.to(self._device), side_px["image_size"])).image_embeds[0]
+        side_px = self.networks.stored.parts["image_encoder"].config["image_size"]
+        shown = clip_pixels(images.to(self._device), side_px)
+        return self.networks.image_encoder()(shown).image_embeds[0]
 
     def velocity(self, seen: Seen) -> Velocity:
         """The UNet without and with the conditions of a round; without them frame and action are zeros.
@@ -60,14 +72,10 @@ class Engine:
         mask: Float[Tensor, " t"],
         given: float = 1.0,
     ) -> Float[Tensor, "t c h w"]:
-        """One look of the UNet.
+        """One look of the UNet at scaled noisy latents.
 
-        Args:
-            seen: The conditions.
-            x: Scaled noisy latents.
-            time: 0.25 ln sigma.
-            mask: One for frames that are known.
-            given: One with the conditions, zero without.
+        ``time`` is 0.25 ln sigma, ``mask`` one for frames that are known; ``given`` is one with the
+        conditions of the round, zero without.
         """
         unet, kind = self.networks.unet(), self.networks.stored.kind
         to = (self._device, self.networks.dtype)

@@ -20,12 +20,12 @@ from dreamdrive.errors import InputError
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
-from dreamdrive.prior.vista.engine import Engine
+from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
-from dreamdrive.prior.vista.picture import NATIVE, SIDE, check_size, to_images
-from dreamdrive.prior.vista.rollout import SCALE, Seen
+from dreamdrive.prior.vista.picture import NATIVE, check_size, nearest_side, to_images
+from dreamdrive.prior.vista.rollout import SCALE
 from dreamdrive.prior.vista.sampler import time_of
 from dreamdrive.prior.vista.unet import watch
 from dreamdrive.progress import Progress, silent
@@ -148,14 +148,8 @@ def extract(
 ) -> Float16[np.ndarray, "f h3 w3 d"]:
     """Principal components of a block's activations.
 
-    Args:
-        engine: The networks.
-        latents: Scaled clean latents of all frames.
-        frames: The frames, of which the first of each window is described.
-        windows: What the UNet sees at once, in order; of frames in two windows the first one counts.
-        options: Which features.
-        seed: Of the noise.
-        tell: Called after every window.
+    ``latents`` of all frames are scaled and clean; of the frames, the first of each window is described. Of
+    frames in two windows, which are in order, the first one counts. ``tell`` is called after every window.
 
     Raises:
         InputError: The features are not finite.
@@ -204,11 +198,7 @@ def _activations(
 
 
 def _check_block(weights: Iterable[str], block: str) -> None:
-    """Whether activations of a block can be had, by the names of the UNet's weights.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """Whether activations of a block can be had, by the names of the UNet's weights."""
     matches = (_BLOCKS.match(name) for name in weights)
     names = {name for match in matches if match for name in (match[0], match[1]) if name}
     if block not in names:
@@ -218,8 +208,7 @@ def _check_block(weights: Iterable[str], block: str) -> None:
 def _nearest(size: tuple[int, int]) -> tuple[int, int]:
     """Multiples of 64, of no more pixels than the network was trained on."""
     shrink = min(1.0, (NATIVE[0] * NATIVE[1] / (size[0] * size[1])) ** 0.5)
-    width, height = (max(SIDE, SIDE * round(shrink * side / SIDE)) for side in size)
-    return width, height
+    return nearest_side(shrink * size[0]), nearest_side(shrink * size[1])
 
 
 def _resize(frame: UInt8[np.ndarray, "h w 3"], size: tuple[int, int]) -> UInt8[np.ndarray, "h2 w2 3"]:

@@ -68,13 +68,9 @@ class Recipe:
 
 @dataclass
 class Recipes:
-    """What a file gives.
+    """What a file gives: the recipe of each tensor by part and name.
 
-    Attributes:
-        parts: The recipe of each tensor, by part and name.
-        ignored: Keys of no use.
-        unknown: Keys that no rule knows.
-        actions: Keys of the action adapters.
+    Beside them keys of no use, keys that no rule knows, and those of the action adapters.
     """
 
     parts: dict[Part, dict[str, Recipe]] = field(default_factory=lambda: {part: {} for part in PARTS})
@@ -92,7 +88,9 @@ def recipes_of(keys: Iterable[str]) -> Recipes:
     """The recipes for a file that holds these keys."""
     keys = sorted(keys)
     found, joined = Recipes(), list[str]()
-    per_level, top = _per_level(keys), _top_level(keys)
+    # Residual blocks a level of the UNet: the first down-sampling comes right behind them.
+    per_level = _counted(min, UNET + r"input_blocks\.(\d+)\.0\.op\.", keys) - 1
+    top = _counted(max, _DECODER + r"up\.(\d+)\.", keys)
     for key in keys:
         if any(pattern.match(key) for pattern in IGNORED.values()):
             found.ignored.append(key)
@@ -117,6 +115,8 @@ _RESIDUAL = {
     "out_layers.3": "conv2",
     "skip_connection": "conv_shortcut",
 }
+_PLAIN = {name: name for name in _RESIDUAL.values()} | {"nin_shortcut": "conv_shortcut"}
+"""Names in the autoencoder's residual blocks, but for the part over time."""
 _ATTENTION = {"norm": "group_norm", "q": "to_q", "k": "to_k", "v": "to_v", "proj_out": "to_out.0"}
 _EMBEDDINGS = {
     "time_embed.0": "time_embedding.linear_1",
@@ -129,6 +129,7 @@ _EMBEDDINGS = {
     "out.0": "conv_norm_out",
     "out.2": "conv_out",
 }
+_TIME = {"time_pos_embed.0": "time_pos_embed.linear_1", "time_pos_embed.2": "time_pos_embed.linear_2"}
 _VISUAL_NAMES = {
     "class_embedding": "vision_model.embeddings.class_embedding",
     "conv1.weight": "vision_model.embeddings.patch_embedding.weight",
@@ -147,16 +148,9 @@ _VISUAL_LAYER = {
 }
 
 
-def _per_level(keys: list[str]) -> int:
-    """Residual blocks a level of the UNet: the first down-sampling comes right behind them."""
-    found = (re.match(re.escape(UNET) + r"input_blocks\.(\d+)\.0\.op\.", key) for key in keys)
-    return min((int(match[1]) for match in found if match), default=3) - 1
-
-
-def _top_level(keys: list[str]) -> int:
-    """The highest level of the decoder, which it starts with."""
-    found = (re.match(re.escape(_DECODER) + r"up\.(\d+)\.", key) for key in keys)
-    return max((int(match[1]) for match in found if match), default=3)
+def _counted(pick: Callable[..., int], pattern: str, keys: list[str]) -> int:
+    found = (re.match(pattern, key) for key in keys)
+    return pick((int(match[1]) for match in found if match), default=3)
 
 
 def _translate(key: str, per_level: int, top: int) -> tuple[Part, dict[str, Recipe]]:
@@ -172,39 +166,35 @@ def _translate(key: str, per_level: int, top: int) -> tuple[Part, dict[str, Reci
 def _unet(name: str, per_level: int) -> str | None:
     if (stem := _swap(name, _EMBEDDINGS)) is not None:
         return stem
-    match = re.match(r"(input_blocks|output_blocks|middle_block)\.(\d+)\.(.*)", name)
+    match = re.match(r"(?:(in|out)put_blocks\.(\d+)|middle_block)\.(\d+)\.(.*)", name)
     if match is None:
         return None
-    side, index, rest = match[1], int(match[2]), match[3]
-    if side == "middle_block":
-        inner = _attention(rest) if index == 1 else _residual(rest)
-        place = "attentions.0" if index == 1 else f"resnets.{index // 2}"
-        return None if inner is None else f"mid_block.{place}.{inner}"
-    level, block = divmod(index - 1 if side == "input_blocks" else index, per_level + 1)
-    place = f"{'down' if side == 'input_blocks' else 'up'}_blocks.{level}"
-    which, _, rest = rest.partition(".")
-    if rest.startswith("op."):
-        return f"{place}.downsamplers.0.conv.{rest.removeprefix('op.')}"
-    if rest.startswith("conv."):
-        return f"{place}.upsamplers.0.{rest}"
-    inner = _residual(rest) if which == "0" else _attention(rest)
-    kind = "resnets" if which == "0" else "attentions"
-    return None if inner is None else f"{place}.{kind}.{block}.{inner}"
+    side, index, which, rest = match.groups()
+    if side is None:
+        place, block, attends = "mid_block", int(which) // 2, which == "1"
+    else:
+        level, block = divmod(int(index) - (side == "in"), per_level + 1)
+        place, attends = f"{'down' if side == 'in' else 'up'}_blocks.{level}", which != "0"
+        if rest.startswith("op."):
+            return f"{place}.downsamplers.0.conv.{rest.removeprefix('op.')}"
+        if rest.startswith("conv."):
+            return f"{place}.upsamplers.0.{rest}"
+    if attends:
+        inner = _swap(rest, _TIME) or re.sub(r"^time_stack\.", "temporal_transformer_blocks.", rest)
+        return f"{place}.attentions.{block}.{inner}"
+    inner = _residual(rest, _RESIDUAL)
+    return None if inner is None else f"{place}.resnets.{block}.{inner}"
 
 
-def _residual(rest: str) -> str | None:
-    if rest == "time_mixer.mix_factor":
-        return rest
+def _residual(rest: str, names: dict[str, str]) -> str | None:
+    """Inside a residual block that has a part over time."""
+    if rest.removeprefix("time_mixer.") == "mix_factor":
+        return "time_mixer.mix_factor"
     if rest.startswith("time_stack."):
         inner = _swap(rest.removeprefix("time_stack."), _RESIDUAL)
         return None if inner is None else f"temporal_res_block.{inner}"
-    inner = _swap(rest, _RESIDUAL)
+    inner = _swap(rest, names)
     return None if inner is None else f"spatial_res_block.{inner}"
-
-
-def _attention(rest: str) -> str:
-    places = {"time_pos_embed.0": "time_pos_embed.linear_1", "time_pos_embed.2": "time_pos_embed.linear_2"}
-    return _swap(rest, places) or re.sub(r"^time_stack\.", "temporal_transformer_blocks.", rest)
 
 
 def _swap(name: str, names: dict[str, str]) -> str | None:
@@ -230,7 +220,9 @@ def _autoencoder(key: str, top: int) -> dict[str, Recipe]:
         side, level, block, rest = match.groups()
         place = "mid_block" if level is None else f"{side}_blocks.{_level(side, level, top)}"
         number = int(block) - (level is None)
-        return {f"{half}.{place}.resnets.{number}.{_block(half, rest)}": Recipe(key)}
+        # Only the decoder's blocks have a part over time.
+        inner = _swap(rest, _PLAIN) if half == "encoder" else _residual(rest, _PLAIN)
+        return {} if inner is None else {f"{half}.{place}.resnets.{number}.{inner}": Recipe(key)}
     if match := re.match(r"(down|up)\.(\d+)\.(down|up)sample\.(conv\..*)", name):
         side, level, _, rest = match.groups()
         return {f"{half}.{side}_blocks.{_level(side, level, top)}.{side}samplers.0.{rest}": Recipe(key)}
@@ -240,18 +232,6 @@ def _autoencoder(key: str, top: int) -> dict[str, Recipe]:
 def _level(side: str, level: str, top: int) -> int:
     """Counted in the order of the work, which in the decoder begins with the highest."""
     return top - int(level) if side == "up" else int(level)
-
-
-def _block(half: str, rest: str) -> str:
-    """Inside a residual block of the autoencoder; the decoder's have a part over time."""
-    if half == "encoder":
-        return rest.replace("nin_shortcut", "conv_shortcut")
-    if rest.startswith("time_stack."):
-        inner = _swap(rest.removeprefix("time_stack."), _RESIDUAL)
-        return f"temporal_res_block.{inner}"
-    if rest == "mix_factor":
-        return "time_mixer.mix_factor"
-    return f"spatial_res_block.{rest.replace('nin_shortcut', 'conv_shortcut')}"
 
 
 def _visual(key: str) -> dict[str, Recipe]:
@@ -275,20 +255,16 @@ def _visual(key: str) -> dict[str, Recipe]:
 
 def _join(found: Recipes, key: str, per_level: int, keys: set[str]) -> None:
     """Add the columns of the actions, or LoRA that is not merged yet, to the matrix that they belong to."""
-    match = _ADDED.fullmatch(key)
-    name = None
+    match, unet = _ADDED.fullmatch(key), found.parts["unet"]
     if match is not None and key.startswith(UNET):
         to = "to_out.0" if match[2] == "out" else f"to_{match[2]}"
         name = _unet(f"{match[1]}.{to}.weight".removeprefix(UNET), per_level)
-    unet = found.parts["unet"]
-    if match is None or name is None or name not in unet:
-        found.unknown.append(key)
-    elif match[3] == "action_control":
-        found.actions.append(key)
-        unet[name] = replace(unet[name], columns=key)
-    else:
         up, down = (f"{match[1]}.{match[2]}_adapter_{which}.weight" for which in ("up", "down"))
-        if up in keys and down in keys:
+        if name in unet and match[3] == "action_control":
+            found.actions.append(key)
+            unet[name] = replace(unet[name], columns=key)
+            return
+        if name in unet and up in keys and down in keys:
             unet[name] = replace(unet[name], low_rank=(up, down))
-        else:
-            found.unknown.append(key)
+            return
+    found.unknown.append(key)

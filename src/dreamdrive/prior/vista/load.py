@@ -11,11 +11,7 @@ from dreamdrive.prior.vista.stored import open_weights
 
 
 def open_networks(weights: Path, kind: Kind | None) -> Networks:
-    """Check weights, without loading anything yet; on a GPU the UNet will compute in float16.
-
-    Args:
-        weights: File or folder.
-        kind: Which model it must be; None takes both.
+    """Check weights of a kind, or of any, without loading; on a GPU the UNet will compute in float16.
 
     Raises:
         InputError: The weights cannot be used.

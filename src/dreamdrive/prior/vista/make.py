@@ -24,7 +24,7 @@ from dreamdrive.prior.vista.kinds import SVD, Kind
 from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
-from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames
+from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
 from dreamdrive.progress import Progress
 from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
@@ -59,7 +59,9 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     networks = open_networks(control.weights, kind)
     wanted = _wanted(control.frames, kind, networks.per_round)
     held_out = held_out_mask(len(wanted), control.hold_out)
-    spans = _rounds(int(wanted[-1]) + 1, kind, networks.per_round)
+    step = networks.per_round - kind.overlap
+    starts = range(0, step * rounds_for(int(wanted[-1]) + 1, kind, networks.per_round), step)
+    spans = [range(start, start + networks.per_round) for start in starts]
     check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
     told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
     noticed = notes_of(networks.stored)
@@ -115,12 +117,6 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, "
     return np.array(wanted, dtype=np.int64)
 
 
-def _rounds(frames: int, kind: Kind, per_round: int) -> list[range]:
-    """Frames of each round, the overlap with the round before among them."""
-    starts = [number * (per_round - kind.overlap) for number in range(rounds_for(frames, kind, per_round))]
-    return [range(start, start + per_round) for start in starts]
-
-
 def _told(
     control: Control, kind: Kind, spans: list[range], times_s: Float[np.ndarray, " f"]
 ) -> tuple[list[Float[Tensor, " a"] | None], Trajectory | None]:
@@ -149,7 +145,7 @@ def _sample(
 ) -> Float[Tensor, "f c h w"]:
     """Latents of all frames; noise is drawn on the CPU, so that it is the same everywhere."""
     draw = torch.Generator().manual_seed(seed)
-    images = leading.images()
+    images = to_images(leading.frames)
     height, width = images.shape[2] // 8, images.shape[3] // 8
     channels = engine.networks.stored.parts["unet"].config.get("out_channels", 4)
     shape = len(windows), len(windows[0].span), channels, height, width
@@ -159,7 +155,7 @@ def _sample(
         first = images[:1] + kind.noise * torch.randn(images[:1].shape, generator=draw)
     actions = [window.action for window in windows]
     made = roll_out(
-        engine.model(), kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
+        engine, kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
     )
     check_finite(made, "latents")
     return made

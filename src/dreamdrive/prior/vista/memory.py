@@ -12,7 +12,7 @@ from typing import Literal
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.decode import CHUNK
-from dreamdrive.prior.vista.picture import SIDE
+from dreamdrive.prior.vista.picture import SIDE, nearest_side
 from dreamdrive.prior.vista.stored import Stored
 
 Step = Literal["image encoder", "encoder", "UNet", "decoder"]
@@ -86,13 +86,7 @@ class Plan:
 
 
 def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
-    """What a run will take.
-
-    Args:
-        stored: The model.
-        job: What is done.
-        half: Whether the UNet computes in float16.
-    """
+    """What a run will take; ``half`` is whether the UNet computes in float16."""
     pixels = job.size[0] * job.size[1] // 64
     width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
     bytes_ = 2 if half else _FLOAT
@@ -109,13 +103,7 @@ def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
 
 
 def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
-    """Refuse a run that does not fit.
-
-    Args:
-        stored: The model.
-        job: What is done.
-        free: What there is.
-        half: Whether the UNet computes in float16.
+    """Refuse a run that does not fit; ``half`` is whether the UNet computes in float16.
 
     Raises:
         InputError: It does not fit; the message names a size that does.
@@ -147,17 +135,13 @@ def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
 
 def smaller_size(size: tuple[int, int]) -> tuple[int, int]:
     """About three quarters of a size, whose sides the network can make."""
-    return _side(0.75 * size[0]), _side(0.75 * size[1])
+    return nearest_side(0.75 * size[0]), nearest_side(0.75 * size[1])
 
 
 def _smaller_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
     """All of the same shape, the largest first."""
     widths = range(size[0] - SIDE, 0, -SIDE)
-    return [(width, _side(width * size[1] / size[0])) for width in widths]
-
-
-def _side(length: float) -> int:
-    return max(SIDE, SIDE * round(length / SIDE))
+    return [(width, nearest_side(width * size[1] / size[0])) for width in widths]
 
 
 def _gb(count: int) -> str:

@@ -1,7 +1,7 @@
 """The networks of a video model, one at a time in memory. Importing this loads diffusers and transformers."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import torch
 from accelerate import init_empty_weights
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
-    """A network whose weights take no memory yet.
-
-    Args:
-        part: Which.
-        config: Of its class.
-        kind: Of which model it is.
-    """
+    """A network of a model by the configuration of its class, whose weights take no memory yet."""
     known = {key: value for key, value in config.items() if not key.startswith("_")}
     with init_empty_weights():
         if part == "unet":
@@ -38,10 +32,7 @@ def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
 class Networks:
     """A stored model whose networks are loaded when they are asked for; each leaves when the next one comes.
 
-    Attributes:
-        stored: The model.
-        device: Where its networks run.
-        half: Whether the UNet computes in float16; the others never do.
+    ``half`` is whether the UNet computes in float16; the others never do.
     """
 
     def __init__(self, stored: "Stored", device: torch.device, *, half: bool) -> None:
@@ -62,21 +53,15 @@ class Networks:
 
     def unet(self) -> VideoUNet:
         """The UNet."""
-        network = self._use("unet")
-        assert isinstance(network, VideoUNet)
-        return network
+        return cast(VideoUNet, self._use("unet"))
 
     def vae(self) -> AutoencoderKLTemporalDecoder:
         """Encoder and decoder of frames."""
-        network = self._use("vae")
-        assert isinstance(network, AutoencoderKLTemporalDecoder)
-        return network
+        return cast(AutoencoderKLTemporalDecoder, self._use("vae"))
 
     def image_encoder(self) -> CLIPVisionModelWithProjection:
         """What describes the first frame."""
-        network = self._use("image_encoder")
-        assert isinstance(network, CLIPVisionModelWithProjection)
-        return network
+        return cast(CLIPVisionModelWithProjection, self._use("image_encoder"))
 
     def free(self) -> None:
         """Let go of what is held."""

@@ -13,15 +13,11 @@ from dreamdrive.scene.trajectory import Trajectory
 
 
 def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last_s: float) -> list[Waypoints]:
-    """The waypoints of rounds, each from where the path is when the round starts.
-
-    Args:
-        path: The wanted path.
-        starts_s: When each round starts, from the first pose on.
-        last_s: Time of the last frame, to which the path has to lead.
+    """The waypoints of rounds that start at ``starts_s``, each from where the path is then.
 
     Raises:
-        InputError: The path is shorter than the frames or the waypoints need, or no car drives it.
+        InputError: The path does not last until ``last_s``, the time of the last frame, or for all waypoints;
+            or no car drives it.
     """
     path = from_first(path)
     needed_s = max(last_s, float(starts_s[-1]) + AT_S[-1])
@@ -35,22 +31,14 @@ def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last
 
 
 def asked_path(path: Trajectory, times_s: Float[np.ndarray, " f"]) -> Trajectory:
-    """The path at the frames of a clip, from the first of them on.
-
-    Args:
-        path: The wanted path.
-        times_s: Time of each frame since the first that is made.
-    """
+    """The path at times of frames since the first that is made, from the first of these frames on."""
     return from_first(Trajectory(from_first(path).at(times_s), times_s))
 
 
 def path_by_rounds(action: Waypoints | Steering, spans: Sequence[range], rate_hz: float) -> Trajectory:
     """The path of all frames that are made where every round is told the same action.
 
-    Args:
-        action: What each round is told.
-        spans: Frames of each round; the action counts from the first of them.
-        rate_hz: Frames a second.
+    The action counts from the first frame of the round, of which ``spans`` are the frames.
     """
     round_ = path_of(action, np.arange(len(spans[0])) / rate_hz).world_from_camera
     poses = round_

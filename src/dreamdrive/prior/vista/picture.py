@@ -72,9 +72,10 @@ class Leading:
     framing: Framing
     notes: tuple[str, ...]
 
-    def images(self) -> Float[Tensor, "n 3 h w"]:
-        """The frames in [-1, 1]."""
-        return to_images(self.frames)
+
+def nearest_side(length_px: float) -> int:
+    """The side that the network can make and that is nearest to a length."""
+    return max(SIDE, SIDE * round(length_px / SIDE))
 
 
 def check_size(size: tuple[int, int]) -> None:
@@ -84,7 +85,7 @@ def check_size(size: tuple[int, int]) -> None:
         InputError: A side is no multiple of 64.
     """
     if min(size) < SIDE or size[0] % SIDE or size[1] % SIDE:
-        near = [max(SIDE, SIDE * round(side / SIDE)) for side in size]
+        near = [nearest_side(side) for side in size]
         raise InputError(
             f"--size {size[0]}x{size[1]}: the network makes frames whose sides are multiples of {SIDE}; give "
             f"{near[0]}x{near[1]}, or leave it out for {NATIVE[0]}x{NATIVE[1]}"
@@ -92,12 +93,7 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def frame(source: tuple[int, int], target: tuple[int, int], name: str) -> Framing:
-    """The largest part of a photo, in its middle, that has the target's shape.
-
-    Args:
-        source: Width and height of the photo.
-        target: Width and height of the frame.
-        name: What to call the photo in messages.
+    """The largest part of a photo, in its middle, that has the target's shape; both by width and height.
 
     Raises:
         InputError: It would have to be enlarged more than twice.
@@ -123,15 +119,10 @@ def read_leading(
     intrinsics: Path | None = None,
     hfov_deg: float | None = None,
 ) -> Leading:
-    """Read a photo, or the first frames of a video or folder.
+    """Read a photo, or the first frames of a video, or of a folder of images at the model's rate.
 
-    Args:
-        path: A photo, a video, or a folder of images at the model's rate.
-        count: Frames to take at most.
-        rate_hz: The model's rate, to whose times the nearest frames of a video are taken.
-        size: Width and height of the frames.
-        intrinsics: Calibration file of the input; a lens in it is taken out of the frames.
-        hfov_deg: Horizontal field of view of the input, instead of ``intrinsics``.
+    Of a video, the frames nearest to the times of the model's rate are taken, ``count`` at most; ``size`` is
+    width and height of the result. A lens in the calibration file is taken out of the frames.
 
     Raises:
         InputError: The input cannot be read, is too small, or changes its size.

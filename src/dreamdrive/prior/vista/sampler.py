@@ -43,11 +43,9 @@ def sigmas(steps: int) -> list[float]:
 
 
 def guidance(schedule: Schedule, frames: int) -> Float[Tensor, " t"]:
-    """How strongly the conditions count in each frame.
+    """How strongly the conditions count in each frame of a round.
 
-    Args:
-        schedule: ``constant`` is Vista's for a single round, ``triangle`` for several, ``linear`` SVD's.
-        frames: Frames of a round.
+    ``constant`` is Vista's for a single round, ``triangle`` for several, ``linear`` SVD's.
     """
     if schedule == "constant":
         return torch.full((frames,), 2.5)
@@ -71,12 +69,8 @@ def denoise(
 ) -> Float[Tensor, "t c h w"]:
     """The clean latents that the network sees in noisy ones (v-prediction).
 
-    Args:
-        velocity: The network.
-        latents: Noisy latents.
-        sigma: Standard deviation of their noise.
-        scale: Guidance of each frame.
-        mask: One for fixed frames.
+    ``sigma`` is the standard deviation of their noise, ``scale`` the guidance of each frame, and ``mask`` one
+    for fixed frames.
     """
     without, given = velocity(latents / (sigma**2 + 1) ** 0.5, time_of(sigma), mask)
     strength = scale.to(latents)[:, None, None, None]
@@ -92,18 +86,10 @@ def sample(
     steps: int,
     tell: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "t c h w"]:
-    """Latents of one round from noise.
+    """Latents of one round from noise of standard deviation 1, by Euler's rule; ``scale`` guides each frame.
 
     Known frames are put in their places before each step and after the last: without noise, as in Vista's
-    training.
-
-    Args:
-        velocity: The network.
-        noise: Of standard deviation 1.
-        scale: Guidance of each frame.
-        fixed: What is known.
-        steps: Of Euler's rule.
-        tell: Called after each step.
+    training. ``tell`` is called after each step.
     """
     levels = sigmas(steps)
     latents = noise * (levels[0] ** 2 + 1) ** 0.5

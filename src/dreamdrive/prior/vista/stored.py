@@ -49,13 +49,7 @@ _SECOND_TIME = "cond_time_embedding."
 
 @dataclass(frozen=True)
 class StoredPart:
-    """One network.
-
-    Attributes:
-        config: Of its class.
-        shapes: Of its tensors.
-        read: Reads one tensor by its name.
-    """
+    """One network: configuration of its class, shapes of its tensors, and a reader of one by its name."""
 
     config: dict[str, Any]
     shapes: Shapes
@@ -69,24 +63,12 @@ class StoredPart:
 
 @dataclass(frozen=True)
 class Stored:
-    """A video model on disk, checked by names and shapes.
-
-    Attributes:
-        path: Where it lies.
-        kind: Which model it is.
-        parts: Its networks.
-        ignored: Keys of the file that are left out on purpose.
-    """
+    """A video model on disk, checked by names and shapes; ``ignored`` keys are left out on purpose."""
 
     path: Path
     kind: Kind
     parts: Mapping[Part, StoredPart]
     ignored: tuple[str, ...] = ()
-
-    @property
-    def image_columns(self) -> int:
-        """Width of the context that describes the first frame."""
-        return int(self.parts["image_encoder"].config["projection_dim"])
 
 
 def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
@@ -111,10 +93,11 @@ def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
         _check(stored, part)
     actions = ACTION_COLUMNS if stored.kind is VISTA else 0
     columns = stored.parts["unet"].config["cross_attention_dim"]
-    if columns != stored.image_columns + actions:
+    image = int(stored.parts["image_encoder"].config["projection_dim"])
+    if columns != image + actions:
         raise InputError(
-            f"{path}: the UNet takes a context of {columns} columns; expected {stored.image_columns} of the "
-            f"image encoder and {actions} of the action"
+            f"{path}: the UNet takes a context of {columns} columns; expected {image} of the image encoder "
+            f"and {actions} of the action"
         )
     return stored
 
@@ -236,11 +219,7 @@ def _check(stored: Stored, part: Part) -> None:
 
 
 def _check_config(stored: Stored, part: Part) -> None:
-    """Whether the sizes in a configuration are those of the tensors, before a network is built of them.
-
-    Raises:
-        InputError: They differ, or are beyond what networks have.
-    """
+    """Whether the sizes in a configuration are those of the tensors, before a network is built of them."""
     own = stored.parts[part]
     where = f"{stored.path}: config.json of the {TITLES[part]}"
     check_sizes(own.config, where)

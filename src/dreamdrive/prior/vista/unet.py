@@ -33,11 +33,7 @@ class _Change:
 
 
 class VideoUNet(UNetSpatioTemporalConditionModel):
-    """The UNet with a second time embedding, for frames that are known.
-
-    Attributes:
-        cond_time_embedding: The embedding of the time for fixed frames; None in SVD.
-    """
+    """The UNet with a second time embedding, for frames that are known; SVD has none."""
 
     cond_time_embedding: TimestepEmbedding | None
     _change: _Change
@@ -50,14 +46,10 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         time_ids: Float[Tensor, "b 3"],
         fixed: Float[Tensor, " t"] | None = None,
     ) -> Float[Tensor, "b t c2 h w"]:
-        """One look at a noisy clip.
+        """One look at scaled noisy latents with the condition latents behind them.
 
-        Args:
-            sample: Scaled noisy latents with the condition latents behind them.
-            time: 0.25 ln sigma.
-            context: First frame and action.
-            time_ids: Frame rate - 1, motion bucket, noise on the first frame.
-            fixed: One for frames that are known.
+        ``time`` is 0.25 ln sigma, ``context`` the first frame and the action, ``time_ids`` are frame rate
+        - 1, motion bucket and noise on the first frame, and ``fixed`` is one for frames that are known.
         """
         times = torch.full((len(sample),), time, device=sample.device)
         try:
@@ -69,11 +61,7 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         return made[0]
 
     def prepare(self, *, fixed_frames: bool) -> "VideoUNet":
-        """Set the normalisations and, for Vista, add the second embedding.
-
-        Args:
-            fixed_frames: Whether it knows of fixed frames.
-        """
+        """Set the normalisations and, for frames that may be fixed (Vista), add the second embedding."""
         for module in self.modules():
             if isinstance(module, ResnetBlock2D | TemporalResnetBlock):
                 module.norm1.eps = module.norm2.eps = _EPS
@@ -94,23 +82,13 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
 
 
 def make_unet(config: Mapping[str, Any], *, fixed_frames: bool) -> VideoUNet:
-    """A UNet without weights of use.
-
-    Args:
-        config: Of ``UNetSpatioTemporalConditionModel``.
-        fixed_frames: Whether it is Vista's.
-    """
+    """A UNet of a configuration without weights of use; Vista's knows of fixed frames."""
     known = {key: value for key, value in config.items() if not key.startswith("_")}
     return VideoUNet(**known).prepare(fixed_frames=fixed_frames)
 
 
 def watch(unet: VideoUNet, name: str, keep: Callable[[Tensor], None]) -> Any:
-    """Hand over what a block makes, each time it runs.
-
-    Args:
-        unet: The network.
-        name: Of the block, such as ``down_blocks.1.attentions.1``.
-        keep: Takes the output (B T, C, h, w).
+    """Hand over what a block such as ``down_blocks.1.attentions.1`` makes each time it runs (B T, C, h, w).
 
     Returns:
         What to ``remove()`` afterwards.

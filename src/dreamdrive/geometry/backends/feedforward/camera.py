@@ -1,6 +1,6 @@
 """One pinhole for a clip: from those that a network gives each frame, or a known one in their place."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -12,26 +12,11 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.similarity import nearest_rotation
 
 
-@dataclass(frozen=True)
-class SharedCamera:
-    """The camera that took all frames, as the network has it.
+def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> tuple[Camera, float]:
+    """The pinhole of the frames that took all pictures, with square pixels, and how far they disagree.
 
-    Attributes:
-        camera: Pinhole of the frames with square pixels.
-        spread: Robust standard deviation (1.4826 times the median distance) of the logarithm of the focal
-            lengths along both axes of all frames.
-    """
-
-    camera: Camera
-    spread: float
-
-
-def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
-    """Medians over all frames; the focal length also over both axes.
-
-    Args:
-        intrinsics: Pinholes (N, 3, 3) in pixels of the pictures.
-        how: How the pictures were made of the frames.
+    It is the median of all pinholes (N, 3, 3), and of both axes for the focal length; the disagreement is the
+    robust standard deviation (1.4826 times the median distance) of the logarithm of the focal lengths.
 
     Raises:
         InputError: A focal length is not positive.
@@ -42,20 +27,16 @@ def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> SharedCamera:
     focal_px = float(np.median(focals_px))
     spread = 1.4826 * float(np.median(np.abs(np.log(focals_px / focal_px))))
     cx_px, cy_px = how.to_frame(np.median(intrinsics[:, :2, 2], axis=0))
-    return SharedCamera(Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread)
+    return Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread
 
 
 def seen_through(seen: Seen, camera: Camera) -> Seen:
-    """What a network saw through pinholes of its own, as it is through the known one.
+    """What a network saw through pinholes of its own, as it is through the known one of the pictures.
 
     Networks that cannot be told have the principal point in the middle. What they see is right for a camera
     that looks along the middle of the picture: it is turned to look along the true axis, by the rotation that
     brings the rays of all pixels nearest together. What a rotation does not mend, a focal length of their
     own, stays.
-
-    Args:
-        seen: Poses, depth and the network's pinholes.
-        camera: The known pinhole of the pictures.
     """
     poses, depth = seen.world_from_camera.copy(), np.empty_like(seen.depth)
     rays = camera.rays()

@@ -37,13 +37,7 @@ class Joined:
 
 
 def chunks(count: int, length: int, overlap: int) -> list[range]:
-    """Frames of each chunk: all of one length, the last moved back to the end of the clip.
-
-    Args:
-        count: Frames of the clip.
-        length: Frames of a chunk.
-        overlap: Frames that neighbours share at least.
-    """
+    """Frames of each chunk: all of one length, with at least ``overlap`` shared, the last up to the end."""
     if not 0 < overlap < length:
         raise ValueError(f"chunks of {length} frames cannot overlap by {overlap}")
     if count <= length:
@@ -68,7 +62,10 @@ def join(parts: Sequence[tuple[range, Seen]], camera: Camera, usable: Bool[np.nd
     similarities, misses = [Similarity(1.0, np.eye(3), np.zeros(3))], []
     for before, after in pairwise(parts):
         step, miss = _onto(before, after, camera, usable)
-        similarities.append(_after(similarities[-1], step))
+        last = similarities[-1]
+        similarities.append(
+            Similarity(last.scale * step.scale, last.rotation @ step.rotation, last(step.translation))
+        )
         misses.append(miss)
     unit = float(np.exp(np.mean([np.log(each.scale) for each in similarities])))
     poses, depth, confidence = [], [], []
@@ -76,7 +73,10 @@ def join(parts: Sequence[tuple[range, Seen]], camera: Camera, usable: Bool[np.nd
         first = 0 if index == 0 else _middle(parts[index - 1][0], frames)
         last = frames.stop if index + 1 == len(parts) else _middle(frames, parts[index + 1][0])
         own = slice(first - frames.start, last - frames.start)
-        poses.append(_moved(seen.world_from_camera[own], similarity, unit))
+        moved = seen.world_from_camera[own].copy()
+        moved[:, :3, 3] = similarity(moved[:, :3, 3]) / unit
+        moved[:, :3, :3] = similarity.rotation @ moved[:, :3, :3]
+        poses.append(moved)
         depth.append(seen.depth[own] * np.float32(similarity.scale / unit))
         confidence.append(seen.confidence[own])
     return Joined(
@@ -144,16 +144,3 @@ def _points(
 
 def _stride(camera: Camera) -> int:
     return max(1, int(np.sqrt(camera.width_px * camera.height_px / _PIXELS)))
-
-
-def _after(second: Similarity, first: Similarity) -> Similarity:
-    return Similarity(second.scale * first.scale, second.rotation @ first.rotation, second(first.translation))
-
-
-def _moved(
-    poses: Float[np.ndarray, "n 4 4"], similarity: Similarity, unit: float
-) -> Float[np.ndarray, "n 4 4"]:
-    moved = poses.copy()
-    moved[:, :3, :3] = similarity.rotation @ poses[:, :3, :3]
-    moved[:, :3, 3] = similarity(poses[:, :3, 3]) / unit
-    return moved

@@ -4,7 +4,7 @@ Only its network is used, which takes a fraction of the package's dependencies; 
 (``depth_anything_3.api``) imports all of them. Signatures and names of outputs are those of that release.
 """
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +46,8 @@ def load_da3(path: Path) -> Network:
     state = stored.keep("model.", tuple(f"{part}{each}." for part in ("", "da3.") for each in _GAUSSIANS))
     network = build(lambda: _make(config, name), stored, state)
     if name not in _METRIC:
-        return Network(_look(network))
-    return Network(_look(network), f"the metric network {name}", METRE_SPREAD)
+        return Network(partial(_look, network))
+    return Network(partial(_look, network), f"the metric network {name}", METRE_SPREAD)
 
 
 def _model_name(stored: Stored) -> str:
@@ -74,17 +74,14 @@ def _make(config: Any, name: str) -> nn.Module:
     return config.create_object(described)
 
 
-def _look(network: nn.Module) -> Callable[[Views], Seen]:
-    def look(views: Views) -> Seen:
-        out = network(standardise(views.pictures).to(chosen_device())[None])
-        return Seen(
-            world_from_camera=world_from_camera(out["extrinsics"][0]),
-            intrinsics=out["intrinsics"][0].cpu().numpy().astype(np.float64),
-            depth=out["depth"][0].cpu().numpy(),
-            confidence=out["depth_conf"][0].cpu().numpy(),
-        )
-
-    return look
+def _look(network: nn.Module, views: Views) -> Seen:
+    out = network(standardise(views.pictures).to(chosen_device())[None])
+    return Seen(
+        world_from_camera=world_from_camera(out["extrinsics"][0]),
+        intrinsics=out["intrinsics"][0].cpu().numpy().astype(np.float64),
+        depth=out["depth"][0].cpu().numpy(),
+        confidence=out["depth_conf"][0].cpu().numpy(),
+    )
 
 
 DA3 = GeometryBackend(

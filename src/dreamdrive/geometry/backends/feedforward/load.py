@@ -20,13 +20,9 @@ _NAMES = ("model.safetensors", "model.pt", "model.pth")
 
 @dataclass(frozen=True)
 class Stored:
-    """Weights as they lie on disk.
+    """Weights as they lie on disk, with what ``config.json`` beside them says, if it is there.
 
-    Attributes:
-        state: Tensors by key.
-        config: What ``config.json`` beside them says; empty without one.
-        source: Where they come from, for messages.
-        expected: Which weights are expected, for messages.
+    In messages ``source`` is where they come from, and ``expected`` which are expected.
     """
 
     state: dict[str, Tensor]
@@ -41,12 +37,9 @@ class Stored:
 
 
 def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Stored:
-    """Read weights; nothing in them is executed, nothing is fetched.
+    """Read weights from a ``.safetensors``, ``.pt`` or ``.pth``, or a folder with ``model`` of that ending.
 
-    Args:
-        path: A ``.safetensors``, ``.pt`` or ``.pth``, or a folder with ``model`` of that ending.
-        expected: Which weights are expected, for messages.
-        needs_config: Whether nothing can be built without ``config.json`` beside them.
+    Nothing in them is executed, nothing is fetched. ``config.json`` may lie beside them, or has to.
 
     Raises:
         InputError: A file is missing or damaged.
@@ -60,7 +53,9 @@ def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Sto
     beside = file.parent / "config.json"
     if needs_config and not beside.is_file():
         raise InputError(f"{beside} does not exist; expected {expected}")
-    return Stored(_read_state(file, expected), _read_config(beside), str(file), expected)
+    config = read_json(beside, "--weights") if beside.is_file() else {}
+    check_sizes(config, f"--weights {beside}")
+    return Stored(_read_state(file, expected), config, str(file), expected)
 
 
 def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
@@ -69,14 +64,6 @@ def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
     content = read_torch(file, expected)
     wrapped = isinstance(content, dict) and isinstance(content.get("model"), dict)
     return as_state(content["model"] if wrapped else content, str(file), expected)
-
-
-def _read_config(file: Path) -> dict[str, Any]:
-    if not file.is_file():
-        return {}
-    config = read_json(file, "--weights")
-    check_sizes(config, f"--weights {file}")
-    return config
 
 
 def upstream(module: str, install: str) -> Any:
@@ -94,12 +81,7 @@ def upstream(module: str, install: str) -> Any:
 
 
 def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]) -> Upstream:
-    """Build a network and fill it, on the GPU where torch has one.
-
-    Args:
-        make: Builds it with whatever weights.
-        stored: Where the weights come from.
-        state: The weights by the network's own keys.
+    """Build a network and fill it with weights by its own keys, on the GPU where torch has one.
 
     Raises:
         InputError: The installed package has another signature, or keys are missing, left over or of

@@ -5,7 +5,7 @@ is built from the weights' ``config.json`` as its ``from_pretrained`` does, whic
 what the file lacks, and fetches weights of its encoder that the file replaces.
 """
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ def load_mapanything(path: Path) -> Network:
     network = build(lambda: model.MapAnything(**settings), stored, stored.state)
     if network.encoder.data_norm_type != _NORMALISED:
         raise InputError(f"{stored.source} takes pictures standardised for {network.encoder.data_norm_type}")
-    return Network(_look(network), "the metric network MapAnything", METRE_SPREAD)
+    return Network(partial(_look, network), "the metric network MapAnything", METRE_SPREAD)
 
 
 def _settings(stored: Stored) -> dict[str, Any]:
@@ -67,25 +67,22 @@ def _settings(stored: Stored) -> dict[str, Any]:
     return {**stored.config, "encoder_config": encoder, "torch_hub_force_reload": False}
 
 
-def _look(network: Any) -> Callable[[Views], Seen]:
-    def look(views: Views) -> Seen:
-        out = network.infer(_shown(views), use_amp=False, memory_efficient_inference=True, minibatch_size=1)
+def _look(network: Any, views: Views) -> Seen:
+    out = network.infer(_shown(views), use_amp=False, memory_efficient_inference=True, minibatch_size=1)
 
-        def all_of(name: str) -> Tensor:
-            return torch.cat([each[name] for each in out]).cpu()
+    def all_of(name: str) -> Tensor:
+        return torch.cat([each[name] for each in out]).cpu()
 
-        intrinsics = all_of("intrinsics").numpy().astype(np.float64)
-        # It counts pixels from 0.
-        intrinsics[:, :2, 2] += 0.5
-        return Seen(
-            world_from_camera=nearest_rigid(all_of("camera_poses")),
-            intrinsics=intrinsics,
-            # Masked pixels are 0 already.
-            depth=all_of("depth_z")[..., 0].numpy(),
-            confidence=all_of("conf").numpy(),
-        )
-
-    return look
+    intrinsics = all_of("intrinsics").numpy().astype(np.float64)
+    # It counts pixels from 0.
+    intrinsics[:, :2, 2] += 0.5
+    return Seen(
+        world_from_camera=nearest_rigid(all_of("camera_poses")),
+        intrinsics=intrinsics,
+        # Masked pixels are 0 already.
+        depth=all_of("depth_z")[..., 0].numpy(),
+        confidence=all_of("conf").numpy(),
+    )
 
 
 def _shown(views: Views) -> list[dict[str, Any]]:

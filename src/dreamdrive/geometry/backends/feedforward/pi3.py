@@ -4,7 +4,7 @@ Signatures, names and conventions of outputs are those of yyfz/Pi3 9fa3ddb. Neit
 is fitted to the points of each frame. Pi3X takes known intrinsics and poses, and is metric, approximately.
 """
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,30 +35,27 @@ def load_pi3(path: Path) -> Network:
     if "metric_token" in stored.state:
         model = upstream("pi3.models.pi3x", INSTALL)
         network = build(lambda: model.Pi3X(use_multimodal=True), stored, stored.state)
-        look = _look(network, conditioned=True)
+        look = partial(_look, network, True)
         return Network(look, "the network Pi3X, metric approximately", 2 * METRE_SPREAD)
     model = upstream("pi3.models.pi3", INSTALL)
     sizes = {name: stored.config[name] for name in ("pos_type", "decoder_size") if name in stored.config}
     network = build(lambda: model.Pi3(**sizes), stored, stored.state)
-    return Network(_look(network, conditioned=False))
+    return Network(partial(_look, network, False))
 
 
-def _look(network: nn.Module, *, conditioned: bool) -> Callable[[Views], Seen]:
-    def look(views: Views) -> Seen:
-        pictures = views.pictures.to(chosen_device())[None]
-        out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
-        known = views.camera if conditioned else None
-        points = out["local_points"][0].cpu().numpy()
-        # The logit itself would do for ranks; the focal length asks for odds above one.
-        odds = (1 + out["conf"][0, ..., 0].double().exp()).cpu().numpy()
-        return Seen(
-            world_from_camera=nearest_rigid(out["camera_poses"][0]),
-            intrinsics=np.stack([_pinhole(*each, known) for each in zip(points, odds, strict=True)]),
-            depth=points[..., 2],
-            confidence=odds,
-        )
-
-    return look
+def _look(network: nn.Module, conditioned: bool, views: Views) -> Seen:
+    pictures = views.pictures.to(chosen_device())[None]
+    out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
+    known = views.camera if conditioned else None
+    points = out["local_points"][0].cpu().numpy()
+    # The logit itself would do for ranks; the focal length asks for odds above one.
+    odds = (1 + out["conf"][0, ..., 0].double().exp()).cpu().numpy()
+    return Seen(
+        world_from_camera=nearest_rigid(out["camera_poses"][0]),
+        intrinsics=np.stack([_pinhole(*each, known) for each in zip(points, odds, strict=True)]),
+        depth=points[..., 2],
+        confidence=odds,
+    )
 
 
 def _conditions(views: Views) -> dict[str, Tensor]:

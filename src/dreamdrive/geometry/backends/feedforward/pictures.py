@@ -15,10 +15,7 @@ _DEVIATION = (0.229, 0.224, 0.225)
 def fit_patches(width_px: int, height_px: int, long_side_px: int) -> Fitting:
     """How frames are resized to whole patches: a little stretched, nothing cut off.
 
-    Args:
-        width_px: Width of the frame.
-        height_px: Height of the frame.
-        long_side_px: Length of the long side, a multiple of 14; the other takes the nearest multiple.
+    The long side, a multiple of 14, is given; the other takes the nearest multiple.
     """
     longest = max(width_px, height_px)
     width, height = (

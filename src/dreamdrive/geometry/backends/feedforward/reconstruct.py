@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.feedforward.camera import SharedCamera, seen_through, share
+from dreamdrive.geometry.backends.feedforward.camera import seen_through, share
 from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
 from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
 from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show
@@ -58,14 +58,8 @@ class FeedForward:
     ) -> Geometry:
         """Cameras and depth of the network, brought to metres.
 
-        Held-out frames are seen, which poses them; their depth is not handed on.
-
-        Args:
-            clip: Frames of one camera.
-            camera_height_m: Height of the camera above the road; None assumes 1.5 m.
-            seed: Seed of everything random.
-            weights: The network's file or folder.
-            work: Told after each chunk of frames; keeps what the network measured.
+        Held-out frames are seen, which poses them; their depth is not handed on. What the network measured is
+        kept.
 
         Raises:
             InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
@@ -92,12 +86,8 @@ class FeedForward:
     ) -> Measured:
         """Cameras and depth of the network, in its unit or that of known poses.
 
-        Args:
-            clip: Two frames or more of one camera.
-            free: Pixels (F, H, W) that show the street.
-            weights: The network's file or folder.
-            seed: Seed of everything random.
-            progress: Told after each chunk of frames; a last step is left for what follows.
+        ``free`` are pixels (F, H, W) that show the street. Progress is told after each chunk of frames; a
+        last step is left for what follows.
 
         Raises:
             InputError: The weights or results cannot be used.
@@ -111,31 +101,26 @@ class FeedForward:
             for frames in cut:
                 parts.append((frames, _see(network, clip, frames, how)))
                 progress(len(parts), len(cut) + 1)
-        shared = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
+        own, spread = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
+        camera = clip.rig[0] if clip.known.intrinsics else own
         usable = np.stack([prepare_mask(one, how) for one in free])
-        joined = join(parts, how.picture_camera(_camera(clip, shared)), usable)
-        return _measured(clip, joined, shared, free, how, network)
+        joined = join(parts, how.picture_camera(camera), usable)
+        return _measured(clip, joined, camera, (own.fx_px, spread), free, how, network)
 
 
 def _measured(
     clip: Clip,
     joined: Joined,
-    shared: SharedCamera,
+    camera: Camera,
+    focal: tuple[float, float],
     free: Bool[np.ndarray, "f h w"],
     how: Fitting,
     network: Network,
 ) -> Measured:
     """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
 
-    Known poses are kept, and give the depth their unit.
-
-    Args:
-        clip: The frames.
-        joined: Their poses and depth on the grid of the pictures.
-        shared: Their camera as the network has it.
-        free: Pixels (F, H, W) of the frames that show the street.
-        how: How the pictures were made of the frames.
-        network: The network, for its unit.
+    Known poses are kept, and give the depth their unit. ``focal`` is the network's focal length in pixels of
+    the clip, and its spread.
     """
     poses, factor, others = joined.world_from_camera, 1.0, dict[str, float]()
     unit, spread = network.unit, network.unit_spread
@@ -152,25 +137,21 @@ def _measured(
     depth, confidence = trusted(depth * np.float32(factor), trust, there)
     return Measured(
         world_from_camera=poses,
-        camera=replace(_camera(clip, shared), world_from_camera=np.eye(4)),
-        focal_observed=clip.known.intrinsics or shared.spread <= _FOCAL_SPREAD,
+        camera=replace(camera, world_from_camera=np.eye(4)),
+        focal_observed=clip.known.intrinsics or focal[1] <= _FOCAL_SPREAD,
         depth=depth,
         confidence=confidence,
         unit=unit,
         unit_spread=spread,
         others=others,
-        notes=tuple(_notes(clip, joined, shared)),
+        notes=tuple(_notes(clip, joined, *focal)),
         details={
-            "focal_by_network_px": shared.camera.fx_px,
-            "focal_spread": shared.spread,
+            "focal_by_network_px": focal[0],
+            "focal_spread": focal[1],
             "chunk_scales": joined.scales.tolist(),
             "chunk_miss": joined.miss.tolist(),
         },
     )
-
-
-def _camera(clip: Clip, shared: SharedCamera) -> Camera:
-    return clip.rig[0] if clip.known.intrinsics else shared.camera
 
 
 def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
@@ -190,13 +171,13 @@ def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
     return seen if views.camera is None else seen_through(seen, views.camera)
 
 
-def _notes(clip: Clip, joined: Joined, shared: SharedCamera) -> list[str]:
+def _notes(clip: Clip, joined: Joined, own_focal_px: float, spread: float) -> list[str]:
     notes = []
-    if shared.spread > _FOCAL_SPREAD:
+    if spread > _FOCAL_SPREAD:
         notes.append("the frames do not agree on a focal length")
     focal_px = clip.rig[0].fx_px
-    if clip.known.intrinsics and abs(shared.camera.fx_px / focal_px - 1) > _FOCAL_APART:
-        notes.append(f"the network sees a focal length of {shared.camera.fx_px:.0f} px, not {focal_px:.0f}")
+    if clip.known.intrinsics and abs(own_focal_px / focal_px - 1) > _FOCAL_APART:
+        notes.append(f"the network sees a focal length of {own_focal_px:.0f} px, not {focal_px:.0f}")
     if (joined.miss > _CHUNK_MISS).any():
         notes.append(f"chunks of frames miss each other by {joined.miss.max():.0%} of the depth")
     return notes

@@ -5,7 +5,7 @@ the copy of its code in facebookresearch/map-anything f7ebafb; ``enable_point`` 
 that copy lacks, are read from forks of its present release.
 """
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,22 +39,19 @@ def load_vggt(path: Path) -> Network:
         stored,
         stored.keep(without=_UNUSED),
     )
-    return Network(_look(network, encoding))
+    return Network(partial(_look, network, encoding))
 
 
-def _look(network: nn.Module, encoding: Any) -> Callable[[Views], Seen]:
-    def look(views: Views) -> Seen:
-        out = network(views.pictures.to(chosen_device())[None])
-        size = tuple(views.pictures.shape[-2:])
-        camera_from_world, intrinsics = encoding.pose_encoding_to_extri_intri(out["pose_enc"], size)
-        return Seen(
-            world_from_camera=world_from_camera(camera_from_world[0]),
-            intrinsics=intrinsics[0].cpu().numpy().astype(np.float64),
-            depth=out["depth"][0, ..., 0].cpu().numpy(),
-            confidence=out["depth_conf"][0].cpu().numpy(),
-        )
-
-    return look
+def _look(network: nn.Module, encoding: Any, views: Views) -> Seen:
+    out = network(views.pictures.to(chosen_device())[None])
+    size = tuple(views.pictures.shape[-2:])
+    camera_from_world, intrinsics = encoding.pose_encoding_to_extri_intri(out["pose_enc"], size)
+    return Seen(
+        world_from_camera=world_from_camera(camera_from_world[0]),
+        intrinsics=intrinsics[0].cpu().numpy().astype(np.float64),
+        depth=out["depth"][0, ..., 0].cpu().numpy(),
+        confidence=out["depth_conf"][0].cpu().numpy(),
+    )
 
 
 VGGT = GeometryBackend(
