@@ -12,7 +12,7 @@ from dreamdrive.cli.evaluate_decomposition import decomposition
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 from dreamdrive.world.files import write_world
@@ -42,7 +42,7 @@ def place(street: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
         tuple(street.cameras[i] for i in INDEX),
         street.times_s[INDEX] - street.times_s[INDEX[0]],
         np.zeros(2, dtype=bool),
-        {"source_index": INDEX},
+        Provenance(source_index=tuple(INDEX)),
     )
     save_scene(scene, folder / "out" / "scene")
     return folder

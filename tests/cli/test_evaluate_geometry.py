@@ -14,7 +14,7 @@ from tests.streets import bare_street, street_clip, true_geometry
 
 from dreamdrive.run import codec
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.stored import save_scene
 from dreamdrive.world import Drive
 from dreamdrive.world.files import write_world
@@ -53,7 +53,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cameras,
         clip.times_s,
         clip.held_out,
-        {"source_index": list(range(5)), "input": "world", "lens": None},
+        Provenance(source_index=tuple(range(5)), input="world"),
     )
     save_scene(scene, folder / "out" / "scene")
     return folder

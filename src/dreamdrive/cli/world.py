@@ -66,11 +66,7 @@ def make(
     )
 
     wanted = parse_size(size)
-    if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(wanted) < 16:
-        raise InputError(
-            f"--frames {frames} --fps {fps:g} --seed {seed} --size {size}: expected at least one frame, a "
-            "positive rate, a seed of 0 or more and at least 16x16 pixels"
-        )
+    _check_numbers(frames, fps, seed, wanted)
     check_free(out, force, MARK)
     count = frames * (len(MOUNTS) if cameras == "surround" else 1)
     _check_memory(count, wanted, free_bytes())
@@ -101,6 +97,15 @@ def make(
         }
     write_world(drives, out, corruption=wrong, replace=force)
     console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s", soft_wrap=True)
+
+
+def _check_numbers(frames: int, fps: float, seed: int, size: tuple[int, int]) -> None:
+    """Refuse what no world can be drawn with."""
+    if frames < 1 or not 0 < fps < float("inf") or seed < 0 or min(size) < 16:
+        raise InputError(
+            f"--frames {frames} --fps {fps:g} --seed {seed} --size {size[0]}x{size[1]}: expected at least "
+            "one frame, a positive rate, a seed of 0 or more and at least 16x16 pixels"
+        )
 
 
 def _check_memory(count: int, size: tuple[int, int], free: int | None) -> None:

@@ -93,7 +93,7 @@ class FeedForward:
             InputError: The weights or results cannot be used.
         """
         how = fit_patches(*clip.size, self.long_side_px)
-        with torch.random.fork_rng():
+        with torch.random.fork_rng(range(torch.cuda.device_count())):
             torch.manual_seed(seed)
             network = self.load(weights)
             parts: list[tuple[range, Seen]] = []
