@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dreamdrive.errors import InputError as InputError
+    from dreamdrive.options import Options as Options
+    from dreamdrive.pipeline import Given as Given
+    from dreamdrive.pipeline import build_scene as build_scene
     from dreamdrive.pipeline import generate as generate
     from dreamdrive.run import Outcome as Outcome
     from dreamdrive.scene.camera import Camera as Camera
@@ -27,10 +30,13 @@ _HOME = {
     "Control": "dreamdrive.scene.control",
     "Gaussians": "dreamdrive.scene.gaussians",
     "Geometry": "dreamdrive.scene.geometry",
+    "Given": "dreamdrive.pipeline",
     "InputError": "dreamdrive.errors",
+    "Options": "dreamdrive.options",
     "Outcome": "dreamdrive.run",
     "Scene": "dreamdrive.scene.scene",
     "Trajectory": "dreamdrive.scene.trajectory",
+    "build_scene": "dreamdrive.pipeline",
     "generate": "dreamdrive.pipeline",
     "load_scene": "dreamdrive.stored.folder",
     "render_scene": "dreamdrive.splat",

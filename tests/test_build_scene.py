@@ -1,0 +1,51 @@
+"""From nouns to a scene, with what is known already in place of what would be found."""
+
+from dataclasses import replace
+
+import torch
+
+from dreamdrive import Given, build_scene, options
+from dreamdrive.decompose import Grouping
+from dreamdrive.fit import FitOptions
+from dreamdrive.progress import Work
+from dreamdrive.run import call
+from tests.streets import small_street, street_clip, true_geometry
+
+DRAFT = options.QUALITIES["draft"]
+TINY = replace(
+    DRAFT, static=FitOptions(steps=4), score=replace(DRAFT.score, steps=4), fit=FitOptions(steps=4)
+)
+
+
+def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_run() -> None:
+    street = small_street(frames=6)
+    clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
+    made: dict[str, object] = {}
+
+    def noted(name, options, compute, *, check=lambda _: None, given=None):
+        made[name] = call(name, options, compute, check=check, given=given)
+        return made[name]
+
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted)
+    assert list(made) == ["geometry", "initialise", "static", "score", "group", "fit"]
+    assert made["geometry"] is geometry
+    assert scene is made["fit"]
+    count = len(made["initialise"])  # type: ignore[arg-type]
+    half = torch.arange(count) % 2 == 0
+    labels = Grouping(half, torch.where(half, 0, -1))
+    known = Given(geometry, made["static"], labels)  # type: ignore[arg-type]
+    again = build_scene(clip, TINY, given=known, run=noted)
+    assert made["group"] is labels
+    assert len(again.dynamic) == int(half.sum())
+    tracks = replace(TINY.cast, tracks=False)
+    still = build_scene(clip, replace(TINY, cast=tracks), given=known)
+    assert still.actors == ()
+
+
+def test_the_same_clip_and_options_give_the_same_scene() -> None:
+    street = small_street(frames=6)
+    clip, given = street_clip(street, hold_out=4), Given(true_geometry(street))
+    static = replace(TINY, representation="static")
+    one, other = (build_scene(clip, static, given=given) for _ in range(2))
+    assert torch.equal(one.static.means, other.static.means)
+    assert Work().keep("part", lambda: 3) == 3
