@@ -62,12 +62,17 @@ class Options:
         return {**fits, "score": self.score.steps} if scored else fits
 
 
+_PAPER_TAU = 0.05
+"""tau of eq. 9, which has no number there: the best of 0.025 to 0.3 on drawn streets of the development
+(``benchmarks/results/parts-2026-11-23.md``). Errors of a static fit are that small."""
+
+
 def with_method(options: Options, method: MethodName) -> Options:
     """The options of ``--method``: ``"paper"`` takes eq. 5-14 as printed, ``"dreamdrive"`` is ours.
 
     The paper's error map is the only target of the scores, unscaled, in all frames; every Gaussian is
     clustered and votes; F_deform alone, of the size of Deformable-3DGS that the paper follows, moves things;
-    the loss is L1 + SSIM. Its tau has no number there: ours, in units of the unscaled error.
+    the loss is L1 + SSIM.
     """
     if method == "dreamdrive":
         return options
@@ -76,7 +81,7 @@ def with_method(options: Options, method: MethodName) -> Options:
         options,
         method="paper",
         score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None),
-        group=replace(g, clusters="density", threshold=g.threshold * s.error_scale, majority=0.5),
+        group=replace(g, clusters="density", threshold=_PAPER_TAU, majority=0.5),
         cast=replace(options.cast, tracks=False),
         static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
         fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0),
