@@ -12,7 +12,7 @@ from dreamdrive.files.paths import inside
 def clean(out: Annotated[Positional[Path], arg(metavar="OUT")]) -> None:
     """Remove the results that the stages of generate keep in an output folder.
 
-    Scene, videos and report stay. The next generate of the same input computes all stages again.
+    Scene, videos and report stay. Another generate into the folder computes all stages again.
 
     Args:
         out: The folder that generate wrote.
