@@ -17,7 +17,7 @@ from dreamdrive.run.held_out import score_baselines, score_scene
 from dreamdrive.run.outcome import Outcome, outcome_of
 from dreamdrive.run.report import describe
 from dreamdrive.run.request import Request
-from dreamdrive.run.stages import Stages, trusted
+from dreamdrive.run.stages import Stages
 from dreamdrive.run.workspace import REPORT, Workspace
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -48,20 +48,11 @@ class Production(Stages):
     request: Request
     say: Say
 
-    def __call__(
-        self,
-        name: str,
-        options: object,
-        compute: Callable[[Work], T],
-        *,
-        check: Callable[[T], None] = trusted,
-        given: T | None = None,
-    ) -> T:
-        """See ``Run``; after the geometry there is something to see."""
-        value = super().__call__(name, options, compute, check=check, given=given)
-        if name == "geometry" and not self.records[name].cached:
+    def _compute(self, name: str, key: str, compute: Callable[[Work], T]) -> T:
+        value = super()._compute(name, key, compute)
+        if isinstance(value, Geometry):
             picture = inside(self.folder, FIRST_PICTURE)
-            write_png(picture, draw_geometry(self.results["prior"], self.results["geometry"]))
+            write_png(picture, draw_geometry(self.results["prior"], value))
             self.say(f"A first picture is there, of the path, distances and what moves: {picture}")
         return value
 
