@@ -194,10 +194,10 @@ def decompose(
         labels = run(
             "group",
             o.group,
-            lambda _: group(clip, geometry, seeds, scores, o.group),
+            lambda _: group(clip, geometry, seeds, scores, o.group, o.seeds.reach_px),
             check=partial(check.grouping, seeds),
         )
     else:
         run("group", o.group, lambda _: labels, given=labels)
-    moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast)
+    moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
     return Parts(fitted.select(labels.static), moving.gaussians, moving.tracks, moving.actors)

@@ -9,6 +9,8 @@ from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
 from dreamdrive.decompose.group import _successive
 from dreamdrive.fit import SeedOptions, initialise
 
+REACH_PX = SeedOptions().reach_px
+
 
 def scene(**changes):
     street = small_street(size=(160, 96), **changes)
@@ -23,9 +25,9 @@ def test_the_majority_of_a_cluster_decides_for_all_of_it():
     doubt = torch.rand(len(seeds), generator=generator)
     # One member in four of the moving thing scores below the threshold, but is no certain street either.
     scores = torch.where(truth, torch.where(doubt < 0.25, 0.3, 0.9), torch.tensor(0.05))
-    grouping = group(clip, geometry, seeds, scores, GroupOptions())
+    grouping = group(clip, geometry, seeds, scores, GroupOptions(), REACH_PX)
     assert (grouping.dynamic == truth).float().mean() > 0.995
-    alone = group(clip, geometry, seeds, scores, GroupOptions(clusters="none"))
+    alone = group(clip, geometry, seeds, scores, GroupOptions(clusters="none"), REACH_PX)
     assert (alone.dynamic[truth]).float().mean() < 0.8
 
 
@@ -33,14 +35,14 @@ def test_scattered_false_alarms_are_outvoted():
     _, clip, geometry, seeds = scene(movers=0)
     generator = torch.Generator().manual_seed(0)
     scores = torch.where(torch.rand(len(seeds), generator=generator) < 0.004, 0.9, 0.05)
-    assert not group(clip, geometry, seeds, scores, GroupOptions()).dynamic.any()
+    assert not group(clip, geometry, seeds, scores, GroupOptions(), REACH_PX).dynamic.any()
 
 
 def test_one_car_is_one_actor_whose_track_is_the_cars():
     street, clip, geometry, seeds = scene()
     scores = seeds.features[:, 0].clone()
-    grouping = group(clip, geometry, seeds, scores, GroupOptions())
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    grouping = group(clip, geometry, seeds, scores, GroupOptions(), REACH_PX)
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     assert len(whole.actors) == 1
     box = next(b for b in street.boxes if b.moving)
     moved = box.world_from_box[-1, :3, 3] - box.world_from_box[0, :3, 3]
@@ -51,8 +53,8 @@ def test_one_car_is_one_actor_whose_track_is_the_cars():
 def test_copies_of_one_car_lie_on_top_of_each_other():
     """Every frame seeds its own copy; merged, they are as compact as one car, not a trail."""
     _, clip, geometry, seeds = scene()
-    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions(), REACH_PX)
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     centres = [
         whole.gaussians.means[whole.gaussians.source_frame == frame].median(dim=0).values
         for frame in range(len(clip))
@@ -66,9 +68,9 @@ def test_copies_of_one_car_lie_on_top_of_each_other():
 
 def test_what_has_no_track_lives_as_long_as_is_asked():
     _, clip, geometry, seeds = scene()
-    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions(), REACH_PX)
     options = ActorOptions(least_frames=100, untracked_frames=2.0)
-    whole = cast(clip, geometry, seeds, grouping, options)
+    whole = cast(clip, geometry, seeds, grouping, options, REACH_PX)
     interval_s = float(np.median(np.diff(clip.times_s[~clip.held_out])))
     assert whole.tracks is None
     torch.testing.assert_close(whole.gaussians.means, seeds.select(grouping.dynamic).means)
@@ -79,8 +81,8 @@ def test_what_has_no_track_lives_as_long_as_is_asked():
 
 def test_nothing_dynamic_gives_an_empty_cast():
     _, clip, geometry, seeds = scene()
-    grouping = group(clip, geometry, seeds, torch.zeros(len(seeds)), GroupOptions())
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions())
+    grouping = group(clip, geometry, seeds, torch.zeros(len(seeds)), GroupOptions(), REACH_PX)
+    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     assert len(whole.gaussians) == 0
     assert whole.actors == ()
     assert whole.tracks is None
@@ -90,8 +92,8 @@ def test_a_cluster_without_a_core_is_street():
     """Foliage that a short fit gets wrong everywhere a little crosses tau, yet nothing in it is certain."""
     _, clip, geometry, seeds = scene(movers=0)
     lukewarm = torch.full((len(seeds),), 0.45)
-    assert not group(clip, geometry, seeds, lukewarm, GroupOptions()).dynamic.any()
-    assert group(clip, geometry, seeds, lukewarm, GroupOptions(core=0.0)).dynamic.any()
+    assert not group(clip, geometry, seeds, lukewarm, GroupOptions(), REACH_PX).dynamic.any()
+    assert group(clip, geometry, seeds, lukewarm, GroupOptions(core=0.0), REACH_PX).dynamic.any()
 
 
 def test_a_shadow_stays_on_the_road_and_its_car_moves_on():
@@ -104,12 +106,12 @@ def test_a_shadow_stays_on_the_road_and_its_car_moves_on():
     shadow = ~car & (away < 1.0) & torch.from_numpy(above_m < 0.05)
     assert shadow.sum() > 50
     scores = torch.where(car | shadow, 0.9, 0.05)
-    apart = group(clip, geometry, seeds, scores, GroupOptions())
+    apart = group(clip, geometry, seeds, scores, GroupOptions(), REACH_PX)
     assert apart.dynamic[shadow].float().mean() < 0.2
     assert apart.dynamic[car].float().mean() > 0.9
-    together = group(clip, geometry, seeds, scores, GroupOptions(road=None))
+    together = group(clip, geometry, seeds, scores, GroupOptions(road=None), REACH_PX)
     assert together.dynamic[shadow].float().mean() > 0.9
-    nowhere = group(clip, replace(geometry, ground=None), seeds, scores, GroupOptions())
+    nowhere = group(clip, replace(geometry, ground=None), seeds, scores, GroupOptions(), REACH_PX)
     assert (nowhere.dynamic == together.dynamic).all()
 
 

@@ -19,7 +19,7 @@ def copy_at(x_m: float, z_m: float) -> np.ndarray:
 
 
 def life(place: tuple[float, float, float], source: int, glimpses: list[Glimpse]) -> tuple[float, float]:
-    found = lives(np.array([place], float), np.array([source]), glimpses, (0.0, 0.5), 0.125)
+    found = lives(np.array([place], float), np.array([source]), glimpses, (0.0, 0.5), 0.125, 4.5)
     return float(found[0, 0]), float(found[0, 1])
 
 

@@ -8,10 +8,12 @@ import pytest
 import torch
 from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.decompose import GroupOptions, cast, group
+from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
 from dreamdrive.motion import DeformationConfig
 from dreamdrive.splat.scene_view import render_scene
+
+REACH_PX = SeedOptions().reach_px
 
 
 def quiet(done: int, total: int) -> None:
@@ -28,7 +30,7 @@ def stages(street):
     clip, geometry = street_clip(street, hold_out=8), true_geometry(street)
     seeds = initialise(clip, geometry, SeedOptions(moving_stride_px=2))
     start = fit_static(clip, geometry, seeds, FitOptions(steps=60), 0, quiet)
-    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions())
+    grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions(), REACH_PX)
     return clip, geometry, seeds, start, grouping
 
 
@@ -40,7 +42,7 @@ def fitted(stages, representation: str, steps: int = 120, seed: int = 0):
     elif representation == "deformable":
         parts = Parts(none, start.gaussians, None, ())
     else:
-        whole = cast(clip, geometry, seeds, grouping)
+        whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
         static = start.gaussians.select(grouping.static)
         parts = Parts(static, whole.gaussians, whole.tracks, whole.actors)
     network = DeformationConfig(width=32)

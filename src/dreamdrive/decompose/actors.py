@@ -88,13 +88,13 @@ def cast(
     geometry: Geometry,
     gaussians: Gaussians,
     grouping: Grouping,
-    options: ActorOptions | None = None,
+    options: ActorOptions,
+    reach_px: float,
 ) -> Cast:
     """Track every dynamic cluster and merge its copies, each where its source frame saw it.
 
-    Held-out frames are not read.
+    Copies within ``reach_px`` in an image are neighbours, see ``SeedOptions``. Held-out frames are not read.
     """
-    options = options or ActorOptions()
     index = np.flatnonzero(grouping.dynamic.numpy())
     chosen = gaussians.select(torch.from_numpy(index))
     if not len(index):
@@ -110,7 +110,7 @@ def cast(
     paths = [
         _path(flows, pixels, frames, np.flatnonzero(cluster == c), options) for c in range(cluster.max() + 1)
     ]
-    return _merge(clip, geometry, chosen, pixels, cluster, paths, options)
+    return _merge(clip, geometry, chosen, pixels, cluster, paths, options, reach_px)
 
 
 def _path(
@@ -198,6 +198,7 @@ def _merge(
     cluster: Int[np.ndarray, " m"],
     paths: list[_Path],
     options: ActorOptions,
+    reach_px: float,
 ) -> Cast:
     seen = np.flatnonzero(~clip.held_out)
     times = np.unique(clip.times_s[seen])
@@ -228,7 +229,7 @@ def _merge(
         if options.lasting:
             glimpses = _glimpses(clip, geometry, path, places - canonical_m, pixels[rows], frames[rows])
             span_s = float(clip.times_s[0]), float(clip.times_s[-1])
-            lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s)
+            lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s, reach_px)
         translations.append(offsets)
         pivots.append(canonical_m)
         name = f"actor {len(actors)}"

@@ -30,8 +30,7 @@ class GroupOptions:
     Attributes:
         threshold: tau of eq. 9: a Gaussian votes dynamic above it. With 0.2 0.469, 0.5 0.503, 0.65 0.492.
         candidate: Only Gaussians above this score are clustered; the rest is one static mass.
-        reach_px: Neighbours of one source frame are at most this far apart in its image.
-        reach_depth: ... and differ by at most this in the logarithm of depth.
+        reach_depth: Neighbours of one source frame differ by at most this in the logarithm of depth.
         link: A label that flow carries onto a cluster keeps its points if it has this share of the strongest
             label's; weaker ones are noise.
         link_depth: Flow carries a label only onto points whose depth differs by at most this in the
@@ -53,7 +52,6 @@ class GroupOptions:
 
     threshold: float = 0.35
     candidate: float = 0.25
-    reach_px: float = 4.5
     reach_depth: float = 0.06
     link: float = 0.2
     link_depth: float = 0.3
@@ -85,13 +83,18 @@ class Grouping:
 
 
 def group(
-    clip: Clip, geometry: Geometry, gaussians: Gaussians, scores: Float[Tensor, " n"], options: GroupOptions
+    clip: Clip,
+    geometry: Geometry,
+    gaussians: Gaussians,
+    scores: Float[Tensor, " n"],
+    options: GroupOptions,
+    reach_px: float,
 ) -> Grouping:
     """Cluster in space and time, then let the majority of each cluster decide for all of it.
 
     Within one source frame neighbours in the image at like depth belong together; from frame to frame optical
-    flow carries labels on, so that a thing keeps its cluster while it moves. Held-out frames are not read;
-    scores are in [0, 1].
+    flow carries labels on, so that a thing keeps its cluster while it moves. Neighbours are at most
+    ``reach_px`` apart, see ``SeedOptions``. Held-out frames are not read; scores are in [0, 1].
     """
     value = scores.detach().numpy()
     votes = value > options.threshold
@@ -104,7 +107,7 @@ def group(
     index = np.flatnonzero(value > options.candidate)
     points = source_pixels(geometry, gaussians, index)
     frames = gaussians.source_frame.numpy()[index]
-    labels = _space_time_labels(clip, points, frames, options)
+    labels = _space_time_labels(clip, points, frames, options, reach_px)
     upright = ~on_road(points[:, :2], frames, labels, _low(geometry, gaussians, index, options))
     wins = elected(labels[upright], value[index[upright]], options)
     members = upright & np.isin(labels, wins)
@@ -154,7 +157,11 @@ def source_pixels(
 
 
 def _space_time_labels(
-    clip: Clip, points: Float[np.ndarray, "m 3"], frames: Int[np.ndarray, " m"], options: GroupOptions
+    clip: Clip,
+    points: Float[np.ndarray, "m 3"],
+    frames: Int[np.ndarray, " m"],
+    options: GroupOptions,
+    reach_px: float,
 ) -> Int[np.ndarray, " m"]:
     """One label a thing: components of a frame take over the labels that flow carries onto their points.
 
@@ -167,13 +174,11 @@ def _space_time_labels(
         rows = np.flatnonzero(frames == frame)
         if not len(rows):
             continue
-        component[rows] = (
-            component.max() + 1 + linked_pixels(points[rows], options.reach_px, options.reach_depth)
-        )
+        component[rows] = component.max() + 1 + linked_pixels(points[rows], reach_px, options.reach_depth)
         earlier = np.flatnonzero(frames == before) if before is not None else rows[:0]
         if before is not None and len(earlier):
             flow = neighbour_flow(clip, before, frame)
-            labels[rows] = _handed_on(points[earlier], labels[earlier], flow, points[rows], options)
+            labels[rows] = _handed_on(points[earlier], labels[earlier], flow, points[rows], options, reach_px)
         labels[rows] = _completed(labels[rows], component[rows], int(labels.max()) + 1, options)
     return _joined(labels, component, frames, options) if len(labels) else labels
 
@@ -192,10 +197,11 @@ def _handed_on(
     flow: Float[np.ndarray, "h w 2"],
     points: Float[np.ndarray, "m 3"],
     options: GroupOptions,
+    reach_px: float,
 ) -> Int[np.ndarray, " m"]:
     """Label of the nearest point of the frame before after flow, at like depth; -1 where there is none."""
     tree = KDTree(carried(sources[:, :2], flow))
-    found = tree.query(points[:, :2], distance_upper_bound=options.reach_px)
+    found = tree.query(points[:, :2], distance_upper_bound=reach_px)
     distance, nearest = np.asarray(found[0]), np.asarray(found[1])
     reached = np.isfinite(distance)
     nearest = np.where(reached, nearest, 0)

@@ -15,9 +15,7 @@ from scipy.spatial import KDTree
 
 from dreamdrive.scene.camera import Camera
 
-_REACH_PX = 4.0  # seeds on moving things are up to 3 px apart
 _LIKE_DEPTH = 0.12  # in the logarithm
-_NEAR_M = 0.2
 _WIDTH = (
     0.6  # standard deviation over half the length of a long life: at its ends a copy keeps half its opacity
 )
@@ -43,13 +41,15 @@ def lives(
     glimpses: Sequence[Glimpse],
     span_s: tuple[float, float],
     deviation_s: float,
+    reach_px: float,
 ) -> Float[np.ndarray, "n 2"]:
     """Centre and standard deviation of each copy's life in seconds, by its canonical place in the world.
 
     ``source`` tells which of the glimpses, in the order of time, each copy is from; ``span_s`` is the clip's;
-    ``deviation_s`` that of a copy that its neighbours in time replace.
+    ``deviation_s`` that of a copy that its neighbours in time replace. Neighbours in an image are at most
+    ``reach_px`` apart.
     """
-    unseen = np.stack([_unseen(places, glimpse) for glimpse in glimpses])
+    unseen = np.stack([_unseen(places, glimpse, reach_px) for glimpse in glimpses])
     times = np.array([glimpse.time_s for glimpse in glimpses])
     begin = _until(unseen, source, times, -1, span_s[0])
     end = _until(unseen, source, times, 1, span_s[1])
@@ -77,20 +77,18 @@ def _until(
     return until
 
 
-def _unseen(places: Float[np.ndarray, "n 3"], glimpse: Glimpse) -> Bool[np.ndarray, " n"]:
+def _unseen(places: Float[np.ndarray, "n 3"], glimpse: Glimpse, reach_px: float) -> Bool[np.ndarray, " n"]:
     """Which surfaces a frame cannot see: out of view, or behind the actor itself or something else.
 
     One that would stand in front of what the frame saw, or beside the actor, is misplaced: it counts as seen.
     """
-    column, row, z = glimpse.camera.project(places + glimpse.offset_m).T
-    height, width = glimpse.depth_m.shape
-    in_view = (z > _NEAR_M) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    unseen = ~in_view
-    where = np.stack([column[in_view], row[in_view]], axis=1)
+    projected = glimpse.camera.project(places + glimpse.offset_m)
+    in_view = glimpse.camera.shows(projected)
+    unseen, where = ~in_view, projected[in_view, :2]
     shown_m = glimpse.depth_m[where[:, 1].astype(int), where[:, 0].astype(int)].astype(np.float64)
     if len(glimpse.copies) and len(where):
-        distance, nearest = KDTree(glimpse.copies[:, :2]).query(where, distance_upper_bound=_REACH_PX)
+        distance, nearest = KDTree(glimpse.copies[:, :2]).query(where, distance_upper_bound=reach_px)
         own = np.isfinite(distance)
         shown_m[own] = glimpse.copies[np.asarray(nearest)[own], 2]
-    unseen[in_view] = (shown_m > 0) & (z[in_view] > np.exp(_LIKE_DEPTH) * shown_m)
+    unseen[in_view] = (shown_m > 0) & (projected[in_view, 2] > np.exp(_LIKE_DEPTH) * shown_m)
     return unseen

@@ -12,7 +12,6 @@ from dreamdrive.scene.scene import Scene
 
 BEHIND = 1.1
 """Depth over the true one from which on a Gaussian lies behind the surface that a pixel shows."""
-_NEAR_M = 0.2
 
 
 @torch.no_grad()
@@ -44,10 +43,9 @@ def true_labels(
     # Logarithmic distance from the true depth in the frame that has judged so far; -1 is the last word.
     distance = np.full(len(source), np.inf)
     for frame, camera in enumerate(views):
-        column, row, z = camera.project(places(scene, float(scene.times_s[frame]))).T
-        inside = (z > _NEAR_M) & (column >= 0) & (column < camera.width_px)
-        inside &= (row >= 0) & (row < camera.height_px)
-        seen = np.flatnonzero(inside)
+        projected = camera.project(places(scene, float(scene.times_s[frame])))
+        column, row, z = projected.T
+        seen = np.flatnonzero(camera.shows(projected))
         pixel = frame, row[seen].astype(int), column[seen].astype(int)
         solid = truth.depth_m[pixel] > 0
         seen, pixel = seen[solid], (frame, pixel[1][solid], pixel[2][solid])

@@ -29,6 +29,8 @@ class SeedOptions:
     Attributes:
         stride_px: Distance between static seeds of one frame.
         moving_stride_px: Distance between seeds on pixels with moving evidence, added by every frame.
+        reach: Seeds on one moving thing have a neighbour within this many of those distances: the diagonal of
+            their lattice is 1.41 of them.
         moving_evidence: Evidence from which a pixel counts as moving for seeding.
         far_m: Depth at which everything farther is put.
         footprint: Standard deviation over the seeds' spacing.
@@ -40,12 +42,18 @@ class SeedOptions:
 
     stride_px: int = 2
     moving_stride_px: int = 3
+    reach: float = 1.5
     moving_evidence: float = 0.5
     far_m: float = 250.0
     footprint: float = 0.55
     agreement: float = 0.08
     sky_fringe_px: int = 1
     sh_degree: int = 1
+
+    @property
+    def reach_px(self) -> float:
+        """How far apart in their image neighbouring seeds on a moving thing are at most."""
+        return self.reach * self.moving_stride_px
 
 
 def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = None) -> Gaussians:
@@ -125,10 +133,10 @@ def _explained(
     nearest = np.full(shape, np.inf, dtype=np.float32)
     for seeds in kept:
         static = ~seeds.moving
-        u, v, depth = camera.project(seeds.points[static]).T
-        u, v, z = np.floor(u), np.floor(v), np.maximum(depth, 1e-6)
+        projected = camera.project(seeds.points[static])
+        u, v, z = np.floor(projected[:, 0]), np.floor(projected[:, 1]), np.maximum(projected[:, 2], 1e-6)
         fine = seeds.spacing_m[static] / z * camera.fx_px < 2.0 * options.stride_px
-        inside = (depth > 0.2) & (u >= 0) & (u < shape[1]) & (v >= 0) & (v < shape[0]) & fine
+        inside = camera.shows(projected) & fine
         np.minimum.at(nearest, (v[inside].astype(int), u[inside].astype(int)), z[inside].astype(np.float32))
     reach = 2 * options.stride_px - 1
     around = cv2.erode(nearest, np.ones((reach, reach), np.uint8), borderValue=float("inf"))

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+NEAR_M = 0.2
+"""Depth along z from which on a camera shows things: the near plane of 3DGS, also in the compiled core."""
 FARTHEST_M = 1e7
 """Largest coordinate of a place: northings of UTM reach it."""
 MAX_SIDE_PX = 65_535
@@ -114,6 +116,12 @@ class Camera:
         column = local[:, 0] / z * self.fx_px + self.cx_px
         row = local[:, 1] / z * self.fy_px + self.cy_px
         return np.column_stack([column, row, local[:, 2]])
+
+    def shows(self, projected: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+        """Which of the points that ``project`` gives lie in the picture and not before the near plane."""
+        column, row, z = projected.T
+        inside = (column >= 0) & (column < self.width_px) & (row >= 0) & (row < self.height_px)
+        return inside & (z > NEAR_M)
 
     def rays(self) -> Float[np.ndarray, "h w 3"]:
         """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""

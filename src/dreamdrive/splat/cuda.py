@@ -15,9 +15,10 @@ from torch import Tensor
 
 from dreamdrive.device import why_no_cuda
 from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
-from dreamdrive.splat.reference import BLUR_PX2, FAR_M, NEAR_M
+from dreamdrive.splat.reference import BLUR_PX2, FAR_M
 
 TILE_PX = 16
 # A kernel holds all channels of a pixel in registers; gsplat's own rendering takes as many at a time.

@@ -10,10 +10,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype, check_pose, check_values
 
-NEAR_M = 0.2
 FAR_M = 1e10
 BLUR_PX2 = 0.3
 MAX_ALPHA = 0.999

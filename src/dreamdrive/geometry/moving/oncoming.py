@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.geometry.depth import View, Warp, by_frame, inside, on_plane, sample
+from dreamdrive.geometry.moving.outline import TALLEST_M
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
 _BACKGROUND = (0.0, 0.012, 0.024)  # 1/m; what is behind it, beside the road
@@ -33,7 +34,6 @@ _SAME_ROW_M = 0.2
 _LEAST_WIDTH_M = 1.0
 _VOTERS, _VOTES = 4, 2  # frames to both sides that are asked, and that have to agree
 _NEAREST_M = 1.5
-_MOST_HEIGHT_M = 3.8
 _BEHIND = 0.6  # of its seeming inverse depth
 _BIAS_LEVELS = 0.5
 
@@ -213,7 +213,7 @@ def _outline(
     misfits: _Misfits, label: int, row: int, across: slice, px_per_m: float
 ) -> Bool[np.ndarray, "h w"]:
     """The part above the contact that the thing explains better than what is behind it."""
-    first = max(0, row - int(_MOST_HEIGHT_M * px_per_m))
+    first = max(0, row - int(TALLEST_M * px_per_m))
     part = np.s_[first : row + 1, across]
     same = np.abs(np.log(np.maximum(misfits.inverse, 1e-6) / misfits.inverse[label])) < _SAME_DEPTH
     behind = misfits.inverse < _BEHIND * misfits.inverse[label]

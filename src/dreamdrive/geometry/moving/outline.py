@@ -24,7 +24,7 @@ _PLANE_SHARE = 0.8
 _MIN_FLOW_PX = 30  # pixels with trusted flow from which a motion is drawn
 _MIN_SHARE = 0.4  # of them that have to follow it
 _FOLLOWS_PX = 1.0
-_MAX_HEIGHT_M = 3.6
+TALLEST_M = 3.8  # of road users
 _SIDE_SHARE = 0.35  # of the width is looked at on both sides
 _UP_OF_HEIGHT = 0.9  # and above, where nothing tells the size
 _UP_OF_WIDTH = 0.45
@@ -97,7 +97,7 @@ def _window(view: View, frame: int, box: np.ndarray) -> tuple[slice, slice]:
     up = max(_UP_OF_HEIGHT * height, _UP_OF_WIDTH * width)
     px_per_m = float(view.plane_inverse[frame][bottom, middle]) * view.cameras[frame].fy_px
     if px_per_m > 0:
-        up = max(3.0, min(3 * up, _MAX_HEIGHT_M * px_per_m - height))
+        up = max(3.0, min(3 * up, TALLEST_M * px_per_m - height))
     side, under = max(4, round(_SIDE_SHARE * width)), max(2, round(_BELOW_SHARE * height))
     rows = slice(max(0, round(top - up)), bottom + 1 + under)
     return rows, slice(max(0, left - side), left + width + side)
