@@ -6,14 +6,14 @@ from typing import Any
 import torch
 from jaxtyping import Float
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.compiled import Gradients, Wanted, differentiable
 from dreamdrive.device import in_core
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.scene.gaussians import Gaussians
 
-# Of one part, in the order of _Activated's arguments.
+# Of one part, in the order of the arguments of _activated.
 _TENSORS = ("means", "unit_m", "offsets", "quaternions", "log_scales", "logit_opacities", "sh")
 
 
@@ -54,60 +54,38 @@ def activate(static: Parameters | None, moved: Gaussians | None) -> Activated:
         tensors += [static.anchors, *(getattr(static, name) for name in _TENSORS[1:])]
     if moved is not None:
         tensors += [getattr(moved, name, None) for name in _TENSORS]
-    return Activated(*_Activated.apply(*tensors))  # pyright: ignore[reportGeneralTypeIssues]
+    return Activated(*differentiable(_activated, *tensors))
 
 
-def _parts(tensors: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-    return [tensors[k : k + len(_TENSORS)] for k in range(0, len(tensors), len(_TENSORS))]
-
-
-class _Activated(torch.autograd.Function):
+def _activated(*tensors: Tensor | None, wanted: Wanted) -> tuple[tuple[Tensor, ...], Gradients]:
     """From the tensors of ``_TENSORS`` of one or two parts to those of ``Activated`` for all of them.
 
     The means are ``means + unit_m * offsets``, of which only the offsets get a gradient, or as given.
     """
+    parts: list[Any] = [tensors[k : k + len(_TENSORS)] for k in range(0, len(tensors), len(_TENSORS))]
+    counts, coefficients = [len(part[0]) for part in parts], parts[0][-1].shape[1]
+    starts = [sum(counts[:k]) for k in range(len(counts))]
+    tails = ((3,), (4,), (3,), (), (coefficients, 3))
+    means, quaternions, scales, opacities, sh = (torch.empty(sum(counts), *tail) for tail in tails)
+    for (base, unit, offsets, q, log_scales, logits, colour), start in zip(parts, starts, strict=True):
+        _native.activate(
+            base, unit, offsets, q, log_scales, logits, colour, start,
+            means, quaternions, scales, opacities, sh,
+        )  # fmt: skip
 
-    @staticmethod
-    def forward(ctx: Any, *tensors: Any) -> tuple[Tensor, ...]:
-        parts = _parts(tuple(None if t is None else t.detach().contiguous() for t in tensors))
-        counts, coefficients = [len(part[0]) for part in parts], parts[0][-1].shape[1]
-        tails = ((3,), (4,), (3,), (), (coefficients, 3))
-        means, quaternions, scales, opacities, sh = (torch.empty(sum(counts), *tail) for tail in tails)
-        start = 0
-        for (base, unit, offsets, q, log_scales, logits, colour), count in zip(parts, counts, strict=True):
-            _native.activate(
-                base, unit, offsets, q, log_scales, logits, colour, start,
-                means, quaternions, scales, opacities, sh,
-            )  # fmt: skip
-            start += count
-        ctx.counts, ctx.units = counts, [part[1] for part in parts]
-        ctx.save_for_backward(scales, opacities)
-        return means, quaternions, scales, opacities, sh
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        scales, opacities = ctx.saved_tensors
-        d_means, d_quaternions, d_scales, d_opacities, d_sh = (g.detach().contiguous() for g in upstream)
-        gradients: list[Tensor | None] = []
-        start = 0
-        for count, unit in zip(ctx.counts, ctx.units, strict=True):
+    def gradients(*upstream: Tensor) -> list[Tensor | None]:
+        d_means, d_quaternions, d_scales, d_opacities, d_sh = upstream
+        found: list[Tensor | None] = []
+        for (_, unit, *_), start, count in zip(parts, starts, counts, strict=True):
             rows = slice(start, start + count)
             d_offsets = None if unit is None else torch.empty(count, 3)
             d_log_scales, d_logits = torch.empty(count, 3), torch.empty(count)
             _native.activate_backward(
-                unit,
-                start,
-                scales,
-                opacities,
-                d_means,
-                d_scales,
-                d_opacities,
-                d_offsets,
-                d_log_scales,
-                d_logits,
-            )
-            gradients += [d_means[rows] if unit is None else None, None, d_offsets]
-            gradients += [d_quaternions[rows], d_log_scales, d_logits, d_sh[rows]]
-            start += count
-        return tuple(gradients)
+                unit, start, scales, opacities, d_means, d_scales, d_opacities,
+                d_offsets, d_log_scales, d_logits,
+            )  # fmt: skip
+            found += [d_means[rows] if unit is None else None, None, d_offsets]
+            found += [d_quaternions[rows], d_log_scales, d_logits, d_sh[rows]]
+        return found
+
+    return (means, quaternions, scales, opacities, sh), gradients

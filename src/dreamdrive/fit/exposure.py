@@ -1,14 +1,12 @@
 """What a fit learns of the recording camera's colour, and the picture it makes of a splat."""
 
-from typing import Any
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.compiled import Gradients, Wanted, differentiable
 from dreamdrive.device import CPU, in_core
 from dreamdrive.scene.exposure import Exposure, transform_colour
 
@@ -34,27 +32,21 @@ def recorded_picture(
         raise ValueError("sky: the recorded picture has no gradient for it; detach it")
     if not in_core(colour):
         return transform_colour(colour + (1 - alpha)[..., None] * sky, affine)
-    return _RecordedPicture.apply(colour, alpha, sky, affine)  # pyright: ignore[reportReturnType]
+    return differentiable(_over_sky, colour, alpha, sky, affine)
 
 
-class _RecordedPicture(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, *inputs: Tensor) -> Tensor:
-        colour, alpha, sky, affine = (t.detach().contiguous() for t in inputs)
-        ctx.save_for_backward(colour, alpha, sky, affine)
-        picture = torch.empty_like(colour)
-        _native.over_sky(colour, alpha, sky, affine, picture)
-        return picture
+def _over_sky(
+    colour: Tensor, alpha: Tensor, sky: Tensor, affine: Tensor, *, wanted: Wanted
+) -> tuple[Tensor, Gradients]:
+    picture = torch.empty_like(colour)
+    _native.over_sky(colour, alpha, sky, affine, picture)
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        colour, alpha, sky, affine = ctx.saved_tensors
+    def gradients(upstream: Tensor) -> tuple[Tensor | None, ...]:
         d_colour, d_alpha, d_affine = (torch.empty_like(t) for t in (colour, alpha, affine))
-        _native.over_sky_backward(
-            colour, alpha, sky, affine, upstream[0].detach().contiguous(), d_colour, d_alpha, d_affine
-        )
+        _native.over_sky_backward(colour, alpha, sky, affine, upstream, d_colour, d_alpha, d_affine)
         return d_colour, d_alpha, None, d_affine
+
+    return picture, gradients
 
 
 class ExposureNetwork(nn.Module):

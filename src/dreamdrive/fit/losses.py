@@ -1,13 +1,14 @@
 """L_render: how far a rendered frame is from its reference (eq. 14), and what keeps geometry sane."""
 
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.compiled import Gradients, Wanted, at_once, differentiable
 from dreamdrive.device import in_core
 from dreamdrive.splat import check_dtype, ssim_map_reference
 
@@ -46,31 +47,22 @@ def render_loss(
         of_l1, of_ssim = WEIGHTS[name]
         similarity = ssim_map_reference(image, reference).mean()
         return of_l1 * (image - reference).abs().mean() + of_ssim * (1 - similarity)
-    return _RenderLoss.apply(image, reference, mask, *WEIGHTS[name])  # pyright: ignore[reportReturnType]
+    return differentiable(partial(_l1_and_ssim, *WEIGHTS[name]), image, reference, mask)
 
 
-class _RenderLoss(torch.autograd.Function):
-    @staticmethod
-    def forward(
-        ctx: Any, image: Tensor, reference: Tensor, mask: Tensor, weight_l1: float, weight_ssim: float
-    ) -> Tensor:
-        a, b, mask = (t.detach().contiguous() for t in (image, reference, mask))
-        partials = torch.empty(3, *a.shape) if ctx.needs_input_grad[0] else None
-        l1, similarity = _native.l1_ssim(a, b, mask, partials)
-        ctx.save_for_backward(a, b, mask, partials)
-        ctx.weights = weight_l1, weight_ssim
-        return torch.tensor(weight_l1 * l1 + weight_ssim * (1 - similarity), dtype=torch.float32)
+def _l1_and_ssim(
+    by_l1: float, by_ssim: float, image: Tensor, reference: Tensor, mask: Tensor, *, wanted: Wanted
+) -> tuple[Tensor, Gradients]:
+    partials = torch.empty(3, *image.shape) if wanted[0] else None
+    l1, similarity = _native.l1_ssim(image, reference, mask, partials)
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        image, reference, mask, partials = ctx.saved_tensors
-        scale, (weight_l1, weight_ssim) = upstream[0].item(), ctx.weights
-        d_image = torch.empty_like(image)
-        _native.l1_ssim_backward(
-            image, reference, mask, partials, scale * weight_l1, -scale * weight_ssim, d_image
-        )
-        return d_image, None, None, None, None
+    def gradients(upstream: Tensor) -> tuple[Tensor | None, ...]:
+        assert partials is not None
+        scale, d_image = upstream.item(), torch.empty_like(image)
+        _native.l1_ssim_backward(image, reference, mask, partials, scale * by_l1, -scale * by_ssim, d_image)
+        return d_image, None, None
+
+    return torch.tensor(by_l1 * l1 + by_ssim * (1 - similarity), dtype=torch.float32), gradients
 
 
 def geometry_loss(
@@ -102,26 +94,24 @@ def geometry_loss(
         off = torch.where(weight > 0, inverse - 1 / reference_m.clamp(min=LEAST), 0.0).abs()
         disparity = (weight * off).sum() / weight.sum().clamp(min=1.0)
         return disparity_weight * disparity + sky_weight * (alpha * sky).mean()
-    return _GeometryLoss.apply(depth_sum, alpha, reference_m, weight, sky, disparity_weight, sky_weight)  # pyright: ignore[reportReturnType]
+    compute = partial(_disparity_and_cover, disparity_weight, sky_weight)
+    return differentiable(compute, depth_sum, alpha, reference_m, weight, sky)
 
 
-class _GeometryLoss(torch.autograd.Function):
-    """Each pixel stands for itself: the gradient costs no more than the value and is kept in its place."""
-
-    @staticmethod
-    def forward(ctx: Any, *inputs: Any) -> Tensor:
-        depth_sum, alpha, reference_m, weight, sky = (t.detach().contiguous() for t in inputs[:5])
-        wanted = any(ctx.needs_input_grad)
-        d_depth_sum, d_alpha = (torch.empty_like(alpha) if wanted else None for _ in range(2))
-        whole = max(1.0, weight.sum().item())
-        loss = _native.geometry_loss(
-            depth_sum, alpha, reference_m, weight, sky, inputs[5], inputs[6], whole, d_depth_sum, d_alpha
-        )
-        ctx.save_for_backward(d_depth_sum, d_alpha)
-        return torch.tensor(loss, dtype=torch.float32)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        d_depth_sum, d_alpha = ctx.saved_tensors
-        return upstream[0] * d_depth_sum, upstream[0] * d_alpha, None, None, None, None, None
+def _disparity_and_cover(
+    by_disparity: float,
+    by_cover: float,
+    depth_sum: Tensor,
+    alpha: Tensor,
+    reference_m: Tensor,
+    weight: Tensor,
+    sky: Tensor,
+    *,
+    wanted: Wanted,
+) -> tuple[Tensor, Gradients]:
+    d_depth_sum, d_alpha = (torch.empty_like(alpha) if any(wanted) else None for _ in range(2))
+    whole = max(1.0, weight.sum().item())
+    loss = _native.geometry_loss(
+        depth_sum, alpha, reference_m, weight, sky, by_disparity, by_cover, whole, d_depth_sum, d_alpha
+    )
+    return torch.tensor(loss, dtype=torch.float32), at_once(d_depth_sum, d_alpha, None, None, None)

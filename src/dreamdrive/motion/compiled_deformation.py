@@ -1,13 +1,14 @@
 """The deformation of float32 Gaussians in the compiled core; ``deformation`` says what it computes."""
 
+from functools import partial
 from typing import Any
 
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.compiled import Gradients, Wanted, differentiable
 
 
 def network_residual(
@@ -22,44 +23,29 @@ def network_residual(
 ) -> Float[Tensor, "n 10"]:
     """What the network adds to mean, unit quaternion and log-scale; differentiable in the weights alone.
 
-    Args:
-        means: Canonical centres in metres.
-        centre_m: Centre of the domain.
-        radius_m: Radius of the domain.
-        time_code: The encoded time.
-        octaves: Frequencies of the positions' encoding.
-        depth: Number of hidden layers.
-        skip: Which of them reads the encoding again.
-        weights: Weight and bias of each hidden layer, then of the heads of mean, quaternion and log-scale.
+    Positions are encoded in ``octaves`` frequencies within the domain, of this centre and radius, and then
+    comes the encoded time. Layer ``skip`` of the ``depth`` hidden ones reads the encoding again. The weights
+    are weight and bias of each hidden layer, then of the heads of mean, quaternion and log-scale.
     """
     shape = (depth, -1 if skip is None else skip)
-    encoding = (centre_m, radius_m, octaves, time_code)
-    return _EncodedNetwork.apply(means.detach(), shape, encoding, *weights)  # pyright: ignore[reportReturnType]
+    encoding = means.detach().contiguous(), centre_m, radius_m, octaves, time_code
+    return differentiable(partial(_encoded_network, shape, encoding), *weights)
 
 
-class _EncodedNetwork(torch.autograd.Function):
-    """Keeps nothing between: the backward pass computes it anew, of rows that some gradient arrives at."""
+def _encoded_network(
+    shape: tuple[int, int], encoding: tuple[Any, ...], *weights: Tensor, wanted: Wanted
+) -> tuple[Tensor, Gradients]:
+    """Keeps nothing between: the way back computes it anew, of rows that some gradient arrives at."""
+    network = _native.encoded_network(list(weights), *shape, *encoding)
+    residual = torch.empty(len(encoding[0]), 10)
+    _native.encoded_network_forward(network, residual)
 
-    @staticmethod
-    def forward(
-        ctx: Any, means: Tensor, shape: tuple[int, int], encoding: tuple[Any, ...], *weights: Tensor
-    ) -> Tensor:
-        tensors = [w.detach().contiguous() for w in weights]
-        network = _native.encoded_network(tensors, *shape, means.contiguous(), *encoding)
-        residual = torch.empty(len(means), 10)
-        _native.encoded_network_forward(network, residual)
-        if any(ctx.needs_input_grad):
-            ctx.network = network
-            # So that torch notices what was changed in place before backward.
-            ctx.save_for_backward(means, *weights)
-        return residual
+    def gradients(upstream: Tensor) -> list[Tensor]:
+        found = [torch.empty(w.shape) for w in weights]
+        _native.encoded_network_backward(network, upstream, found)
+        return found
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        gradients = [torch.empty(w.shape) for w in ctx.saved_tensors[1:]]
-        _native.encoded_network_backward(ctx.network, upstream[0].detach().contiguous(), gradients)
-        return None, None, None, *gradients
+    return residual, gradients
 
 
 def posed(
@@ -74,60 +60,37 @@ def posed(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Gaussians on their tracks, with the residual, faded; differentiable in canonical, residual and tracks.
 
-    Args:
-        canonical: Means (N, 3), quaternions (N, 4), log-scales (N, 3) and logits (N,).
-        residual: Added to mean, unit quaternion and log-scale.
-        lifespan: Centre and deviation in seconds, or None.
-        actor: Track that each follows, -1 for none, or None.
-        tracks: Translation (A, 3) and yaw (A,) at the time.
-        pivot_m: What each track turns about.
-        up: Axis of the yaw.
-        t_s: Time in seconds.
-
-    Returns:
-        Means, quaternions, log-scales and logits at ``t_s``.
+    ``canonical`` are means (N, 3), quaternions (N, 4), log-scales (N, 3) and logits (N,), as is the result at
+    ``t_s``. The residual is added to mean, unit quaternion and log-scale. ``actor`` is the track that each
+    follows, -1 for none; ``tracks`` are translation (A, 3) and yaw (A,) about ``up`` and ``pivot_m`` at the
+    time; ``lifespan`` is centre and deviation in seconds.
     """
     others = (lifespan, actor, pivot_m, up, t_s)
-    return _Posed.apply(others, *canonical, residual, *tracks)  # pyright: ignore[reportReturnType]
+    return differentiable(partial(_posed, others), *canonical, residual, *tracks)
 
 
-class _Posed(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, others: tuple[Any, ...], *learned: Tensor) -> tuple[Tensor, ...]:
-        means, quaternions, log_scales, logits, residual, translation, yaw = (
-            t.detach().contiguous() for t in learned
-        )
-        lifespan, actor, pivot, up, t_s = others
-        pose = _native.pose(
-            means,
-            quaternions,
-            log_scales,
-            logits,
-            residual,
-            lifespan,
-            actor,
-            translation,
-            yaw,
-            pivot,
-            up,
-            t_s,
-        )
-        out = [torch.empty_like(t) for t in (means, quaternions, log_scales, logits)]
-        _native.pose_forward(pose, out[0], out[1], out[2], out[3])
-        if any(ctx.needs_input_grad):
-            ctx.pose = pose
-            ctx.save_for_backward(*learned)  # so that torch notices what was changed in place before backward
-        return tuple(out)
+def _posed(
+    others: tuple[Any, ...],
+    means: Tensor,
+    quaternions: Tensor,
+    log_scales: Tensor,
+    logits: Tensor,
+    residual: Tensor,
+    translation: Tensor,
+    yaw: Tensor,
+    *,
+    wanted: Wanted,
+) -> tuple[tuple[Tensor, ...], Gradients]:
+    canonical = means, quaternions, log_scales, logits
+    lifespan, actor, pivot, up, t_s = others
+    pose = _native.pose(*canonical, residual, lifespan, actor, translation, yaw, pivot, up, t_s)
+    out = tuple(torch.empty_like(t) for t in canonical)
+    _native.pose_forward(pose, *out)
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        by_means, by_quaternions, by_log_scales, by_logits = (g.detach().contiguous() for g in upstream)
-        means, quaternions, _, logits, residual, translation, yaw = (
-            torch.empty(t.shape) for t in ctx.saved_tensors
-        )
-        _native.pose_backward(
-            ctx.pose, by_means, by_quaternions, by_log_scales, by_logits,
-            means, quaternions, logits, residual, translation, yaw,
-        )  # fmt: skip
-        return None, means, quaternions, by_log_scales, logits, residual, translation, yaw
+    def gradients(*upstream: Tensor) -> tuple[Tensor, ...]:
+        learned = means, quaternions, logits, residual, translation, yaw
+        found = [torch.empty(t.shape) for t in learned]
+        _native.pose_backward(pose, *upstream, *found)
+        return *found[:2], upstream[2], *found[2:]  # a log-scale is only added to
+
+    return out, gradients

@@ -1,46 +1,16 @@
 """Structural similarity of two images (Wang et al. 2004), with the window and padding of 3DGS."""
 
-from typing import Any
-
 import torch
 from jaxtyping import Float
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from dreamdrive import _native
+from dreamdrive.compiled import Gradients, Wanted, differentiable
 
 WINDOW = 11
 SIGMA_PX = 1.5
 C1 = 0.01**2
 C2 = 0.03**2
-
-
-def _gradient(image: Tensor, target: Tensor, partials: Tensor | None, by_map: Tensor) -> Tensor | None:
-    if partials is None:
-        return None
-    out = torch.empty_like(image)
-    _native.ssim_backward(image, target, partials, by_map, out)
-    return out
-
-
-class _SsimMap(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, image: Tensor, target: Tensor) -> Tensor:
-        a, b = image.detach().contiguous(), target.detach().contiguous()
-        similarity = torch.empty_like(a)
-        by_image, by_target = (torch.empty(3, *a.shape) if needs else None for needs in ctx.needs_input_grad)
-        if by_target is not None:  # symmetric: the target takes the image's place
-            _native.ssim_forward(b, a, similarity, by_target)
-        _native.ssim_forward(a, b, similarity, by_image)
-        ctx.save_for_backward(a, b, by_image, by_target)
-        return similarity
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, Tensor | None]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        a, b, by_image, by_target = ctx.saved_tensors
-        by_map = upstream[0].detach().contiguous()
-        return _gradient(a, b, by_image, by_map), _gradient(b, a, by_target, by_map)
 
 
 def ssim_map(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
@@ -68,7 +38,26 @@ def ssim_map(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> F
         raise ValueError(
             f"target: expected the image's shape {tuple(image.shape)}, got {tuple(target.shape)}"
         )
-    return _SsimMap.apply(image, target)  # pyright: ignore[reportReturnType]
+    return differentiable(_similarity, image, target)
+
+
+def _similarity(image: Tensor, target: Tensor, *, wanted: Wanted) -> tuple[Tensor, Gradients]:
+    similarity = torch.empty_like(image)
+    by_image, by_target = (torch.empty(3, *image.shape) if needs else None for needs in wanted)
+    if by_target is not None:  # symmetric: the target takes the image's place
+        _native.ssim_forward(target, image, similarity, by_target)
+    _native.ssim_forward(image, target, similarity, by_image)
+
+    def gradients(by_map: Tensor) -> list[Tensor | None]:
+        found = [None if partials is None else torch.empty_like(image) for partials in (by_image, by_target)]
+        for partials, pair, out in zip(
+            (by_image, by_target), ((image, target), (target, image)), found, strict=True
+        ):
+            if partials is not None and out is not None:
+                _native.ssim_backward(*pair, partials, by_map, out)
+        return found
+
+    return similarity, gradients
 
 
 def ssim(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> Float[Tensor, ""]:
