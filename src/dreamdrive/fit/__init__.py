@@ -1,6 +1,6 @@
 """Seeds become Gaussians, and Gaussians are fitted to the frames."""
 
-from dreamdrive.fit.densify import DENSIFIERS, Densifier, DensifySettings, GradientDensifier, NoDensifier
+from dreamdrive.fit.densify import DENSIFIERS, Densifier, DensifySettings, GradientDensifier
 from dreamdrive.fit.hybrid import Parts, fit
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -12,19 +11,19 @@ from dreamdrive.device import CPU
 from dreamdrive.fit.parameters import Parameters
 
 
-@runtime_checkable
-class Densifier(Protocol):
-    """What the trainer asks of a densification strategy."""
+class Densifier:
+    """What the trainer asks of a densification strategy; this one keeps the set as it was seeded."""
+
+    def __init__(self, *unused: object) -> None:
+        pass
 
     def observe(
         self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
     ) -> None:
         """Take in one step's gradient by the projected means, per pixel, of some rows or of all (None)."""
-        ...
 
     def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
         """Change the set after a step, if it is time."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class DensifySettings:
     most: int = 120_000
 
 
-class GradientDensifier:
+class GradientDensifier(Densifier):
     """Clone small and split large Gaussians whose screen position wants to move; prune transparent ones.
 
     The rule of 3DGS with these differences: sizes are measured in units of each Gaussian's seed footprint
@@ -146,23 +145,8 @@ class GradientDensifier:
         return parameters.means[index] + local + w * twice + torch.linalg.cross(xyz, twice)
 
 
-class NoDensifier:
-    """Keep the set as it was seeded."""
-
-    def __init__(self, *unused: object) -> None:
-        pass
-
-    def observe(
-        self, rows: Int[Tensor, " m"] | None, gradient_px: Float[Tensor, "m 2"], visible: Bool[Tensor, " m"]
-    ) -> None:
-        """Nothing is collected."""
-
-    def update(self, parameters: Parameters, step: int, steps: int, generator: torch.Generator) -> None:
-        """Nothing is changed."""
-
-
 DENSIFIERS: dict[str, Callable[[DensifySettings, int, tuple[float, float], torch.device], Densifier]] = {
     "gradient": GradientDensifier,
-    "none": NoDensifier,
+    "none": Densifier,
 }
 """Every strategy by name, made from settings, number of Gaussians, half the image in pixels, device."""

@@ -51,19 +51,9 @@ def fit(
 ) -> Scene:
     """Optimise Gaussians, motion and exposure jointly (eq. 13-14).
 
-    All motions take ``options.steps`` steps from the same static fit.
-
-    Args:
-        clip: References; held-out frames are not read, their exposure is interpolated.
-        geometry: Cameras, depth, masks, up axis.
-        parts: Static and dynamic Gaussians; with no dynamic ones the result is a static scene.
-        start: The static fit, whose sky is kept.
-        options: Length, rates and weights.
-        motion: Which representation of motion, and its size; the paper's is F_deform.
-        densify: When and what to grow and prune.
-        seed: Order of the frames, weights, places of split Gaussians.
-        progress: Called with steps done and steps in all.
-        device: Where it is computed; the scene is on the CPU.
+    All motions take ``options.steps`` steps from the same static fit, whose sky is kept; the paper's is
+    F_deform. Held-out frames are not read, their exposure is interpolated. Without dynamic Gaussians the
+    result is a static scene. It is computed on ``device``; the scene is on the CPU.
     """
     views = training_views(clip, geometry, device)
     moving, dynamic = None, parts.dynamic

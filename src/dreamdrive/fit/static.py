@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 
 from dreamdrive.device import CPU
-from dreamdrive.fit.densify import NoDensifier
+from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
@@ -45,20 +45,13 @@ def fit_static(
 ) -> StaticFit:
     """Optimise all seeds as static (eq. 5), without densification, so that rows keep their meaning.
 
-    Args:
-        clip: References; held-out frames are not read.
-        geometry: Cameras, depth, masks.
-        gaussians: The seeds.
-        options: Length, rates and weights.
-        seed: Order of the frames.
-        progress: Called with steps done and steps in all.
-        device: Where it is computed; the result is on the CPU.
+    Held-out frames are not read. It is computed on ``device``; the result is on the CPU.
     """
     views = training_views(clip, geometry, device)
     static = Parameters(gaussians.to(device), footprints(gaussians).to(device), LearningRates())
     exposure = ExposureNetwork(len(clip), seed).to(device)
     model = Model(static, None, None, estimate_sky(clip, geometry), exposure)
-    optimise(model, views, [NoDensifier()], options, seed, progress)
+    optimise(model, views, [Densifier()], options, seed, progress)
     return StaticFit(
         static.frozen(), model.sky, model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera)
     )

@@ -1,7 +1,7 @@
 """The optimisation loop both fits share: render a frame, compare, step, densify."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from jaxtyping import Float, Int
@@ -20,7 +20,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import one_torch_thread, rasterize
+from dreamdrive.splat import one_torch_thread, seen_by
 
 # Field of ``FitOptions`` that holds the step size of each of ``Motion.groups``.
 RATES = {"network": "deformation_rate", "planes": "plane_rate", "tracks": "track_rate"}
@@ -140,16 +140,10 @@ class Trainer:
         self._optimiser = _shared_optimiser(model, options)
 
     def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> Float[Tensor, ""]:
-        """Render a frame, compare, learn and densify.
+        """Render a frame, compare, learn and densify; the loss before that, on the device.
 
-        Args:
-            step: Number of the step, from 0.
-            view: The frame.
-            sky: What its camera sees of the sky alone.
-            shrink: By how much the frame is shrunk.
-
-        Returns:
-            The loss before the step, on the device.
+        ``step`` counts from 0, ``sky`` is what the view's camera sees of the sky alone, ``shrink`` how much
+        the frame is shrunk.
         """
         model, options = self.model, self.options
         done = step / options.steps
@@ -194,15 +188,10 @@ def optimise(
     seed: int,
     progress: Progress,
 ) -> None:
-    """Fit ``model`` in place to the views.
+    """Fit ``model`` in place to training frames, by how much they are shrunk: 1 and 2.
 
-    Args:
-        model: What changes.
-        views: The same training frames by how much they are shrunk: 1 and 2.
-        densifiers: One for each of ``model.parts()``.
-        options: Length, rates and weights.
-        seed: Order of the frames and places of split Gaussians.
-        progress: Called with steps done and steps in all.
+    There is a densifier for each of ``model.parts()``; the seed decides the order of the frames and where
+    split Gaussians come to lie.
     """
     _native.keep_freed_memory()
     # Of their own, so that how many Gaussians are split leaves the order of the frames as it is: with one for
@@ -226,22 +215,8 @@ def optimise(
 def _splat(
     activated: Activated, camera: Camera, offsets_px: Float[Tensor, "n 2"], sh_degree: int | None
 ) -> Render:
-    return rasterize(
-        activated.means,
-        activated.quaternions,
-        activated.scales,
-        activated.opacities,
-        activated.sh,
-        torch.as_tensor(camera.camera_from_world, dtype=torch.float32, device=activated.means.device),
-        fx_px=camera.fx_px,
-        fy_px=camera.fy_px,
-        cx_px=camera.cx_px,
-        cy_px=camera.cy_px,
-        width_px=camera.width_px,
-        height_px=camera.height_px,
-        screen_offsets_px=offsets_px,
-        sh_degree=sh_degree,
-    )
+    parameters = (getattr(activated, field.name) for field in fields(activated))
+    return seen_by(camera, *parameters, screen_offsets_px=offsets_px, sh_degree=sh_degree)
 
 
 def _loss(

@@ -7,4 +7,4 @@ from dreamdrive.splat.scene_view import SceneView, render_scene
 from dreamdrive.splat.settings import native_info, set_threads, threads
 from dreamdrive.splat.ssim import C1, C2, SIGMA_PX, WINDOW, ssim, ssim_map, ssim_map_reference
 from dreamdrive.splat.torch_threads import one_torch_thread
-from dreamdrive.splat.view import render
+from dreamdrive.splat.view import render, seen_by

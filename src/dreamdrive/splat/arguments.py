@@ -1,6 +1,6 @@
 """What a splatting backend is given, and the checks every backend shares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import torch
@@ -29,25 +29,13 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class SplatArguments:
-    """Gaussians with activated parameters and the pinhole that looks at them.
+    """Gaussians with activated parameters and the pinhole that looks at them; see ``rasterize``.
 
     Attributes:
-        means: Centres (N, 3) in metres, world frame.
-        quaternions: Rotations (N, 4), wxyz, not zero; normalised inside.
-        scales: Standard deviations (N, 3) in metres; with zeros the Gaussian is a disc, a needle or a point.
-        opacities: In [0, 1] (N,).
-        sh: Spherical-harmonic colour (N, K, 3), K = 1, 4, 9 or 16.
-        camera_from_world: Rigid transform (4, 4) to the camera frame (x right, y down, z forward).
         focal_px: Focal lengths (fx, fy).
         centre_px: Principal point (cx, cy); the centre of the top-left pixel is at (0.5, 0.5).
         size_px: Image width and height.
         sh_degree: Degree evaluated, at most the stored one.
-        channels: Further values per Gaussian (N, C), composited like colour, or None.
-        screen_offsets_px: Added to the projected centres (N, 2), or None.
-        screen_absolute_px: Changes nothing (N, 2); its gradient is the sum over the pixels of the absolute
-            gradients by the projected centres. Or None.
-        antialiased: Whether opacities shrink by what the blur adds to the footprints.
-        inspect: Whether median depth and the weights of the Gaussians are wanted.
     """
 
     means: Float[Tensor, "n 3"]
@@ -68,19 +56,8 @@ class SplatArguments:
 
     def tensors(self) -> dict[str, Tensor]:
         """The present tensors by the name of their argument."""
-        names = (
-            "means",
-            "quaternions",
-            "scales",
-            "opacities",
-            "sh",
-            "camera_from_world",
-            "channels",
-            "screen_offsets_px",
-            "screen_absolute_px",
-        )
-        named = ((name, getattr(self, name)) for name in names)
-        return {name: value for name, value in named if value is not None}
+        named = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return {name: value for name, value in named if isinstance(value, Tensor)}
 
 
 def check_shapes(tensors: dict[str, Tensor | None]) -> None:

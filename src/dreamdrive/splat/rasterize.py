@@ -83,48 +83,35 @@ def rasterize(
     backend = backend or ("native" if means.is_cpu else "gsplat")
     if backend not in BACKENDS:
         raise ValueError(f"backend: expected one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
-    check_shapes(
-        {
-            "means": means,
-            "quaternions": quaternions,
-            "scales": scales,
-            "opacities": opacities,
-            "sh": sh,
-            "camera_from_world": camera_from_world,
-            "channels": channels,
-            "screen_offsets_px": screen_offsets_px,
-            "screen_absolute_px": screen_absolute_px,
-        }
-    )
-    focal, centre, size = (
-        (float(fx_px), float(fy_px)),
-        (float(cx_px), float(cy_px)),
-        (int(width_px), int(height_px)),
-    )
+    tensors: dict[str, Any] = {
+        "means": means,
+        "quaternions": quaternions,
+        "scales": scales,
+        "opacities": opacities,
+        "sh": sh,
+        "camera_from_world": camera_from_world,
+        "channels": channels,
+        "screen_offsets_px": screen_offsets_px,
+        "screen_absolute_px": screen_absolute_px,
+    }
+    check_shapes(tensors)
+    focal, centre = (float(fx_px), float(fy_px)), (float(cx_px), float(cy_px))
+    size = int(width_px), int(height_px)
     check_pinhole(focal, centre, size)
-    poses = camera_from_world[None] if camera_from_world.ndim == 2 else camera_from_world
-    views = [
-        BACKENDS[backend](
-            SplatArguments(
-                means=means,
-                quaternions=quaternions,
-                scales=scales,
-                opacities=opacities,
-                sh=sh,
-                camera_from_world=pose,
-                focal_px=focal,
-                centre_px=centre,
-                size_px=size,
-                sh_degree=active_degree(sh_degree, sh.shape[1]),
-                channels=channels,
-                screen_offsets_px=screen_offsets_px,
-                screen_absolute_px=screen_absolute_px,
-                antialiased=antialiased,
-                inspect=inspect,
-            )
+    degree = active_degree(sh_degree, sh.shape[1])
+    views: list[Render] = []
+    for pose in camera_from_world[None] if camera_from_world.ndim == 2 else camera_from_world:
+        tensors["camera_from_world"] = pose
+        arguments = SplatArguments(
+            **tensors,
+            focal_px=focal,
+            centre_px=centre,
+            size_px=size,
+            sh_degree=degree,
+            antialiased=antialiased,
+            inspect=inspect,
         )
-        for pose in poses
-    ]
+        views.append(BACKENDS[backend](arguments))
     return views[0] if camera_from_world.ndim == 2 else _stacked(views)
 
 

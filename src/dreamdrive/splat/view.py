@@ -1,5 +1,7 @@
 """Splatting of the scene's own noun: ``Gaussians`` seen by a ``Camera``."""
 
+from typing import Any
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -23,24 +25,31 @@ def render(
 
     Life spans, sky and exposure are not applied here.
     """
-    pose = torch.as_tensor(
-        camera.camera_from_world, dtype=gaussians.means.dtype, device=gaussians.means.device
-    )
-    return rasterize(
+    return seen_by(
+        camera,
         gaussians.means,
         gaussians.quaternions,
         torch.exp(gaussians.log_scales),
         torch.sigmoid(gaussians.logit_opacities),
         gaussians.sh,
-        pose,
-        fx_px=camera.fx_px,
-        fy_px=camera.fy_px,
-        cx_px=camera.cx_px,
-        cy_px=camera.cy_px,
-        width_px=camera.width_px,
-        height_px=camera.height_px,
         channels=channels,
         screen_offsets_px=screen_offsets_px,
         sh_degree=sh_degree,
         backend=backend,
     )
+
+
+def seen_by(
+    camera: Camera,
+    means: Float[Tensor, "n 3"],
+    quaternions: Float[Tensor, "n 4"],
+    scales: Float[Tensor, "n 3"],
+    opacities: Float[Tensor, " n"],
+    sh: Float[Tensor, "n k 3"],
+    **how: Any,
+) -> Render:
+    """``rasterize`` for a ``Camera`` in place of its pose and pinhole."""
+    pose = torch.as_tensor(camera.camera_from_world, dtype=means.dtype, device=means.device)
+    names = ("fx_px", "fy_px", "cx_px", "cy_px", "width_px", "height_px")
+    pinhole = {name: getattr(camera, name) for name in names}
+    return rasterize(means, quaternions, scales, opacities, sh, pose, **pinhole, **how)
