@@ -13,8 +13,7 @@ from dreamdrive.geometry.backends.dust3r.align import (
     AlignOptions,
     Known,
     align,
-    check_budget,
-    predicted_bytes,
+    check_memory,
 )
 from dreamdrive.geometry.backends.dust3r.network import (
     BUDGET_BYTES,
@@ -111,15 +110,13 @@ def planned_pairs(network: Dust3r, frames: int, size: tuple[int, int]) -> Int[np
         InputError: Not even pairs of close neighbours fit into the memory allowed, through the network or in
             the alignment.
     """
-    options = AlignOptions()
     sizes = [(size[1], size[0])] * frames
     refused: InputError | None = None
     for graph in (video_graph(frames), *_NARROWER):
         edges = make_pairs(frames, graph)
         try:
             plan_memory(network, sizes, edges, BUDGET_BYTES)
-            aligning = predicted_bytes(sizes, edges, options.samples_per_image)
-            check_budget(aligning, int(options.memory_gb * 1e9), frames, len(edges))
+            check_memory(sizes, edges, AlignOptions())
         except InputError as error:
             refused = error
         else:
