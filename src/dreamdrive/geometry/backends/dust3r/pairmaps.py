@@ -9,15 +9,10 @@ from jaxtyping import Bool, Float, Int
 
 @dataclass(frozen=True)
 class PairMaps:
-    """Points and confidences of both images of each pair.
+    """Points and confidences of both images of each pair, whose indices i and j are its edge.
 
-    Images may differ in shape, also within a pair.
-
-    Attributes:
-        edges: For each pair (E, 2) the indices i and j of its images.
-        points: For each pair the points of image i and of image j, (H, W, 3) and (U, V, 3), both in the frame
-            of camera i (x right, y down, z forward), up to a scale of each pair's own.
-        confidence: Their confidences (H, W) and (U, V), at least 1 in the published models.
+    Points of image i and of image j are both in the frame of camera i (x right, y down, z forward), up to a
+    scale of each pair's own. Confidences are at least 1 in the published models. Images may differ in shape.
     """
 
     edges: Int[np.ndarray, "e 2"]

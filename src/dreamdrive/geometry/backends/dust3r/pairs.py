@@ -29,20 +29,10 @@ def video_graph(frames: int) -> str:
 
 
 def make_pairs(frames: int, graph: str = "swin-3-noncyclic") -> Int[np.ndarray, "e 2"]:
-    """Pairs (E, 2) of frame indices, all in reverse at the end; a frame is never paired with itself.
+    """Pairs of frame indices, all in reverse at the end; a frame is never paired with itself.
 
-    Args:
-        frames: Number of frames, at least 2.
-        graph: One of
-
-            - ``complete``: all pairs,
-            - ``swin-K``: frames up to K apart, 3 where no K is given,
-            - ``logwin-K``: frames 1, 2, 4 ... 2^(K-1) apart.
-
-            Windows close into a circle unless the name ends in ``-noncyclic``.
-
-    Raises:
-        InputError: Fewer than two frames, or a graph of another form.
+    The graph is ``complete``; or ``swin-K``, frames up to K apart, 3 where no K is given; or ``logwin-K``,
+    frames 1, 2, 4 ... 2^(K-1) apart. Windows close into a circle unless the name ends in ``-noncyclic``.
     """
     if frames < 2:
         raise InputError(f"{frames} frames make no pair; at least 2 are needed")

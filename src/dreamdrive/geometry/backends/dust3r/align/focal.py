@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.weighted import weighted_median
+from dreamdrive.geometry.measured import weighted_median
 
 _STEPS, _ROBUST_STEPS = 10, 6
 _TINY_PX = 1e-8

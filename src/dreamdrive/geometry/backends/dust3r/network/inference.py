@@ -36,8 +36,8 @@ def infer(
 
     Args:
         network: The network.
-        pictures: Frames as ``images.prepare`` makes them, RGB (H, W, 3); shapes may differ.
-        edges: Pairs (E, 2) of indices of pictures.
+        pictures: Frames as ``fitting.prepare`` makes them, RGB; shapes may differ.
+        edges: Pairs of indices of pictures.
         budget_bytes: Memory that may be taken, the weights included.
         progress: Told after each batch of the frames and pairs done, of all of them.
 
