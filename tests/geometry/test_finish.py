@@ -8,7 +8,7 @@ from tests.geometry.toy import HEIGHT_M, Toy, drive
 from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.cameras.standing import stands
+from dreamdrive.geometry.cameras.paths import stands
 from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import check_frames, finish
 from dreamdrive.geometry.measured import Measured

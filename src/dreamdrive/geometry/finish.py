@@ -121,9 +121,7 @@ def _metric(
     known = Known(poses, True, (measured.depth * np.float32(factor)).astype(np.float32))
     points = depth_points(replace(clip, rig=(measured.camera,), known=known))
     poses, points = rebase(poses, points)
-    small = measured.camera.resized(evidence.small.width_px, evidence.small.height_px)
-    asked_m_s = scales.asked_m_s(clip)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
+    street = Street.of(clip, evidence, measured.camera, poses, points)
     if clip.known.ground is not None and clip.known.world_from_camera is not None and clip.known.metric:
         return _over(clip.known.ground.seen_from(clip.known.world_from_camera[0]), street, measured, seed)
     if measured.unit is not None:
