@@ -21,8 +21,7 @@ from dreamdrive.geometry.backends.dust3r.network.blocks import Rotation, grid_po
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.backends.dust3r.network.images import any_fitting
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
 from dreamdrive.geometry.backends.dust3r.reference import Objective, Raw, descend, raw_parameters
 from dreamdrive.geometry.fitting import prepare
 from geometry.simulated_pairs import Noise, Truth, pair_maps

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference import (
     Objective,
     Raw,

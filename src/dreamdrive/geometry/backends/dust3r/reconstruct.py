@@ -23,8 +23,7 @@ from dreamdrive.geometry.backends.dust3r.network import (
     load_dust3r,
     plan_memory,
 )
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs, video_graph
 from dreamdrive.geometry.cameras import stands
 from dreamdrive.geometry.depth import above_horizon, sky_mask
 from dreamdrive.geometry.evidence import Evidence, free_pixels

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Start
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
 _FOCAL_BREAK = 20.0

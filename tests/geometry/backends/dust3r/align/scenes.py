@@ -9,7 +9,7 @@ import torch
 from tests.golden import reading
 from tests.golden.reading import Table
 
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference import Raw
 
 PNP = 1e-3

@@ -11,7 +11,7 @@ from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align, predicted_bytes
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.backends.dust3r.reference import Objective, descend, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 from geometry.simulated_pairs import Noise, Truth, pair_maps

@@ -11,7 +11,7 @@ from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.cameras import unit_in
 from dreamdrive.scene.similarity import Similarity
 

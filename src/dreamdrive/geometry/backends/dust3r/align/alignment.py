@@ -17,7 +17,7 @@ from dreamdrive.geometry.backends.dust3r.align.solver import solve
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import onto_known, spanning_tree
 from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, FocalFreedom, Freedom, State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.splat import one_torch_thread
 

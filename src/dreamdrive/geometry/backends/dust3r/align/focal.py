@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.measured import weighted_median
 
 _STEPS, _ROBUST_STEPS = 10, 6

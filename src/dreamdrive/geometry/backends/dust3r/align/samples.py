@@ -8,7 +8,7 @@ from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.backends.dust3r.align.rays import Penalty, RayMisses, pixel_rays
 from dreamdrive.geometry.backends.dust3r.align.state import State
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 
 _CHUNK = 8192  # pixels at a time, so that their arrays stay in the cache
 _FULL_STEPS = 12

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes, weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.backends.dust3r.align.registration import pose_by_pnp, register
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs

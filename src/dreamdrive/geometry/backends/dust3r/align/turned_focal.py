@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.registration import pose_by_pnp
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 
 _SURE = 0.02  # relative; a network's own focal length counts as 0.05 off
 _UNDERSTATED = 1.5  # of 26 drawn corners of ten frames; the few images that turn share their errors

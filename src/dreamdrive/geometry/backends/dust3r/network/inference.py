@@ -13,7 +13,7 @@ from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r, Tokens
 from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap
 from dreamdrive.geometry.backends.dust3r.network.images import as_input
 from dreamdrive.geometry.backends.dust3r.network.memory import Size, plan_memory
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.progress import Progress, silent
 
 BUDGET_BYTES = 8 * 10**9
