@@ -15,10 +15,8 @@ from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
-from dreamdrive.geometry.backends.dust3r.reference.adam import descend
-from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
+from dreamdrive.geometry.backends.dust3r.reference import Objective, descend, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 from geometry.cases import Measurement, Row
 from geometry.simulated_pairs import Noise, Truth, pair_maps, truth_of

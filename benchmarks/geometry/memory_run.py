@@ -15,10 +15,8 @@ from jaxtyping import Int
 
 from common.memory import peak_bytes, resident_bytes
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
-from dreamdrive.geometry.backends.dust3r.align.memory import predicted_bytes
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align, predicted_bytes
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
 from geometry.alignment import EASY, RATE_HZ
 from geometry.simulated_pairs import Truth, pair_maps, truth_of
 from geometry.worlds import world_of

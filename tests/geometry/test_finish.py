@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.geometry.toy import HEIGHT_M, Toy, drive
+from tests.geometry.toy_drive import make_clip, straight
 
-from dreamdrive.geometry.cameras.standing import stands
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.cameras.paths import stands
 from dreamdrive.geometry.evidence.look import look
-from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.finish import check_frames, finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground
@@ -163,3 +165,10 @@ def test_who_stands(still: Toy, moving: Toy) -> None:
     assert stands(replace(still.clip, known=Known(driven, metric=False)), here)
     assert stands(replace(moving.clip, known=Known(jittered(count, 0.0))), there)
     assert not stands(replace(moving.clip, known=Known(jittered(count, 0.05))), there)
+
+
+def test_a_drive_is_accepted_and_a_still_is_not() -> None:
+    clip = make_clip(straight([0.5, 0.5]))
+    check_frames(clip, "dust3r")
+    with pytest.raises(InputError, match="dust3r: all 3 frames are alike"):
+        check_frames(replace(clip, frames=np.repeat(clip.frames[:1], 3, axis=0)), "dust3r")

@@ -17,14 +17,12 @@ from torch import Tensor
 from dreamdrive.geometry.backends.dust3r.align.focal import weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
+from dreamdrive.geometry.backends.dust3r.network.blocks import Rotation, grid_positions, rotate, rotation
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.backends.dust3r.network.images import any_fitting
-from dreamdrive.geometry.backends.dust3r.network.rope import Rotation, grid_positions, rotate, rotation
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
-from dreamdrive.geometry.backends.dust3r.reference.adam import descend
-from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, Raw, raw_parameters
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
+from dreamdrive.geometry.backends.dust3r.reference import Objective, Raw, descend, raw_parameters
 from dreamdrive.geometry.fitting import prepare
 from geometry.simulated_pairs import Noise, Truth, pair_maps
 

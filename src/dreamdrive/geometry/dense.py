@@ -1,7 +1,6 @@
 """The dense half of the classical reconstruction: depth, confidence, sky and motion of posed frames."""
 
-from dataclasses import dataclass
-
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -21,9 +20,9 @@ from dreamdrive.geometry.depth import (
     unheard,
 )
 from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
-from dreamdrive.geometry.road import upright_depth
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
 PASSES = 7
@@ -32,16 +31,7 @@ _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
 _BACKDROP_CONFIDENCE = 0.1
-
-
-@dataclass(frozen=True)
-class Dense:
-    """Per-pixel results, as in ``Geometry``: depth_m, confidence, moving (F, H, W) and sky (F, H, W)."""
-
-    depth_m: Float[np.ndarray, "f h w"]
-    confidence: Float[np.ndarray, "f h w"]
-    sky: Bool[np.ndarray, "f h w"]
-    moving: Float[np.ndarray, "f h w"]
+_SMOOTH_SHARE = 0.02  # of the image width: columns are smoothed over twice this and one more
 
 
 DepthMaps = tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]
@@ -54,8 +44,8 @@ def densify(
     measured: DepthMaps | None = None,
     tell: Tell = unheard,
     keep: Keep = at_once,
-) -> Dense:
-    """Depth, confidence, sky and moving evidence of every frame that is not held out.
+) -> Geometry:
+    """The posed clip with depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
     as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
@@ -88,7 +78,7 @@ def densify(
         moving = moving * ~sky
         if not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    return _finish(view, inverse, confidence, sky, moving)
+    return _geometry(posed, view, inverse, confidence, sky, moving)
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -148,18 +138,67 @@ def _stand_movers(
     return inverse, confidence
 
 
-def _finish(
+def upright_depth(
+    flagged: Bool[np.ndarray, "h w"], plane_inverse: Float[np.ndarray, "h w"]
+) -> Float[np.ndarray, "h w"]:
+    """Inverse depth in 1/m of flagged regions, each column upright on the road; 0 where none is known.
+
+    The lowest flagged pixel of a region's column is its contact with the road, whose plane is 0 above the
+    horizon; a running median over the columns takes out notches. A region cut off by the lower edge of the
+    image comes out too far away.
+    """
+    height, width = flagged.shape
+    reach = max(1, round(_SMOOTH_SHARE * width))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(flagged.astype(np.uint8))
+    inverse = np.zeros(flagged.shape, np.float32)
+    for label in range(1, count):
+        left, span = stats[label, cv2.CC_STAT_LEFT], stats[label, cv2.CC_STAT_WIDTH]
+        region = labels[:, left : left + span] == label
+        lowest = height - 1 - region[::-1].argmax(axis=0)
+        contact = plane_inverse[lowest, np.arange(left, left + span)]
+        padded = np.pad(contact, reach, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        column = np.median(windows, axis=1).astype(np.float32)
+        part = inverse[:, left : left + span]
+        part[region] = np.broadcast_to(column, region.shape)[region]
+    return inverse
+
+
+def _geometry(
+    posed: Posed,
     view: View,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
-) -> Dense:
+) -> Geometry:
+    """What both halves found, as the next stages take it."""
     shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
-    depth = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
-    return Dense(
-        depth_m=depth,
-        confidence=np.where(shown, confidence, 0).astype(np.float32),
-        sky=sky & view.usable,
-        moving=np.where(view.usable, moving, 0).astype(np.float32),
+    depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
+    confidence = np.where(shown, confidence, 0).astype(np.float32)
+    sky = sky & view.usable
+    moving = np.where(view.usable, moving, 0).astype(np.float32)
+    shares = {
+        "depth_share": float((depth_m[view.used] > 0).mean()),
+        "confident_share": float((confidence[view.used] > 0.25).mean()),
+        "sky_share": float(sky[view.used].mean()),
+        "moving_share": float((moving[view.used] >= 0.5).mean()),
+    }
+    return Geometry(
+        cameras=posed.cameras,
+        depth_m=depth_m,
+        confidence=confidence,
+        sky=sky,
+        moving=moving,
+        fixed_regions=posed.fixed_regions[None],
+        region_names=posed.region_names,
+        ground=posed.ground,
+        scale=posed.scale,
+        focal=posed.focal,
+        detected=posed.detected,
+        fallback=posed.fallback,
+        details={**posed.details, **shares},
+        fallback_kind=posed.fallback_kind,
+        placed=posed.placed,
+        metres_per_unit=posed.metres_per_unit,
     )

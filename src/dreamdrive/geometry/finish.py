@@ -1,13 +1,15 @@
-"""From measured cameras and depth to a geometry: metres, road, sky, what moves."""
+"""What a network that measures is shown; and from its cameras and depth to metres, road, sky, what moves."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.geometry.cameras import Posed, as_posed, rebase, stands
-from dreamdrive.geometry.dense import Dense, densify
-from dreamdrive.geometry.evidence import Evidence
+from dreamdrive.errors import InputError
+from dreamdrive.geometry.cameras import as_posed, contradiction, rebase, stands, without_poses
+from dreamdrive.geometry.dense import densify
+from dreamdrive.geometry.evidence import Evidence, look
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
 from dreamdrive.geometry.road import scale as scales
@@ -15,7 +17,37 @@ from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 
 _MEDIAN_DEPTH_M = 12.0  # of a street seen from a car; makes "near" a word before the metre is known
+_ALIKE = 1.0  # grey levels
 _STANDING = "the camera stands still: its path is noise and not used"
+
+
+def begin(clip: Clip, backend: str, weights: Path | None) -> tuple[Path, Evidence, Clip]:
+    """The weights of a network, what the frames show without it, and the clip as it is to be measured.
+
+    Of a standing camera the path is noise, in which no unit can be read: it is measured without known poses.
+
+    Raises:
+        InputError: No weights, fewer than two frames, frames that are all alike, or known poses that
+            contradict them.
+    """
+    if weights is None:
+        raise InputError(f"geometry {backend} needs the weights of its network")
+    check_frames(clip, backend)
+    evidence = look.look(clip)
+    contradiction.check(clip, evidence)
+    return weights, evidence, without_poses(clip) if stands(clip, evidence) else clip
+
+
+def check_frames(clip: Clip, backend: str) -> None:
+    """Refuse what no network can find cameras in."""
+    if len(clip) < 2:
+        raise InputError(f"geometry {backend} takes two frames or more; got {len(clip)}")
+    first = clip.frames[0].astype(np.int16)
+    if all(float(np.abs(frame - first).mean()) < _ALIKE for frame in clip.frames[1:]):
+        raise InputError(
+            f"geometry {backend}: all {len(clip)} frames are alike, which shows neither path nor depth; "
+            "take frames between which the camera moves"
+        )
 
 
 def finish(
@@ -49,37 +81,7 @@ def finish(
     posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
-    dense = densify(known, posed, (depth_m, measured.confidence))
-    return assemble(clip, posed, dense)
-
-
-def assemble(clip: Clip, posed: Posed, dense: Dense) -> Geometry:
-    """What both halves found, as the next stages take it."""
-    used = ~clip.held_out
-    shares = {
-        "depth_share": float((dense.depth_m[used] > 0).mean()),
-        "confident_share": float((dense.confidence[used] > 0.25).mean()),
-        "sky_share": float(dense.sky[used].mean()),
-        "moving_share": float((dense.moving[used] >= 0.5).mean()),
-    }
-    return Geometry(
-        cameras=posed.cameras,
-        depth_m=dense.depth_m,
-        confidence=dense.confidence,
-        sky=dense.sky,
-        moving=dense.moving,
-        fixed_regions=posed.fixed_regions[None],
-        region_names=posed.region_names,
-        ground=posed.ground,
-        scale=posed.scale,
-        focal=posed.focal,
-        detected=posed.detected,
-        fallback=posed.fallback,
-        details={**posed.details, **shares},
-        fallback_kind=posed.fallback_kind,
-        placed=posed.placed,
-        metres_per_unit=posed.metres_per_unit,
-    )
+    return densify(known, posed, (depth_m, measured.confidence))
 
 
 def _rough_factor(measured: Measured) -> float:
@@ -119,9 +121,7 @@ def _metric(
     known = Known(poses, True, (measured.depth * np.float32(factor)).astype(np.float32))
     points = depth_points(replace(clip, rig=(measured.camera,), known=known))
     poses, points = rebase(poses, points)
-    small = measured.camera.resized(evidence.small.width_px, evidence.small.height_px)
-    asked_m_s = scales.asked_m_s(clip)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
+    street = Street.of(clip, evidence, measured.camera, poses, points)
     if clip.known.ground is not None and clip.known.world_from_camera is not None and clip.known.metric:
         return _over(clip.known.ground.seen_from(clip.known.world_from_camera[0]), street, measured, seed)
     if measured.unit is not None:

@@ -20,30 +20,23 @@ from dreamdrive.scene.camera import Camera
 class Fitting:
     """How frames of one size are brought to the size of the network: resized, then the middle cut out.
 
-    Pixel coordinates have the centre of the top-left pixel at (0.5, 0.5), in frames and pictures alike.
-
-    Attributes:
-        frame_size: Width and height of the frame in pixels.
-        resized: Width and height after resizing.
-        left: Columns cut off at the left.
-        top: Rows cut off at the top.
-        size: Width and height of the picture.
-        shrinks: Whether resizing counts as shrinking, which takes the sinc instead of the cubic.
+    Sizes are width and height in pixels. Pixel coordinates have the centre of the top-left pixel at (0.5,
+    0.5), in frames and pictures alike.
     """
 
     frame_size: tuple[int, int]
     resized: tuple[int, int]
-    left: int
-    top: int
-    size: tuple[int, int]
-    shrinks: bool
+    left: int  # columns cut off
+    top: int  # rows cut off
+    size: tuple[int, int]  # of the picture
+    shrinks: bool  # whether resizing counts as shrinking, which takes the sinc instead of the cubic
 
     def to_picture(self, pixels: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-        """Column and row (..., 2) in the picture of pixels of the frame."""
+        """Column and row in the picture of pixels of the frame."""
         return pixels * self._scale - self._corner
 
     def to_frame(self, pixels: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-        """Column and row (..., 2) in the frame of pixels of the picture."""
+        """Column and row in the frame of pixels of the picture."""
         return (pixels + self._corner) / self._scale
 
     def picture_camera(self, camera: Camera) -> Camera:

@@ -28,6 +28,17 @@ def ranks(values: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
     return rankdata(values).reshape(values.shape) / max(values.size, 1)
 
 
+def weighted_median(values: Float[np.ndarray, " n"], weights: Float[np.ndarray, " n"]) -> float:
+    """The lowest value with half of the weight at or below it; NaN are absent, and stand for no value."""
+    counts = ~np.isnan(values) & (weights > 0)
+    values, weights = values[counts], weights[counts]
+    if not len(values):
+        return float("nan")
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weights[order], dtype=np.float64)
+    return float(values[order][np.searchsorted(below, below[-1] / 2)])
+
+
 @dataclass(frozen=True)
 class Measured:
     """What is measured of a clip before it is brought to metres and told what is road, sky and traffic.

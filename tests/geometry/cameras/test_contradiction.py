@@ -18,8 +18,7 @@ def clip() -> Clip:
 
 
 def share(clip: Clip, poses: np.ndarray) -> float:
-    evidence = look(clip)
-    found = explain(evidence.grey, evidence.street, evidence.small, poses)
+    found = explain(look(clip), poses)
     assert found.own > 0.8
     assert found.contradictory == (found.given < 0.5 * found.own)
     return found.given / found.own
@@ -68,10 +67,10 @@ def test_a_wrong_focal_length_is_thought_of(clip: Clip) -> None:
 def test_frames_that_show_nothing_contradict_nothing(clip: Clip) -> None:
     blank = replace(clip, frames=np.full_like(clip.frames, 90))
     evidence = look(blank)
-    assert explain(evidence.grey, evidence.street, evidence.small, PATH).pairs == 0
+    assert explain(evidence, PATH).pairs == 0
     still = straight([0.0] * 7)
     evidence = look(clip)
-    assert explain(evidence.grey, evidence.street, evidence.small, still).pairs == 0
+    assert explain(evidence, still).pairs == 0
 
 
 def test_poses_that_stand_are_refused_where_the_camera_moves(clip: Clip) -> None:

@@ -13,9 +13,7 @@ from dreamdrive.scene.clip import Clip
 
 
 def run(clip: Clip, seed: int = 0) -> Outcome:
-    seen = evidence.look(clip)
-    grey, usable = evidence.working_frames(clip, seen)
-    return reconstruct(grey, usable, seen.working, seen.motion.moving, clip.known.intrinsics, seed)
+    return reconstruct(clip, evidence.look(clip), seed)
 
 
 @pytest.fixture(scope="module")

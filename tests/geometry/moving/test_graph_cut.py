@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dreamdrive.geometry.moving.graph_cut import minimum_cut
+from dreamdrive.geometry.moving.outline import minimum_cut
 
 ROWS, COLUMNS = 3, 3
 ALL = np.array(list(product([False, True], repeat=ROWS * COLUMNS))).reshape(-1, ROWS, COLUMNS)

@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis.extra.numpy import arrays
 from tests.geometry import toy
 
-from dreamdrive.geometry.dense import densify
+from dreamdrive.geometry.dense import densify, upright_depth
 from dreamdrive.geometry.moving.evidence import FLAGGED, decide, fill
-from dreamdrive.geometry.road.upright import upright_depth
 
 
 def flagged_shares(street: toy.Toy) -> tuple[float, float, float]:

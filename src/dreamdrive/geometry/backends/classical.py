@@ -5,7 +5,6 @@ from pathlib import Path
 
 from dreamdrive.geometry.cameras import STEPS, pose_clip
 from dreamdrive.geometry.dense import PASSES, densify
-from dreamdrive.geometry.finish import assemble
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.road import in_metres
 from dreamdrive.progress import Work
@@ -31,9 +30,9 @@ def reconstruct(
     tell = _counted(work, 0, passes, total)
     posed = work.keep("posed", lambda: pose_clip(clip, camera_height_m=camera_height_m, seed=seed, tell=tell))
     known = in_metres(clip, posed.metres_per_unit)
-    dense = densify(known, posed, tell=_counted(work, posing, 1, total), keep=work.keep)
+    found = densify(known, posed, tell=_counted(work, posing, 1, total), keep=work.keep)
     work(total, total)
-    return assemble(clip, posed, dense)
+    return found
 
 
 def _counted(work: Work, start: int, each: int, total: int) -> Callable[[], None]:

@@ -3,8 +3,6 @@
 from dreamdrive.geometry.cameras import contradiction, odometry, sfm
 from dreamdrive.geometry.cameras.focal import settle
 from dreamdrive.geometry.cameras.mapping import STEPS
-from dreamdrive.geometry.cameras.paths import fill, rebase
+from dreamdrive.geometry.cameras.paths import fill, rebase, stands, unit_in, without_poses
 from dreamdrive.geometry.cameras.posing import MIN_TRACKS, Posed, as_posed, pose_clip
 from dreamdrive.geometry.cameras.refine import refined
-from dreamdrive.geometry.cameras.registration import register
-from dreamdrive.geometry.cameras.standing import stands, unit_in, without_poses

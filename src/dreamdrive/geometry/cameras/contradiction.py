@@ -5,7 +5,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.paths import path_length
@@ -42,20 +42,16 @@ class Explained:
 
 
 def check(clip: Clip, evidence: Evidence) -> None:
-    """Refuse known poses that contradict the frames, where there are any and the user gave them.
-
-    Raises:
-        InputError: The frames clearly show another motion.
-    """
+    """Refuse known poses that contradict the frames, where there are any and the user gave them."""
     if clip.known.world_from_camera is None or clip.known.generated:
         return
     poses = clip.known.world_from_camera
-    if _stand(poses, clip.known.metric) and _moves(evidence.grey, evidence.street, evidence.small):
+    if _stand(poses, clip.known.metric) and _moves(evidence):
         raise InputError(
             "the given poses are all the same, but the camera moves in the frames: with them nothing has a "
             "depth. Give the pose of each frame, or none to have them found"
         )
-    found = explain(evidence.grey, evidence.street, evidence.small, poses)
+    found = explain(evidence, poses)
     if not found.contradictory:
         return
     focal = "" if clip.known.intrinsics else "; the focal length is a guess: if it is known, give it too"
@@ -66,23 +62,18 @@ def check(clip: Clip, evidence: Evidence) -> None:
     )
 
 
-def explain(
-    grey: UInt8[np.ndarray, "f h w"],
-    usable: Bool[np.ndarray, "f h w"],
-    camera: Camera,
-    world_from_camera: Float[np.ndarray, "f 4 4"],
-) -> Explained:
-    """How much of the flow between frames the given poses, in any unit, explain; frames are 320 px wide.
+def explain(evidence: Evidence, world_from_camera: Float[np.ndarray, "f 4 4"]) -> Explained:
+    """How much of the flow between frames the given poses, in any unit, explain.
 
     A track is explained if it ends within 2 px of its epipolar line, on the side of points before the camera:
     poses that were inverted, or have other axes, drive backwards. Pairs between which either nothing moves or
     the given camera stands tell nothing.
     """
-    path = path_length(world_from_camera)
+    path, camera = path_length(world_from_camera), evidence.small
     given, own = [], []
-    for first, second in _pairs(len(grey)):
+    for first, second in _pairs(len(world_from_camera)):
         relative = np.linalg.inv(world_from_camera[second]) @ world_from_camera[first]
-        tracks = _clear_tracks(grey, usable, first, second)
+        tracks = _clear_tracks(evidence, first, second)
         if tracks is not None and np.linalg.norm(relative[:3, 3]) > _STANDING * path:
             given.append(_share(*tracks, camera, relative))
             own.append(_share(*tracks, camera, _own(*tracks, camera)))
@@ -103,18 +94,18 @@ def _stand(world_from_camera: Float[np.ndarray, "f 4 4"], metric: bool) -> bool:
     return bool(np.abs(world_from_camera - world_from_camera[0]).max() < (_SAME_POSE if metric else 1e-9))
 
 
-def _moves(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], camera: Camera) -> bool:
+def _moves(evidence: Evidence) -> bool:
     """Whether most pairs of frames show one clear motion of the camera."""
-    found = [_clear_tracks(grey, usable, *pair) for pair in _pairs(len(grey))]
+    found, camera = [_clear_tracks(evidence, *pair) for pair in _pairs(len(evidence.grey))], evidence.small
     shares = [0.0 if tracks is None else _share(*tracks, camera, _own(*tracks, camera)) for tracks in found]
     return float(np.median(shares)) >= MIN_OWN
 
 
 def _clear_tracks(
-    grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], first: int, second: int
+    evidence: Evidence, first: int, second: int
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]] | None:
     """Places of enough corners in both frames; None where they hardly move."""
-    here, there = track(grey[first], grey[second], usable[first])
+    here, there = track(evidence.grey[first], evidence.grey[second], evidence.street[first])
     if len(here) < _MIN_TRACKS or np.median(np.linalg.norm(there - here, axis=1)) < _MIN_FLOW_PX:
         return None
     return here, there

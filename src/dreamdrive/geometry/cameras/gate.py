@@ -19,19 +19,12 @@ MAX_VARIATION = 0.6
 
 @dataclass(frozen=True)
 class Verdict:
-    """Outcome of the gate.
+    """Outcome of the gate."""
 
-    Attributes:
-        reasons: Why the model is refused, in words; empty when it is accepted.
-        figures: What was measured, as JSON values.
-        backwards: Whether the camera consistently drives backwards.
-        wobbling: Whether the frames are not quite pictures of one street, as generated ones are not.
-    """
-
-    reasons: tuple[str, ...]
-    figures: dict[str, Any]
-    backwards: bool
-    wobbling: bool = False
+    reasons: tuple[str, ...]  # why the model is refused, in words; empty when it is accepted
+    figures: dict[str, Any]  # what was measured, as JSON values
+    backwards: bool  # the camera consistently drives backwards
+    wobbling: bool = False  # the frames are not quite pictures of one street, as generated ones are not
 
 
 def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, UInt8
 
 from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Features, features
+from dreamdrive.geometry.evidence import Evidence, Features, features, look
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Fallback
 
 MIN_FRAMES = 3
@@ -39,29 +39,20 @@ class Outcome:
     refusal: Fallback | None = None
 
 
-def reconstruct(
-    grey: UInt8[np.ndarray, "f h w"],
-    usable: Bool[np.ndarray, "f h w"],
-    camera: Camera,
-    moving: Bool[np.ndarray, " s"],
-    calibrated: bool,
-    seed: int,
-    tell: Tell = unheard,
-) -> Outcome:
+def reconstruct(clip: Clip, evidence: Evidence, seed: int, tell: Tell = unheard) -> Outcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
     Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
-    before incremental mapping. Frames and pinhole are of the working size; ``moving`` are steps in which the
-    picture moves. ``tell`` is called after features, after matches, and with the model.
+    before incremental mapping. ``tell`` is called after features, after matches, and with the model.
     """
-    if len(grey) < MIN_FRAMES:
-        return _refused(f"{len(grey)} frames are too few for structure from motion", "few")
-    found = features.extract(grey, usable)
+    if len(clip) < MIN_FRAMES:
+        return _refused(f"{len(clip)} frames are too few for structure from motion", "few")
+    found = features.extract(*look.working_frames(clip, evidence))
     tell()
     typical = int(np.median([len(entry.keypoints_px) for entry in found]))
     if typical < MIN_FEATURES:
         return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
-    square, found = _square_pixels(camera, found)
+    square, found = _square_pixels(evidence.working, found)
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
     figures: dict[str, Any] = {"features": typical}
@@ -71,12 +62,12 @@ def reconstruct(
         tell()
         for name, again, start in _attempts(seed):
             mapper = sfm.map_globally if name == "global" else sfm.map_incrementally
-            model = mapper(database, len(grey), start)
+            model = mapper(database, len(clip), start)
             if model is None or model.registered.mean() < 0.5:
                 failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
             else:
-                settled = settle(database, model, square, calibrated, seed)
-                verdict = gate.judge(settled.model, moving)
+                settled = settle(database, model, square, clip.known.intrinsics, seed)
+                verdict = gate.judge(settled.model, evidence.motion.moving)
                 failed = verdict.reasons
                 figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
                 if not failed:

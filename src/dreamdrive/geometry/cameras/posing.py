@@ -11,8 +11,7 @@ from dreamdrive.geometry.cameras import contradiction, odometry
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Evidence
-from dreamdrive.geometry.evidence import look as looking
+from dreamdrive.geometry.evidence import Evidence, look
 from dreamdrive.geometry.road import Metric, Street, depth_points, depth_ratios, scale
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -72,7 +71,7 @@ def pose_clip(
             the frames.
     """
     _check(clip, camera_height_m)
-    evidence = looking.look(clip)
+    evidence = look.look(clip)
     contradiction.check(clip, evidence)
     tell()
     if clip.known.world_from_camera is not None:
@@ -85,10 +84,7 @@ def pose_clip(
     if evidence.motion.standing:
         reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
         return _standing(clip, evidence, camera_height_m, reason)
-    grey, usable = looking.working_frames(clip, evidence)
-    outcome = reconstruct(
-        grey, usable, evidence.working, evidence.motion.moving, clip.known.intrinsics, seed, tell
-    )
+    outcome = reconstruct(clip, evidence, seed, tell)
     if outcome.settled is None:
         return _from_odometry(clip, evidence, outcome, camera_height_m)
     return _from_model(clip, evidence, outcome, camera_height_m, seed)
@@ -111,9 +107,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
         camera = replace(camera, fx_px=camera.fx_px * factor, fy_px=camera.fy_px * factor)
     filled = fill(model.world_from_camera, clip.times_s)
     poses, points = rebase(filled, model.points)
-    small = camera.resized(evidence.small.width_px, evidence.small.height_px)
-    asked_m_s = scale.asked_m_s(clip)
-    street = Street(evidence.grey, evidence.street, small, poses, points, clip.times_s, asked_m_s)
+    street = Street.of(clip, evidence, camera, poses, points)
     ratios = depth_ratios(clip, camera, poses, points, model.seen)
     if len(ratios):
         metric = scale.from_depth(ratios, street, height_m, seed)
@@ -167,8 +161,7 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    asked_m_s = scale.asked_m_s(clip)
-    return Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s, asked_m_s)
+    return Street.of(clip, evidence, clip.rig[0], poses, points)
 
 
 def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
@@ -189,7 +182,7 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     poses = np.tile(np.eye(4), (len(clip), 1, 1))
     points = depth_points(clip)
     camera = clip.rig[0]
-    street = Street(evidence.grey, evidence.street, evidence.small, poses, points, clip.times_s)
+    street = Street.of(clip, evidence, camera, poses, points)
     plane = scale.find_ground(street, 0)[0] if len(points) else None
     metric = _level_road(height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:

@@ -1,6 +1,6 @@
 """Structure from motion of one camera with pycolmap, one thread, seeded."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,29 +22,21 @@ ROBUST_SCALE_PX = 1.0
 
 @dataclass(frozen=True)
 class Model:
-    """A sparse reconstruction of a clip, in arbitrary units.
+    """A sparse reconstruction of a clip, in arbitrary units."""
 
-    Attributes:
-        world_from_camera: Poses (F, 4, 4); NaN where a frame was not registered.
-        points: Points (P, 3) in the world.
-        seen: Which frame sees which point (F, P).
-        lens: Focal lengths, principal point in pixels at the working size, and the radial term k.
-        cost: Mean robust (Cauchy, 1 px) cost of an observation.
-        reprojection_px: Mean reprojection error.
-        native: pycolmap's own reconstruction.
-    """
-
-    world_from_camera: Float[np.ndarray, "f 4 4"]
+    world_from_camera: Float[np.ndarray, "f 4 4"]  # NaN where a frame was not registered
     points: Float[np.ndarray, "p 3"]
-    seen: Bool[np.ndarray, "f p"]
-    lens: Float[np.ndarray, "5"]
-    cost: float
-    reprojection_px: float
-    native: Any
+    seen: Bool[np.ndarray, "f p"]  # which frame sees which point
+    lens: Float[
+        np.ndarray, "5"
+    ]  # focal lengths, principal point in pixels at the working size, radial term k
+    cost: float  # mean robust (Cauchy, 1 px) cost of an observation
+    reprojection_px: float  # mean
+    native: Any  # pycolmap's own reconstruction
 
     @property
     def registered(self) -> Bool[np.ndarray, " f"]:
-        """Frames with a pose (F,)."""
+        """Frames with a pose."""
         return np.isfinite(self.world_from_camera[:, 0, 0])
 
 
@@ -95,11 +87,7 @@ def map_globally(database: Path, count: int, seed: int) -> Model | None:
     mapper.bundle_adjustment.refine_extra_params = False
     mapper.bundle_adjustment.ceres.solver_options.num_threads = 1
     mapper.global_positioning.use_gpu = False
-    output = database.parent / "models"
-    output.mkdir(exist_ok=True)
-    with _quiet():
-        models = pycolmap.global_mapping(database, database.parent, output, options=options)
-    return _largest(models, count)
+    return _largest(pycolmap.global_mapping, database, options, count)
 
 
 def map_incrementally(database: Path, count: int, seed: int) -> Model | None:
@@ -119,11 +107,7 @@ def map_incrementally(database: Path, count: int, seed: int) -> Model | None:
     mapper.filter_max_reproj_error = 2.0
     mapper.abs_pose_refine_focal_length = False
     mapper.abs_pose_refine_extra_params = False
-    output = database.parent / "models"
-    output.mkdir(exist_ok=True)
-    with _quiet():
-        models = pycolmap.incremental_mapping(database, database.parent, output, options=options)
-    return _largest(models, count)
+    return _largest(pycolmap.incremental_mapping, database, options, count)
 
 
 def adjust(
@@ -145,13 +129,8 @@ def adjust(
         lens[:2] = focal_px
     camera = native.cameras[1]
     if free_focal or free_radial or lens[4] != 0:
-        replacement = pycolmap.Camera(
-            model="SIMPLE_RADIAL",
-            width=camera.width,
-            height=camera.height,
-            params=[float(lens[:2].mean()), lens[2], lens[3], lens[4]],
-        )
-        camera.model, camera.params = replacement.model, replacement.params.tolist()
+        camera.model = pycolmap.CameraModelId.SIMPLE_RADIAL
+        camera.params = [float(lens[:2].mean()), *lens[2:].tolist()]
     else:
         camera.params = lens[:4].tolist()
     _adjust_in_place(native, free_focal, free_radial, drop_outliers)
@@ -192,7 +171,11 @@ def _verify_pairs(database: Path, camera: Camera, seed: int) -> None:
         )
 
 
-def _largest(models: dict[int, Any], count: int) -> Model | None:
+def _largest(run: Callable[..., dict[int, Any]], database: Path, options: Any, count: int) -> Model | None:
+    output = database.parent / "models"
+    output.mkdir(exist_ok=True)
+    with _quiet():
+        models = run(database, database.parent, output, options=options)
     found = [model for model in models.values() if model.num_points3D() > 0]
     if not found:
         return None

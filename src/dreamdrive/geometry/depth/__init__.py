@@ -1,7 +1,6 @@
 """Plane sweep, its smoothing and its confidence."""
 
-from dreamdrive.geometry.depth.confidence import agreement, combine, temporal_neighbours
-from dreamdrive.geometry.depth.flanks import fill_flanks
+from dreamdrive.geometry.depth.confidence import agreement, combine, fill_flanks, temporal_neighbours
 from dreamdrive.geometry.depth.one_frame import sweep_frames
 from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
 from dreamdrive.geometry.depth.sweep import Correlation, Warp, inside, on_plane, sample

@@ -26,14 +26,11 @@ ROAD_AHEAD = (0.2, 0.8, 0.4, 0.92)
 class Fixed:
     """What does not move with the street.
 
-    Attributes:
-        regions: 0 for the street, else 1 + index into ``names`` (H, W).
-        names: Names of the regions.
-        objects: What keeps its place without being fixed to the camera (H, W): a car ahead at a constant
-            distance, a faint reflection. It must not steer the poses, but it belongs to the scene.
+    Objects keep their place without being fixed to the camera: a car ahead at a constant distance, a faint
+    reflection. They must not steer the poses, but they belong to the scene.
     """
 
-    regions: Int[np.ndarray, "h w"]
+    regions: Int[np.ndarray, "h w"]  # 0 for the street, else 1 + index into the names
     names: tuple[str, ...]
     objects: Bool[np.ndarray, "h w"]
 
@@ -80,12 +77,9 @@ def find_fixed(
     renumbered = np.zeros_like(regions)
     for index, name in enumerate(names, 1):
         renumbered[regions == (BONNET, OVERLAY, BAR).index(name) + 1] = index
-    resized = cv2.resize(renumbered, size, interpolation=cv2.INTER_NEAREST)
-    return Fixed(
-        resized.astype(np.int32),
-        names,
-        cv2.resize(objects.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0,
-    )
+    maps = renumbered, objects.astype(np.uint8)
+    resized, kept = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in maps)
+    return Fixed(resized.astype(np.int32), names, kept > 0)
 
 
 def _bars(grey: np.ndarray) -> np.ndarray:

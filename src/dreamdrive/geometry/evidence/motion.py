@@ -19,21 +19,13 @@ FEW_TRACKS = 30
 
 @dataclass(frozen=True)
 class Motion:
-    """How much the picture moves.
+    """How much the picture moves."""
 
-    Attributes:
-        flow_px: 70th percentile of the flow (F - 1,) from each frame to the next, at 320 px width.
-        moving: Whether the camera moves in that step (F - 1,).
-        standing: Whether it stands in the whole clip.
-        brightness: Median over frames of the 90th percentile of grey levels.
-        tracks: Median number of tracked corners.
-    """
-
-    flow_px: Float[np.ndarray, " s"]
-    moving: Bool[np.ndarray, " s"]
-    standing: bool
-    brightness: float
-    tracks: float
+    flow_px: Float[np.ndarray, " s"]  # 70th percentile from each frame to the next, at 320 px width
+    moving: Bool[np.ndarray, " s"]  # whether the camera moves in that step
+    standing: bool  # in the whole clip
+    brightness: float  # median over frames of the 90th percentile of grey levels
+    tracks: float  # median number of tracked corners
 
 
 def track(

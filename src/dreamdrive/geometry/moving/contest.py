@@ -32,17 +32,11 @@ _TEXTURE = 3.0  # grey levels, standard deviation
 
 @dataclass(frozen=True)
 class Verdict:
-    """Outcome for one frame.
+    """Outcome for one frame."""
 
-    Attributes:
-        excess_px: How far the flow is beyond what any static point could show (H, W); 0 where it is not.
-        gain: By how many grey levels the flow matches better than the static explanation (H, W).
-        off_line: Clearly better matched by a flow that leaves the epipolar line or its allowed part (H, W).
-    """
-
-    excess_px: Float[np.ndarray, "h w"]
-    gain: Float[np.ndarray, "h w"]
-    off_line: Bool[np.ndarray, "h w"]
+    excess_px: Float[np.ndarray, "h w"]  # of the flow beyond what any static point could show, or 0
+    gain: Float[np.ndarray, "h w"]  # grey levels by which the flow matches better than a static explanation
+    off_line: Bool[np.ndarray, "h w"]  # clearly better matched off the epipolar line or its allowed part
 
 
 def judge(

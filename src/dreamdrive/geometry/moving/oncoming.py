@@ -71,13 +71,10 @@ class _Columns:
 
 
 def oncoming(view: View) -> dict[int, Bool[np.ndarray, "h w"]]:
-    """Pixels (H, W) of each used frame that show what comes towards the camera.
+    """Pixels of each used frame that show what comes towards the camera; none without a road plane.
 
     These are things that seem to be nearer than where they meet the road, 1.4 to 2.75 times, in two frames or
     more: while its speed lasts such a thing seems to stand at one place, to which all frames agree.
-
-    Args:
-        view: The posed frames; without a road plane nothing is found.
     """
     found = by_frame(view, lambda frame: _things(view, frame))
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-from dreamdrive.geometry.depth import View, Warp
+from dreamdrive.geometry.depth import View, Warp, inside, sample
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
-from dreamdrive.geometry.moving.graph_cut import minimum_cut
-from dreamdrive.geometry.moving.misfit import misfit
 
 _REACH = 2  # offsets beyond this are not asked
 _SAME_PX = 2.0  # explanations that land this near are one
@@ -37,6 +37,8 @@ _UNDER = 1.0  # cost of a pixel below the region
 _NEVER = 100.0
 _EDGE = 6.0  # weight of two equal neighbours
 _EDGE_FLOOR = 0.3
+_CAP_LEVELS, _WINDOW_PX = 25.0, 3  # of a misfit
+_UNIT = 100  # the flow of a cut is found in whole numbers
 _EDGE_LEVELS = 15.0  # difference in colour at which the weight is 0.6 of that
 
 
@@ -86,7 +88,7 @@ def _neighbour(view: View, frame: int, flow: PairFlow, inverse_depth: Float[np.n
     explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for inverse in (inverse_depth, np.maximum(inverse_depth, np.float32(_PLANE_SHARE) * plane), plane):
         x, y = warp(inverse)
-        explanations.append((x, y, misfit(view, frame, flow.source, x, y)))
+        explanations.append((x, y, _misfit(view, frame, flow.source, x, y)))
     return _Neighbour(flow, explanations)
 
 
@@ -117,7 +119,7 @@ def _gain(
         if motion is None:
             continue
         x, y = motion
-        own = misfit(view, frame, neighbour.flow.source, x, y)[window]
+        own = _misfit(view, frame, neighbour.flow.source, x, y)[window]
         static = np.full(own.shape, np.float32(np.inf))
         for at_x, at_y, error in neighbour.explanations:
             apart = np.hypot(at_x[window] - x[window], at_y[window] - y[window]) >= _SAME_PX
@@ -174,3 +176,56 @@ def _hanging_together(cut: Bool[np.ndarray, "u v"], part: Bool[np.ndarray, "u v"
     _, found = cv2.connectedComponents(cut.astype(np.uint8), connectivity=4)
     labels = np.asarray(found, np.intp)
     return cut & np.isin(labels, np.unique(labels[part & cut]))
+
+
+def _misfit(
+    view: View, frame: int, other: int, x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"]
+) -> Float[np.ndarray, "h w"]:
+    """How badly a frame fits another one where its pixels are said to have gone, by column and row.
+
+    Mean difference in grey levels over a small window, capped; NaN outside the other frame.
+    """
+    difference = np.minimum(
+        np.abs(sample(view.grey[other], x, y) - view.grey[frame]), np.float32(_CAP_LEVELS)
+    )
+    mean = cv2.boxFilter(difference, cv2.CV_32F, (_WINDOW_PX, _WINDOW_PX))
+    return np.where(inside(x, y, view.usable[other]), mean, np.float32(np.nan))
+
+
+def minimum_cut(
+    gain: Float[np.ndarray, "h w"],
+    right: Float[np.ndarray, "h v"],
+    below: Float[np.ndarray, "u w"],
+) -> Bool[np.ndarray, "h w"]:
+    """The labels with the largest sum of gains of the labelled pixels less the weights that are cut.
+
+    Two labels for every pixel, as a minimum cut (Boykov and Jolly, 2001). A gain is what labelling a pixel is
+    worth; negative where it costs. Non-negative weights are those of unlike labels of each pixel and its
+    neighbour on the right or below. Gains and weights count in steps of 1/100. Of equally good labellings it
+    is that of the fewest pixels.
+    """
+    pixel = np.arange(gain.size).reshape(gain.shape)
+    source, sink = gain.size, gain.size + 1
+    worth, cost = _whole(np.maximum(gain, 0)).ravel(), _whole(np.maximum(-gain, 0)).ravel()
+    edges = [
+        (np.full(gain.size, source), pixel.ravel(), worth),
+        (pixel.ravel(), np.full(gain.size, sink), cost),
+    ]
+    for start, end, weight in (
+        (pixel[:, :-1], pixel[:, 1:], right),
+        (pixel[:-1], pixel[1:], below),
+    ):
+        both = _whole(weight).ravel()
+        edges += [(start.ravel(), end.ravel(), both), (end.ravel(), start.ravel(), both)]
+    rows, columns, values = (np.concatenate(part) for part in zip(*edges, strict=True))
+    network = csr_array((values, (rows, columns)), shape=(gain.size + 2, gain.size + 2))
+    left = network - maximum_flow(network, source, sink).flow
+    left.data[left.data < 0] = 0
+    left.eliminate_zeros()
+    labelled = np.zeros(gain.size + 2, bool)
+    labelled[breadth_first_order(left, source, return_predecessors=False)] = True
+    return labelled[: gain.size].reshape(gain.shape)
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    return np.rint(values * _UNIT).astype(np.int32)

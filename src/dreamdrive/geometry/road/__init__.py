@@ -1,7 +1,6 @@
-"""The road plane, the metric scale, and what stands on the road."""
+"""The road plane and the metric scale."""
 
 from dreamdrive.geometry.road import scale
 from dreamdrive.geometry.road.ground_sweep import Pair, Road
 from dreamdrive.geometry.road.known_depth import MIN_RATIOS, depth_points, depth_ratios, factor_of, in_metres
 from dreamdrive.geometry.road.scale import Metric, Street
-from dreamdrive.geometry.road.upright import upright_depth

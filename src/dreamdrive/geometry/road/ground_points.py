@@ -14,23 +14,14 @@ REACH = 20.0
 
 @dataclass(frozen=True)
 class Plane:
-    """Points x with ``normal . x + offset = 0``, the normal pointing up, in the units of the poses.
+    """Points x with ``normal . x + offset = 0``, in the units of the poses."""
 
-    Attributes:
-        normal: Unit normal (3,).
-        offset: Height of the origin above the plane.
-        height: Mean height of the cameras above it.
-        support: Inliers, or peak of the photometric profile over its median.
-        share: Inliers over candidates, or 1.
-        spread: Relative spread of the height.
-    """
-
-    normal: Float[np.ndarray, "3"]
-    offset: float
-    height: float
-    support: float
-    share: float
-    spread: float
+    normal: Float[np.ndarray, "3"]  # of length 1, up
+    offset: float  # height of the origin above the plane
+    height: float  # mean height of the cameras above it
+    support: float  # inliers, or peak of the photometric profile over its median
+    share: float  # inliers over candidates, or 1
+    spread: float  # of the height, relative
 
 
 def up_direction(world_from_camera: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "3"]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.road.ground_points import Plane, fit_points
 from dreamdrive.geometry.road.ground_sweep import Road, sweep
 from dreamdrive.geometry.road.known_depth import factor_of
@@ -42,6 +43,19 @@ class Street:
     points: Float[np.ndarray, "p 3"]
     times_s: Float[np.ndarray, " f"]
     asked_m_s: float | None = None
+
+    @staticmethod
+    def of(
+        clip: Clip,
+        evidence: Evidence,
+        camera: Camera,
+        world_from_camera: Float[np.ndarray, "f 4 4"],
+        points: Float[np.ndarray, "p 3"],
+    ) -> "Street":
+        """A clip with the pinhole of its frames, poses and points."""
+        small = camera.resized(evidence.small.width_px, evidence.small.height_px)
+        frames = evidence.grey, evidence.street, small
+        return Street(*frames, world_from_camera, points, clip.times_s, asked_m_s(clip))
 
 
 @dataclass(frozen=True)

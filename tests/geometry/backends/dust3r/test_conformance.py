@@ -14,7 +14,7 @@ from tests.streets import street_clip
 from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
 from dreamdrive.geometry.backends.dust3r.network.images import fitting
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.fitting import Fitting
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip

@@ -18,7 +18,7 @@ from safetensors.torch import save_file
 from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 
-from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show, standardise
+from dreamdrive.geometry.backends.feedforward.network import fit_patches, show, standardise
 from dreamdrive.geometry.fitting import Fitting
 from dreamdrive.world import Drive
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dreamdrive.geometry.backends.feedforward.camera import seen_through
 from dreamdrive.geometry.backends.feedforward.network import Seen
+from dreamdrive.geometry.backends.feedforward.reconstruct import seen_through
 from dreamdrive.scene.camera import Camera
 
 KNOWN = Camera(100.0, 100.0, 86.0, 45.0, 160, 96)

@@ -12,9 +12,9 @@ from dreamdrive.data.distortion import Distortion
 from dreamdrive.data.lens import Lens
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach
-from dreamdrive.geometry.backends.files.declared import read_declared
+from dreamdrive.geometry.backends.files.attach import OntoClip
 from dreamdrive.geometry.backends.files.depth import read_depth
-from dreamdrive.geometry.backends.files.onto_clip import OntoClip
+from dreamdrive.geometry.backends.files.given import read_declared
 from dreamdrive.scene.camera import Camera
 
 DEPTH = np.linspace(2, 50, 6 * 10, dtype=np.float32).reshape(6, 10)

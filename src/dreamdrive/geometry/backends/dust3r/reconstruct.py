@@ -13,8 +13,7 @@ from dreamdrive.geometry.backends.dust3r.align import (
     AlignOptions,
     Known,
     align,
-    check_budget,
-    predicted_bytes,
+    check_memory,
 )
 from dreamdrive.geometry.backends.dust3r.network import (
     BUDGET_BYTES,
@@ -24,14 +23,12 @@ from dreamdrive.geometry.backends.dust3r.network import (
     load_dust3r,
     plan_memory,
 )
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
-from dreamdrive.geometry.cameras import contradiction, stands, without_poses
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs, video_graph
+from dreamdrive.geometry.cameras import stands
 from dreamdrive.geometry.depth import above_horizon, sky_mask
-from dreamdrive.geometry.evidence import Evidence, free_pixels, look
-from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.evidence import Evidence, free_pixels
+from dreamdrive.geometry.finish import begin, finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
-from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.moving import FLAGGED
 from dreamdrive.progress import Progress, Work
@@ -55,28 +52,14 @@ def reconstruct(
 ) -> Geometry:
     """Pointmaps of pairs of frames, aligned, brought to metres; see ``geometry.protocol``.
 
-    Held-out frames take part in the alignment, which poses them; their depth is not handed on.
-
-    Args:
-        clip: Frames of one camera.
-        camera_height_m: Height of the camera above the road; None assumes 1.5 m.
-        seed: Seed of everything random.
-        weights: The network: a ``.pth`` of the authors, or the folder of its hub form.
-        work: Told of frames and pairs that the network has seen, then of the alignment.
+    Held-out frames take part in the alignment, which poses them; their depth is not handed on. Work is told
+    of frames and pairs that the network has seen, then of the alignment.
 
     Raises:
-        InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that contradict
-            them, or weights or pointmaps that cannot be used.
+        InputError: As ``finish.begin`` says; or weights or pointmaps cannot be used.
     """
-    if weights is None:
-        raise InputError("geometry dust3r needs the weights of its network")
-    check_frames(clip, "dust3r")
-    evidence = look.look(clip)
-    contradiction.check(clip, evidence)
-    maps, how = _seen(clip, weights, lambda done, total: work(done, total + 1))
-    # Of a standing camera the path is noise, in which no unit can be read.
-    standing = stands(clip, evidence)
-    shown = without_poses(clip) if standing else clip
+    path, evidence, shown = begin(clip, "dust3r", weights)
+    maps, how = _seen(clip, path, lambda done, total: work(done, total + 1))
     usable = _usable(clip, evidence, how)
     maps = maps.masked(tuple(usable))
 
@@ -86,7 +69,7 @@ def reconstruct(
         return finish(clip, seen, evidence, camera_height_m=camera_height_m, seed=seed)
 
     first = found(None)
-    still = None if standing else _still(first.moving, usable, how)
+    still = None if stands(clip, evidence) else _still(first.moving, usable, how)
     return first if still is None else found(tuple(still))
 
 
@@ -100,26 +83,19 @@ def _seen(clip: Clip, weights: Path, progress: Progress) -> tuple[PairMaps, Fitt
 
 
 def planned_pairs(network: Dust3r, frames: int, size: tuple[int, int]) -> Int[np.ndarray, "e 2"]:
-    """Pairs (E, 2) of frames: those of ``video_graph``, or of narrower windows where they would not fit.
-
-    Args:
-        network: The network that is to look at them.
-        frames: Number of frames.
-        size: Width and height of the pictures.
+    """Pairs of frames: those of ``video_graph``, or of narrower windows where they would not fit.
 
     Raises:
         InputError: Not even pairs of close neighbours fit into the memory allowed, through the network or in
             the alignment.
     """
-    options = AlignOptions()
     sizes = [(size[1], size[0])] * frames
     refused: InputError | None = None
     for graph in (video_graph(frames), *_NARROWER):
         edges = make_pairs(frames, graph)
         try:
             plan_memory(network, sizes, edges, BUDGET_BYTES)
-            aligning = predicted_bytes(sizes, edges, options.samples_per_image)
-            check_budget(aligning, int(options.memory_gb * 1e9), frames, len(edges))
+            check_memory(sizes, edges, AlignOptions())
         except InputError as error:
             refused = error
         else:

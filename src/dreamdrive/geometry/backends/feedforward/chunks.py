@@ -9,8 +9,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.network import Seen
-from dreamdrive.geometry.measured import ranks
-from dreamdrive.geometry.weighted import weighted_median
+from dreamdrive.geometry.measured import ranks, weighted_median
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.similarity import Similarity, nearest_rotation
 
@@ -19,21 +18,13 @@ _PIXELS = 4_000  # of a frame that take part in joining; more do not make it bet
 
 @dataclass(frozen=True)
 class Joined:
-    """All frames of a clip in one world.
-
-    Attributes:
-        world_from_camera: Poses (F, 4, 4).
-        depth: Depth along z (F, H, W) in their unit, the geometric mean of the chunks' units.
-        confidence: As the network gave it (F, H, W).
-        scales: Units of the chunks (C,) in this one.
-        miss: Median distance (C-1,) of the points that two chunks share, relative to their depth.
-    """
+    """All frames of a clip in one world."""
 
     world_from_camera: Float[np.ndarray, "f 4 4"]
-    depth: Float[np.ndarray, "f h w"]
-    confidence: Float[np.ndarray, "f h w"]
-    scales: Float[np.ndarray, " c"]
-    miss: Float[np.ndarray, " d"]
+    depth: Float[np.ndarray, "f h w"]  # along z in the unit of the poses, the geometric mean of the chunks'
+    confidence: Float[np.ndarray, "f h w"]  # as the network gave it
+    scales: Float[np.ndarray, " c"]  # units of the chunks in this one
+    miss: Float[np.ndarray, " d"]  # median distance of the points two chunks share, relative to their depth
 
 
 def chunks(count: int, length: int, overlap: int) -> list[range]:
@@ -49,15 +40,8 @@ def chunks(count: int, length: int, overlap: int) -> list[range]:
 def join(parts: Sequence[tuple[range, Seen]], camera: Camera, usable: Bool[np.ndarray, "f h w"]) -> Joined:
     """Bring each chunk onto the one before by the frames they share.
 
-    Where two chunks overlap, a frame is taken from the one whose edge is further away.
-
-    Args:
-        parts: Frames of each chunk and what was seen in them.
-        camera: Pinhole of the pictures.
-        usable: Pixels (F, H, W) that show the street.
-
-    Raises:
-        InputError: Two chunks have nothing in common.
+    Where two chunks overlap, a frame is taken from the one whose edge is further away. Of the pictures are
+    the camera and the usable pixels.
     """
     similarities, misses = [Similarity(1.0, np.eye(3), np.zeros(3))], []
     for before, after in pairwise(parts):

@@ -14,9 +14,14 @@ from torch import nn
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
-from dreamdrive.geometry.backends.feedforward.pictures import standardise
-from dreamdrive.geometry.backends.feedforward.poses import world_from_camera
+from dreamdrive.geometry.backends.feedforward.network import (
+    METRE_SPREAD,
+    Network,
+    Seen,
+    Views,
+    standardise,
+    world_from_camera,
+)
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 
@@ -35,11 +40,7 @@ _GAUSSIANS = ("gs_head", "gs_adapter")
 
 
 def load_da3(path: Path) -> Network:
-    """Load a network with poses; the one with ``nested`` in its name has the metre as its unit.
-
-    Raises:
-        InputError: A file or package is missing, or the weights are of another model.
-    """
+    """Load a network with poses; the one with ``nested`` in its name has the metre as its unit."""
     stored = read_stored(path, EXPECTED, needs_config=True)
     name = _model_name(stored)
     config = upstream("depth_anything_3.cfg", INSTALL)

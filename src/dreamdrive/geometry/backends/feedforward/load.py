@@ -40,9 +40,6 @@ def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Sto
     """Read weights from a ``.safetensors``, ``.pt`` or ``.pth``, or a folder with ``model`` of that ending.
 
     Nothing in them is executed, nothing is fetched. ``config.json`` may lie beside them, or has to.
-
-    Raises:
-        InputError: A file is missing or damaged.
     """
     file = path
     if path.is_dir():
@@ -67,11 +64,7 @@ def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
 
 
 def upstream(module: str, install: str) -> Any:
-    """A module of an optional package.
-
-    Raises:
-        InputError: It or something that it needs is missing.
-    """
+    """A module of an optional package; how to install that is said where it is missing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the package's own age
@@ -81,12 +74,7 @@ def upstream(module: str, install: str) -> Any:
 
 
 def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]) -> Upstream:
-    """Build a network and fill it with weights by its own keys, on the GPU where torch has one.
-
-    Raises:
-        InputError: The installed package has another signature, or keys are missing, left over or of
-            another shape.
-    """
+    """Build a network and fill it with weights by its own keys, on the GPU where torch has one."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

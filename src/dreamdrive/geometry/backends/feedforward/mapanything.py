@@ -16,9 +16,14 @@ from torch import Tensor
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
-from dreamdrive.geometry.backends.feedforward.pictures import standardise
-from dreamdrive.geometry.backends.feedforward.poses import nearest_rigid
+from dreamdrive.geometry.backends.feedforward.network import (
+    METRE_SPREAD,
+    Network,
+    Seen,
+    Views,
+    nearest_rigid,
+    standardise,
+)
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 
@@ -35,12 +40,7 @@ _ENCODER = "facebookresearch_dinov2_main"
 
 
 def load_mapanything(path: Path) -> Network:
-    """Load the network, whose unit is the metre.
-
-    Raises:
-        InputError: A file, the package or the code of its encoder is missing, or the weights are of another
-            model.
-    """
+    """Load the network, whose unit is the metre."""
     stored = read_stored(path, EXPECTED, needs_config=True)
     model = upstream("mapanything.models.mapanything", INSTALL)
     settings = _settings(stored)

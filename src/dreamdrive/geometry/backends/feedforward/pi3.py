@@ -15,8 +15,7 @@ from torch import Tensor, nn
 from dreamdrive.device import chosen_device
 from dreamdrive.geometry.backends.dust3r.align import robust_px
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views
-from dreamdrive.geometry.backends.feedforward.poses import nearest_rigid
+from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views, nearest_rigid
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.scene.camera import Camera
@@ -26,11 +25,7 @@ INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH
 
 
 def load_pi3(path: Path) -> Network:
-    """Load Pi3, or Pi3X where the weights have its token for the metre.
-
-    Raises:
-        InputError: A file or package is missing, or the weights are of another model.
-    """
+    """Load Pi3, or Pi3X where the weights have its token for the metre."""
     stored = read_stored(path, EXPECTED)
     if "metric_token" in stored.state:
         model = upstream("pi3.models.pi3x", INSTALL)

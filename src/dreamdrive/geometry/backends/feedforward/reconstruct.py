@@ -6,23 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.feedforward.camera import seen_through, share
 from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
-from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
-from dreamdrive.geometry.backends.feedforward.pictures import fit_patches, show
-from dreamdrive.geometry.cameras import contradiction, stands, unit_in, without_poses
-from dreamdrive.geometry.evidence import free_pixels, look
-from dreamdrive.geometry.finish import finish
+from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views, fit_patches, show
+from dreamdrive.geometry.cameras import unit_in
+from dreamdrive.geometry.evidence import free_pixels
+from dreamdrive.geometry.finish import begin, finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
-from dreamdrive.geometry.frames import check_frames
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.progress import Progress, Work, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.similarity import nearest_rotation
 
 _FOCAL_SPREAD = 0.2  # of the logarithm; beyond it the frames speak of different cameras
 _FOCAL_APART = 0.1  # relative
@@ -31,21 +29,16 @@ _CHUNK_MISS = 0.1  # relative to depth
 
 @dataclass(frozen=True)
 class FeedForward:
-    """Reconstruct by such a network; see ``geometry.protocol.Reconstruct``.
+    """Reconstruct by such a network, loaded from the file or folder of its weights.
 
-    Attributes:
-        name: For messages.
-        load: From the file or folder of the weights to the network.
-        long_side_px: Of the pictures that it is shown, a multiple of 14.
-        chunk: Frames that it is shown at once.
-        overlap: Frames that two chunks share.
+    See ``geometry.protocol.Reconstruct``.
     """
 
-    name: str
+    name: str  # for messages
     load: Callable[[Path], Network]
-    long_side_px: int
-    chunk: int = 24
-    overlap: int = 8
+    long_side_px: int  # of the pictures that it is shown, a multiple of 14
+    chunk: int = 24  # frames that it is shown at once
+    overlap: int = 8  # frames that two chunks share
 
     def __call__(
         self,
@@ -62,18 +55,11 @@ class FeedForward:
         kept.
 
         Raises:
-            InputError: No weights, frames as ``frames.check_frames`` refuses them, known poses that
-                contradict them, or weights or results that cannot be used.
+            InputError: As ``finish.begin`` says; or weights or results cannot be used.
         """
-        if weights is None:
-            raise InputError(f"geometry {self.name} needs the weights of its network")
-        check_frames(clip, self.name)
-        evidence = look.look(clip)
-        contradiction.check(clip, evidence)
-        # Of a standing camera the path is noise, in which no unit can be read.
-        shown = without_poses(clip) if stands(clip, evidence) else clip
+        path, evidence, shown = begin(clip, self.name, weights)
         free = free_pixels(clip, evidence)
-        found = work.keep("measured", lambda: self.measure(shown, free, weights, seed, work))
+        found = work.keep("measured", lambda: self.measure(shown, free, path, seed, work))
         return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
 
     def measure(
@@ -86,11 +72,8 @@ class FeedForward:
     ) -> Measured:
         """Cameras and depth of the network, in its unit or that of known poses.
 
-        ``free`` are pixels (F, H, W) that show the street. Progress is told after each chunk of frames; a
-        last step is left for what follows.
-
-        Raises:
-            InputError: The weights or results cannot be used.
+        ``free`` are pixels that show the street. Progress is told after each chunk of frames; a last step is
+        left for what follows.
         """
         how = fit_patches(*clip.size, self.long_side_px)
         with torch.random.fork_rng(range(torch.cuda.device_count())):
@@ -169,6 +152,42 @@ def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
     depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
     seen = replace(seen, depth=depth)
     return seen if views.camera is None else seen_through(seen, views.camera)
+
+
+def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> tuple[Camera, float]:
+    """The pinhole of the frames that took all pictures, with square pixels, and how far they disagree.
+
+    It is the median of all pinholes, and of both axes for the focal length; the disagreement is the robust
+    standard deviation (1.4826 times the median distance) of the logarithm of the focal lengths.
+    """
+    focals_px = intrinsics[:, [0, 1], [0, 1]] * np.divide(how.frame_size, how.size)
+    if not (focals_px > 0).all() or not np.isfinite(intrinsics).all():
+        raise InputError("the network gives focal lengths that are not positive: are these its weights?")
+    focal_px = float(np.median(focals_px))
+    spread = 1.4826 * float(np.median(np.abs(np.log(focals_px / focal_px))))
+    cx_px, cy_px = how.to_frame(np.median(intrinsics[:, :2, 2], axis=0))
+    return Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread
+
+
+def seen_through(seen: Seen, camera: Camera) -> Seen:
+    """What a network saw through pinholes of its own, as it is through the known one of the pictures.
+
+    Networks that cannot be told have the principal point in the middle. What they see is right for a camera
+    that looks along the middle of the picture: it is turned to look along the true axis, by the rotation that
+    brings the rays of all pixels nearest together. What a rotation does not mend, a focal length of their
+    own, stays.
+    """
+    poses, depth = seen.world_from_camera.copy(), np.empty_like(seen.depth)
+    rays = camera.rays()
+    towards = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    for frame, matrix in enumerate(seen.intrinsics):
+        size = camera.width_px, camera.height_px
+        own = Camera(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *size).rays()
+        own_towards = own / np.linalg.norm(own, axis=-1, keepdims=True)
+        turn = nearest_rotation(np.einsum("hwi,hwj->ij", own_towards, towards))
+        poses[frame, :3, :3] = poses[frame, :3, :3] @ turn
+        depth[frame] = seen.depth[frame] * (own @ turn[:, 2])
+    return replace(seen, world_from_camera=poses, depth=depth)
 
 
 def _notes(clip: Clip, joined: Joined, own_focal_px: float, spread: float) -> list[str]:

@@ -14,8 +14,7 @@ from torch import nn
 
 from dreamdrive.device import chosen_device
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views
-from dreamdrive.geometry.backends.feedforward.poses import world_from_camera
+from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views, world_from_camera
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 
@@ -26,11 +25,7 @@ _UNUSED = ("point_head.", "track_head.")
 
 
 def load_vggt(path: Path) -> Network:
-    """Load the network without the heads for points and tracks, which are not used.
-
-    Raises:
-        InputError: A file or package is missing, or the weights are of another model.
-    """
+    """Load the network without the heads for points and tracks, which are not used."""
     stored = read_stored(path, EXPECTED)
     model, encoding = (upstream(f"vggt.{name}", INSTALL) for name in ("models.vggt", "utils.pose_enc"))
     sizes = {name: stored.config[name] for name in _SIZES if name in stored.config}

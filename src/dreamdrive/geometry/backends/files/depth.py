@@ -15,8 +15,7 @@ from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import check_file, is_path
 from dreamdrive.files.tensor_file import briefly
-from dreamdrive.geometry.backends.files.declared import NAME, Declared
-from dreamdrive.geometry.backends.files.given import DepthFiles
+from dreamdrive.geometry.backends.files.given import NAME, Declared, DepthFiles
 
 ENDINGS = (".npz", ".npy", ".exr", ".png")
 _EXR_CHANNELS = ("Z", "Depth.V", "depth.V", "V", "Y", "R")
@@ -42,13 +41,8 @@ def read_depth(
 ) -> tuple[Float[np.ndarray, "h w"], str | None]:
     """Depth in metres, or in the unit of the poses, and the unit that was taken without being declared.
 
-    Args:
-        path: The file.
-        unit: What the stored number 1 means; ``None`` is millimetres for a PNG, metres for floats.
-        kitti: Whether ``None`` is 1/256 m for a PNG.
-
-    Raises:
-        InputError: The file is damaged, or no depth: negative, NaN, infinite, whole numbers without a unit.
+    Where no unit is, the stored number 1 means a millimetre, or KITTI's 1/256 m, for a PNG, a metre for
+    floats; whole numbers without a unit are refused.
     """
     stored, sure = _READERS[path.suffix.lower()](path)
     if stored.ndim != 2 or stored.size == 0 or stored.dtype.kind not in "fiu":

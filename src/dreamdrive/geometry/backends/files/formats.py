@@ -9,8 +9,7 @@ from dreamdrive.data.intrinsics import model_cameras
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import open_file
-from dreamdrive.geometry.backends.files.declared import NAME, OPTION
-from dreamdrive.geometry.backends.files.given import Given
+from dreamdrive.geometry.backends.files.given import NAME, OPTION, Given
 from dreamdrive.geometry.backends.files.readers import (
     CALIBRATION,
     read_colmap_model,
@@ -31,14 +30,7 @@ Reader = Callable[[Path, Wanted], Given]
 
 
 def recognise(path: Path) -> tuple[Reader, Path]:
-    """The reader of the format that lies at ``path``, and what it reads: a file, or a folder for COLMAP.
-
-    Args:
-        path: A file, or a folder with one of the known files in it.
-
-    Raises:
-        InputError: Nothing or more than one thing there is known.
-    """
+    """The reader of the format that lies at ``path``, and what it reads: a file, or a folder for COLMAP."""
     if path.is_dir():
         found = [path / name for name in _FILES if (path / name).is_file()]
         model = find_colmap(path)

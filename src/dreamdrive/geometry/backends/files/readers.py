@@ -1,6 +1,7 @@
 """Each format as ``Given``: the poses, cameras and depth of the frames that are wanted.
 
-What ``dreamdrive.data.formats`` parses is brought to the frames here. Our own format, a folder, is
+What ``dreamdrive.data.formats`` parses is brought to the frames here, and refused where it does not fit them.
+Our own format, a folder, is
 
 - ``cameras.json``: ``{"width", "height", "intrinsics": {"fx", "fy", "cx", "cy"},
   "world_from_camera": [4x4, ...], "frames": [index, ...]}``. Pixels are counted by integer index (the first
@@ -36,9 +37,16 @@ from dreamdrive.data.formats.rigid import clean_poses, numbers, pose_name
 from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import of_type, read_json
-from dreamdrive.geometry.backends.files.declared import NAME, OPTION, Declared, read_declared
 from dreamdrive.geometry.backends.files.depth import ENDINGS, find_depth
-from dreamdrive.geometry.backends.files.given import DepthFiles, Given, SparsePoints
+from dreamdrive.geometry.backends.files.given import (
+    NAME,
+    OPTION,
+    Declared,
+    DepthFiles,
+    Given,
+    SparsePoints,
+    read_declared,
+)
 from dreamdrive.geometry.backends.files.wanted import Wanted
 from dreamdrive.scene.camera import Camera
 
@@ -55,14 +63,8 @@ class _NamedFrames(msgspec.Struct):
 def read_colmap_model(path: Path, wanted: Wanted) -> Given:
     """Read a COLMAP model; pictures that were not registered count as missing.
 
-    Depth may lie in a folder ``depth`` in the model's folder, called like the images.
-
-    Args:
-        path: The folder that was given; the model lies in it, or in its ``sparse/0``.
-        wanted: The frames to look for.
-
-    Raises:
-        InputError: The model is damaged, lacks a frame, or has a lens that is not known.
+    It lies in the folder that was given, or in its ``sparse/0``. Depth may lie in a folder ``depth`` in the
+    folder that was given, called like the images.
     """
     folder = find_colmap(path) or path
     model = read_colmap(folder)
@@ -106,11 +108,7 @@ def _sparse(model: Any, image_ids: Int[np.ndarray, " f"]) -> SparsePoints | None
 
 
 def read_transforms(path: Path, wanted: Wanted) -> Given:
-    """Read a ``transforms.json`` and the depth that it names.
-
-    Raises:
-        InputError: The file is malformed, lacks a frame or names depth that is not there.
-    """
+    """Read a ``transforms.json`` and the depth that it names."""
     record = read_json(path, OPTION)
     frames = transforms_frames(record, str(path))
     rows, notes = wanted.rows(frame_names(frames, str(path)), str(path))
@@ -153,11 +151,7 @@ def _named_depth(
 
 
 def read_pandaset(path: Path, wanted: Wanted) -> Given:
-    """Read one camera: that of ``geometry.json``, or the only one, or the one that is called like the input.
-
-    Raises:
-        InputError: The file is malformed, the camera cannot be told, or its poses do not fit the frames.
-    """
+    """Read one camera: that of ``geometry.json``, the only one, or the one that is called like the input."""
     record = read_json(path, OPTION)
     declared = read_declared(path.parent)
     cameras = cast("dict[str, Any]", record["cameras"])
@@ -173,11 +167,7 @@ def read_pandaset(path: Path, wanted: Wanted) -> Given:
 
 
 def read_plain(path: Path, wanted: Wanted) -> Given:
-    """Read our own ``cameras.json`` and the depth beside it.
-
-    Raises:
-        InputError: The file is malformed or has no pose for a selected frame.
-    """
+    """Read our own ``cameras.json`` and the depth beside it."""
     record = read_json(path, OPTION)
     if any(key not in record for key in _NEEDED):
         raise InputError(f"{path}: expected an object with {', '.join(_NEEDED)}")
@@ -206,9 +196,6 @@ def read_pose_list(path: Path, wanted: Wanted) -> Given:
 
     KITTI's poses are those of camera 0: those of another camera, which ``geometry.json`` or an input folder
     such as ``image_2`` names, lie beside them by the last column of its P.
-
-    Raises:
-        InputError: A file is malformed or the poses fit the frames in no way.
     """
     declared = read_declared(path.parent)
     rows = read_pose_file(path, OPTION)

@@ -16,54 +16,34 @@ from dreamdrive.scene.clip import Clip
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is known of the frames for which geometry is wanted.
+    """What is known of the frames for which geometry is wanted."""
 
-    Attributes:
-        index: Index of each selected frame in the source (F,).
-        times_s: Time of each selected frame since frame 0 of the source (F,).
-        names: File name of each selected frame, where the source is a folder of images.
-        folder: Name of the source.
-        picture: Width and height of the source's pictures; the clip's own where they are not known.
-        count: Number of frames in the source; may take as long as decoding it.
-    """
-
-    index: Int[np.ndarray, " f"]
-    times_s: Float[np.ndarray, " f"]
-    names: tuple[str, ...] | None
-    folder: str
-    picture: tuple[int, int]
-    count: Callable[[], int]
+    index: Int[np.ndarray, " f"]  # in the source
+    times_s: Float[np.ndarray, " f"]  # since frame 0 of the source
+    names: tuple[str, ...] | None  # of the files, where the source is a folder of images
+    folder: str  # name of the source
+    picture: tuple[int, int]  # width and height in the source; in the clip where they are not known
+    count: Callable[[], int]  # of frames in the source; may take as long as decoding it
 
     @staticmethod
     def of(clip: Clip, source: Path | None) -> "Wanted":
-        """The frames of a clip.
-
-        Args:
-            clip: The clip.
-            source: The recording that it was read from; ``None`` looks where the clip says that it came from.
-        """
+        """The frames of a clip, of this recording or of the one that it says that it came from."""
         about = clip.provenance
         index = np.asarray(clip.source_index)
         period = float(np.median(np.diff(clip.times_s) / np.diff(index))) if len(index) > 1 else 0.0
-        picture = tuple(map(int, about.get("source_size", clip.size)))
+        width, height = map(int, about.get("source_size", clip.size))
         times_s = clip.times_s + period * index[0]
         # A drawn clip has no recording: its frames are all there are.
         if about.get("kind") not in ("video", "images"):
-            return Wanted(index, times_s, None, "", (picture[0], picture[1]), lambda: int(index.max()) + 1)
+            return Wanted(index, times_s, None, "", (width, height), lambda: int(index.max()) + 1)
         path = source or Path(about["input"])
         names = None
         if about["kind"] == "images":
             folder = open_source(path)
             assert isinstance(folder, ImageFolder)
             names = tuple(folder.files[int(i)].name for i in index)
-        return Wanted(
-            index,
-            times_s,
-            names,
-            path.resolve().name,
-            (picture[0], picture[1]),
-            lambda: open_source(path).count(),
-        )
+        name = path.resolve().name
+        return Wanted(index, times_s, names, name, (width, height), lambda: open_source(path).count())
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -78,9 +58,6 @@ class Wanted:
         Names decide, without their folders and then without their endings. Where none is that of a selected
         frame the natural order of the names counts, if there is one for each frame of the source or for each
         selected frame.
-
-        Raises:
-            InputError: Some frames are not in the list, or it has neither of these lengths.
         """
         paths = [PurePosixPath(name.replace("\\", "/")) for name in names]
         by_name: dict[str, list[int]] = defaultdict(list)

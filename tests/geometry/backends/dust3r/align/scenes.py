@@ -9,8 +9,8 @@ import torch
 from tests.golden import reading
 from tests.golden.reading import Table
 
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.reference.objective import Raw
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference import Raw
 
 PNP = 1e-3
 """Share of a path or a depth by which a pose from PnP may differ, which ends where its steps become small."""

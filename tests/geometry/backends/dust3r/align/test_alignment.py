@@ -8,13 +8,11 @@ from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, str
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align, predicted_bytes
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
-from dreamdrive.geometry.backends.dust3r.align.memory import predicted_bytes
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.reference.adam import descend
-from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, raw_parameters
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference import Objective, descend, raw_parameters
 from dreamdrive.splat.torch_threads import one_torch_thread
 from geometry.simulated_pairs import Noise, Truth, pair_maps
 

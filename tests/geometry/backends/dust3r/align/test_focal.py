@@ -7,7 +7,7 @@ from tests.golden.reading import arrays, cases, values
 
 from dreamdrive.geometry.backends.dust3r.align.focal import focal_votes, robust_px, weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
-from dreamdrive.geometry.weighted import weighted_median
+from dreamdrive.geometry.measured import weighted_median
 from geometry.simulated_pairs import Noise, pair_maps
 
 LIMIT = 1e-5

@@ -8,7 +8,7 @@ from tests.geometry.backends.dust3r.align.pairs import street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from geometry.simulated_pairs import Noise, pair_maps
 
 

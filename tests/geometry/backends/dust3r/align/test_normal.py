@@ -8,14 +8,12 @@ import pytest
 import torch
 from tests.geometry.backends.dust3r.align.pairs import street, window
 
-from dreamdrive.geometry.backends.dust3r.align.freedom import Freedom
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples, normal_equations
-from dreamdrive.geometry.backends.dust3r.align.penalty import Cauchy, Distance, Penalty
-from dreamdrive.geometry.backends.dust3r.align.rays import RayMisses
+from dreamdrive.geometry.backends.dust3r.align.rays import Cauchy, Distance, Penalty, RayMisses
 from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.backends.dust3r.align.state import State
+from dreamdrive.geometry.backends.dust3r.align.state import Freedom, State
 from dreamdrive.splat.torch_threads import one_torch_thread
 from geometry.simulated_pairs import Noise, pair_maps
 

@@ -9,7 +9,7 @@ from tests.geometry.backends.dust3r.align.scenes import PNP, extent, runs_with, 
 from tests.golden.reading import close
 
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from geometry.simulated_pairs import Noise, pair_maps
 
 EXACT = Noise(0, 1 / 8, 0, 0, 0)

@@ -11,7 +11,7 @@ from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Kn
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from geometry.simulated_pairs import Noise, Truth, pair_maps
 
 FRAMES = 8

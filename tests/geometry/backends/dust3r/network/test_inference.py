@@ -14,8 +14,7 @@ from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r, Tokens
 from dreamdrive.geometry.backends.dust3r.network.images import as_input
 from dreamdrive.geometry.backends.dust3r.network.inference import infer
 from dreamdrive.geometry.backends.dust3r.network.memory import plan_memory
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
 
 SHAPES = ((32, 48), (32, 48), (48, 32), (32, 48), (48, 32))
 

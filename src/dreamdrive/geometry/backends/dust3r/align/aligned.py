@@ -11,7 +11,7 @@ from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
 from dreamdrive.geometry.backends.dust3r.align.state import State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.geometry.cameras import unit_in
 from dreamdrive.scene.similarity import Similarity
 
@@ -70,15 +70,7 @@ class Aligned:
 
 @dataclass(frozen=True)
 class Found:
-    """What the solver leaves behind.
-
-    Attributes:
-        state: Cameras and pairs.
-        depth: Along z (H, W) of each image.
-        loss: Over all pixels.
-        samples: What cameras and pairs were solved with.
-        losses: Over the samples.
-    """
+    """What the solver leaves behind: depth along z and loss over all pixels, its losses over the samples."""
 
     state: State
     depth: tuple[Float[np.ndarray, "_ _"], ...]
@@ -97,26 +89,24 @@ def report(
     focal_known: bool,
     known_poses: Float[np.ndarray, "n 4 4"] | None,
 ) -> Aligned:
-    """Bring the solution to the frame of image 0, or to that of the known poses, and measure it.
-
-    Raises:
-        InputError: Known poses stand still, which gives depth no unit.
-    """
+    """Bring the solution to the frame of image 0, or to that of the known poses, and measure it."""
     frame = _frame(found, known_poses)
-    poses = _poses(found.state, frame)
+    poses = found.state.world_from_camera
+    poses[:, :3, :3], poses[:, :3, 3] = frame.rotation @ found.state.rotation, frame(found.state.centre)
     if known_poses is None:
         poses[0] = np.eye(4)
     confidence = [
         np.maximum.reduce([maps.confidence[h.edge][h.side] for h in halves]) for halves in graph.halves
     ]
     pair_spread = _pair_spread(maps, found.state)
+    pairs = zip(found.state.edge_scale, found.state.edge_rotation, found.state.edge_centre, strict=True)
     error = votes.spread / float(np.sqrt(len(graph)))
     shown = turned.spread if turned is not None and turned.observed else None
     return Aligned(
         world_from_camera=poses if known_poses is None else known_poses.astype(np.float64),
         focals_px=found.state.focal_px,
         depth=tuple(depth * np.float32(frame.scale) for depth in found.depth),
-        pairs=_pairs(found.state, frame),
+        pairs=tuple(Similarity(frame.scale * float(s), frame.rotation @ r, frame(t)) for s, r, t in pairs),
         confidence=tuple(confidence),
         loss=found.loss,
         losses=found.losses,
@@ -140,21 +130,6 @@ def _frame(found: Found, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity
         return Similarity(1.0, turn, -turn @ state.centre[0])
     middle = float(np.median([np.median(depth) for depth in found.depth]))
     return Similarity(unit_in(known, state.world_from_camera, middle), np.eye(3), np.zeros(3))
-
-
-def _poses(state: State, frame: Similarity) -> Float[np.ndarray, "n 4 4"]:
-    poses = np.tile(np.eye(4), (len(state.centre), 1, 1))
-    poses[:, :3, :3], poses[:, :3, 3] = frame.rotation @ state.rotation, frame(state.centre)
-    return poses
-
-
-def _pairs(state: State, frame: Similarity) -> tuple[Similarity, ...]:
-    return tuple(
-        Similarity(frame.scale * float(scale), frame.rotation @ rotation, frame(centre))
-        for scale, rotation, centre in zip(
-            state.edge_scale, state.edge_rotation, state.edge_centre, strict=True
-        )
-    )
 
 
 def _pair_spread(maps: PairMaps, state: State) -> float:

@@ -5,26 +5,29 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned, Found, report
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
-from dreamdrive.geometry.backends.dust3r.align.freedom import FocalFreedom, Freedom
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
-from dreamdrive.geometry.backends.dust3r.align.memory import check_budget, predicted_bytes
-from dreamdrive.geometry.backends.dust3r.align.penalty import Cauchy, Distance, Penalty
+from dreamdrive.geometry.backends.dust3r.align.rays import Cauchy, Distance, Penalty
 from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples, solve_depth
 from dreamdrive.geometry.backends.dust3r.align.solver import solve
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import onto_known, spanning_tree
-from dreamdrive.geometry.backends.dust3r.align.state import State
+from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, FocalFreedom, Freedom, State
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.splat import one_torch_thread
 
 _FLOOR = 1e-4  # of the median depth: distances below it weigh no more
 _COARSE = 1e-3  # gain of a step at which the paper's loss is left for the robust one
+_SAMPLE_BYTES = 32  # a point and a weight in float64
+_WORK_BYTES = 1000  # of the normal equations, for each edge at each sample of one image
+_MATRICES = 6  # of the size of the Hessian
+_PIXEL_BYTES = 48  # of start and result: a placed point and what became of it
+_FIXED_BYTES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,51 @@ def align(
     if known.intrinsics is not None:
         graph = graph.through(known.intrinsics)
     storage = max(side.dtype.itemsize for pair in maps.points for side in pair)
-    predicted = predicted_bytes(graph.sizes, maps.edges, options.samples_per_image, storage)
-    check_budget(predicted, int(options.memory_gb * 1e9), len(graph), len(maps.edges))
+    check_memory(graph.sizes, maps.edges, options, storage)
     with one_torch_thread():
         return _solved(maps, maps if still is None else maps.masked(still), graph, options, known)
+
+
+def predicted_bytes(
+    sizes: Sequence[tuple[int, int]],
+    edges: Int[np.ndarray, "e 2"],
+    samples_per_image: int,
+    storage_bytes: int = 4,
+) -> int:
+    """Bytes that pointmaps, confidences and their alignment take at most at once.
+
+    Sizes are height and width of each image; a number of the pointmaps takes ``storage_bytes``.
+    """
+    areas = np.array([height * width for height, width in sizes])
+    degrees = np.bincount(edges.ravel(), minlength=len(areas))
+    sampled = np.minimum(areas, samples_per_image)
+    return int(
+        4 * storage_bytes * areas[edges].sum()
+        + _SAMPLE_BYTES * (degrees * sampled).sum()
+        + _WORK_BYTES * (degrees * sampled).max()
+        + _MATRICES * 8 * (PER_IMAGE * len(areas) + PER_EDGE * len(edges)) ** 2
+        + _PIXEL_BYTES * areas.sum()
+        + _FIXED_BYTES
+    )
+
+
+def check_memory(
+    sizes: Sequence[tuple[int, int]],
+    edges: Int[np.ndarray, "e 2"],
+    options: AlignOptions,
+    storage_bytes: int = 4,
+) -> None:
+    """Refuse an alignment that would not fit, before it starts.
+
+    Raises:
+        InputError: ``predicted_bytes`` is above what the options allow.
+    """
+    predicted = predicted_bytes(sizes, edges, options.samples_per_image, storage_bytes)
+    if predicted > int(options.memory_gb * 1e9):
+        raise InputError(
+            f"Aligning {len(sizes)} images in {len(edges)} pairs takes about {predicted / 1e9:.1f} GB, and "
+            f"{options.memory_gb:.1f} GB are allowed: take fewer frames (--frames)."
+        )
 
 
 def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:

@@ -1,6 +1,7 @@
 """The focal length that a pointmap in its own camera's frame speaks for.
 
-It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/z, y/z) of their points.
+It is the f of p = f q: pixels p relative to the principal point, slopes q = (x/z, y/z) of their points. Where
+no principal point, a column and a row, is given it is the middle (W/2, H/2).
 """
 
 from dataclasses import dataclass, replace
@@ -9,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.weighted import weighted_median
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive.geometry.measured import weighted_median
 
 _STEPS, _ROBUST_STEPS = 10, 6
 _TINY_PX = 1e-8
@@ -21,13 +22,7 @@ _ENOUGH = 3_000  # pixels; more of them do not make the robust estimate better, 
 
 @dataclass(frozen=True)
 class FocalVotes:
-    """Focal lengths from the first pointmap of each edge.
-
-    Attributes:
-        image: First image (E,) of each edge.
-        focal_px: Its focal length (E,) by that edge.
-        weight: Sum of its log confidences (E,).
-    """
+    """Focal lengths of each edge's first image by its pointmap; the sums of its log confidences weigh."""
 
     image: Int[np.ndarray, " e"]
     focal_px: Float[np.ndarray, " e"]
@@ -45,18 +40,15 @@ class FocalVotes:
         return 1.4826 * weighted_median(apart, self.weight)
 
     def all_at(self, focal_px: Float[np.ndarray, " n"]) -> "FocalVotes":
-        """The votes of pointmaps that were given the focal lengths (N,) of their images."""
+        """The votes of pointmaps that were given the focal lengths of their images."""
         return replace(self, focal_px=focal_px[self.image])
 
     def lateral(self, focal_px: Float[np.ndarray, " n"]) -> Float[np.ndarray, " e"]:
-        """Factors (E,) on x and y that give pointmaps the focal lengths (N,) of their images.
-
-        A pointmap that shows none stays as it is.
-        """
+        """Factors on x and y that give pointmaps the focal lengths of their images, 1 where one has none."""
         return np.nan_to_num(self.focal_px / focal_px[self.image], nan=1.0)
 
     def per_image_px(self, count: int) -> Float[np.ndarray, " n"]:
-        """Weighted median (N,) over the edges that start at an image; the shared one where none does."""
+        """Weighted median over the edges that start at an image; the shared one where none does."""
         focals = np.full(count, self.shared_px)
         for image in np.unique(self.image):
             mine = self.image == image
@@ -77,12 +69,7 @@ def focal_votes(maps: PairMaps, graph: Graph) -> FocalVotes:
 def weiszfeld_px(
     points: Float[np.ndarray, "h w 3"], principal_px: tuple[float, float] | None = None
 ) -> float:
-    """The paper's rule: minimise sum |p - f q| over all pixels alike (Wang et al. 2024, section 3.3).
-
-    Args:
-        points: Pointmap (H, W, 3) in the frame of its own camera.
-        principal_px: Column and row; None is the middle (W/2, H/2).
-    """
+    """The paper's rule: minimise sum |p - f q| over all pixels alike (Wang et al. 2024, section 3.3)."""
     p, q = _pixels_and_slopes(points, principal_px, 1.0)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)
     focal = pq.mean() / qq.mean()
@@ -98,7 +85,9 @@ def robust_px(
     principal_px: tuple[float, float] | None = None,
     stretch: float = 1.0,
 ) -> float:
-    """Log confidences weigh, masked pixels and points behind the camera do not count, outliers drop out.
+    """The focal length, or NaN where no pixel speaks for a positive one.
+
+    Log confidences weigh, masked pixels and points behind the camera do not count, outliers drop out.
 
     A sum of norms has no protection against points of great slope: a fifth of them six times too steep takes
     Weiszfeld's result from 36 px to 10. Here the weighted median of the radial votes p·q / q·q, each weighing
@@ -107,11 +96,8 @@ def robust_px(
     Args:
         points: Pointmap (H, W, 3) in the frame of its own camera.
         confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
-        principal_px: Column and row; None is the middle (W/2, H/2).
+        principal_px: Of the camera.
         stretch: fx / fy.
-
-    Returns:
-        The focal length, or NaN where no pixel speaks for a positive one.
     """
     p, q = _pixels_and_slopes(points, principal_px, stretch)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)

@@ -8,19 +8,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 
 _FEWEST = 10  # pixels that weigh, of an image in an edge
 
 
 @dataclass(frozen=True)
 class Half:
-    """What one edge says of one of its images.
-
-    Attributes:
-        edge: Number of the edge.
-        side: 0 where the image is the edge's first, 1 where it is the second.
-    """
+    """What one edge says of one of its images: the first, side 0, or the second."""
 
     edge: int
     side: int
@@ -54,7 +49,7 @@ class Graph:
         return replace(self, principal_px=intrinsics[:, :2, 2], stretch=stretch)
 
     def shaped(self, edge: int, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """Points (..., 3) of an edge with its ``lateral`` factor, in their own precision."""
+        """Points of an edge with its ``lateral`` factor, in their own precision."""
         return points if self.lateral[edge] == 1 else points * self.shape(edge).astype(points.dtype)
 
     def shape(self, edge: int) -> Float[np.ndarray, "3"]:
@@ -62,7 +57,7 @@ class Graph:
         return np.array([self.lateral[edge], self.lateral[edge], 1.0])
 
     def pixels(self, image: int, some: Int[np.ndarray, " p"]) -> Float[np.ndarray, "p 2"]:
-        """Columns and stretched rows (P, 2) relative to the principal point, of pixels by row-major index."""
+        """Columns and stretched rows relative to the principal point, of pixels by row-major index."""
         width, (cx, cy) = self.sizes[image][1], self.principal_px[image]
         return np.stack([some % width - cx, (some // width - cy) * self.stretch[image]], axis=1)
 

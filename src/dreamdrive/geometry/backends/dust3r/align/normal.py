@@ -7,8 +7,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align.penalty import Distance, Penalty
-from dreamdrive.geometry.backends.dust3r.align.rays import RayMisses, pixel_rays
+from dreamdrive.geometry.backends.dust3r.align.rays import Distance, Penalty, RayMisses, pixel_rays
 from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, State
 
 _TINY = 1e-30
@@ -16,15 +15,11 @@ _TINY = 1e-30
 
 @dataclass(frozen=True)
 class ImageSamples:
-    """Some pixels of an image and what its edges say of them, in float64.
+    """Some pixels of an image and what the edges that speak of it say of them, in float64.
 
-    Attributes:
-        image: Number of the image.
-        edges: Numbers (K,) of the edges that speak of it.
-        index: Row-major index (P,) of each pixel.
-        pixels: Column and stretched row (P, 2) of each pixel, relative to the principal point.
-        points: Point (K, P, 3) of each pixel by each edge, in the frame of the edge's first camera.
-        weight: Log confidence over the divisor of the loss, times the pixels that each one stands for (K, P).
+    The index is row-major, columns and stretched rows are relative to the principal point, points in the
+    frame of the edge's first camera. Log confidence over the divisor of the loss, times the pixels that each
+    one stands for, is the weight.
     """
 
     image: int
@@ -35,7 +30,7 @@ class ImageSamples:
     weight: Float[Tensor, "k p"]
 
     def rays(self, state: State) -> Float[Tensor, "p 3"]:
-        """Directions (P, 3) in the camera's frame, z = 1."""
+        """Directions in the camera's frame, z = 1."""
         return pixel_rays(self.pixels, float(state.focal_px[self.image]))
 
     def misses(self, state: State) -> RayMisses:
@@ -60,16 +55,10 @@ def normal_equations(
     A miss is r = X - Y, X = c + R x d with the ray x, Y = T + s R P. With W the 3x3 weight of a miss,
     J = dr/d(step) and D = dX/d(depth) = R x, each pixel adds J'WJ - (D'WJ)'(D'WJ) / (D'WD). Where W tells the
     directions along and across the ray apart it turns with the ray, which the gradient knows and the Hessian
-    does not.
+    does not. The depth is the best for this state.
 
-    Args:
-        samples: The pixels.
-        state: Cameras and pairs.
-        depth: Depth (P,) of the pixels, the best for this state.
-        penalty: Cost of a miss.
-        bend: Share of the true curvature of a distance along the miss itself, where it has none, that is
-            taken: 0 is the quadratic that lies above everywhere, 1 would be Newton's. For :class:`Distance`
-                alone.
+    ``bend`` is the share of the true curvature of a distance along the miss itself, where it has none, that
+    is taken: 0 is the quadratic that lies above everywhere, 1 would be Newton's. For :class:`Distance` alone.
     """
     edges = list(samples.edges)
     turn = torch.from_numpy(state.rotation[samples.image])

@@ -6,10 +6,9 @@ from jaxtyping import Float, Int
 
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples
-from dreamdrive.geometry.backends.dust3r.align.penalty import Penalty
-from dreamdrive.geometry.backends.dust3r.align.rays import RayMisses, pixel_rays
+from dreamdrive.geometry.backends.dust3r.align.rays import Penalty, RayMisses, pixel_rays
 from dreamdrive.geometry.backends.dust3r.align.state import State
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 
 _CHUNK = 8192  # pixels at a time, so that their arrays stay in the cache
 _FULL_STEPS = 12
@@ -50,7 +49,7 @@ def _stretches(which: Int[np.ndarray, " n"], most: int, random: np.random.Genera
 def solve_depth(
     maps: PairMaps, graph: Graph, state: State, penalty: Penalty
 ) -> tuple[tuple[Float[np.ndarray, "_ _"], ...], float]:
-    """The best depth along z (H, W) of each image given all else, and the cost summed over all pixels.
+    """The best depth along z of each image given all else, and the cost summed over all pixels.
 
     Depth is positive, float32; a pixel that no edge weighs gets the median of its image, since nothing is
     known of it. A chunk of pixels is solved at a time; none is copied for longer.
@@ -64,24 +63,17 @@ def solve_depth(
         shapes = [graph.shape(half.edge) for half in halves]
         parts = [(matrix * shape, shift) for (matrix, shift), shape in zip(parts, shapes, strict=True)]
         matrices, shifts = (torch.from_numpy(np.stack(part)).float() for part in zip(*parts, strict=True))
-        flat = [
-            (
-                maps.points[h.edge][h.side].reshape(-1, 3),
-                maps.confidence[h.edge][h.side].ravel(),
-                areas[h.side],
-            )
-            for h in halves
-        ]
+        clouds = [maps.points[half.edge][half.side].reshape(-1, 3) for half in halves]
+        trusts = [(maps.confidence[half.edge][half.side].ravel(), areas[half.side]) for half in halves]
         depth = torch.zeros(size[0] * size[1])
         known = torch.zeros(size[0] * size[1], dtype=torch.bool)
         for first in range(0, len(depth), _CHUNK):
             some = slice(first, min(first + _CHUNK, len(depth)))
             pixels = graph.pixels(image, np.arange(some.start, some.stop)).astype(np.float32)
             rays = pixel_rays(torch.from_numpy(pixels), float(state.focal_px[image]))
-            weight = torch.from_numpy(
-                np.stack([np.log(c[some], dtype=np.float32) / np.float32(a) for _, c, a in flat])
-            )
-            points = torch.from_numpy(np.stack([p[some].astype(np.float32, copy=False) for p, _, _ in flat]))
+            logs = [np.log(trust[some], dtype=np.float32) / np.float32(area) for trust, area in trusts]
+            weight = torch.from_numpy(np.stack(logs))
+            points = torch.from_numpy(np.stack([cloud[some].astype(np.float32) for cloud in clouds]))
             points = torch.where(weight[..., None] > 0, points, 0.0)
             misses = RayMisses.of(rays, torch.baddbmm(shifts[:, None], points, matrices.mT), weight)
             middle = misses.middle()

@@ -9,14 +9,14 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from dreamdrive.geometry.backends.dust3r.align.freedom import Freedom
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples, normal_equations
-from dreamdrive.geometry.backends.dust3r.align.penalty import Penalty
-from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, State
+from dreamdrive.geometry.backends.dust3r.align.rays import Penalty
+from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE, Freedom, State
 
 _DAMPING = 1e-4
 _LESS, _MORE, _MOST = 0.3, 8.0, 1e6
 _DEPTH_STEPS = 3
+_BEND = 0.5  # see normal_equations
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,6 @@ def solve(
     *,
     steps: int = 60,
     tolerance: float = 5e-5,
-    bend: float = 0.5,
 ) -> tuple[State, tuple[float, ...]]:
     """Lower the loss over the samples until a step gains less than ``tolerance`` of it.
 
@@ -47,7 +46,7 @@ def solve(
     losses, damping = [here.loss], _DAMPING
     for _ in range(steps):
         basis = freedom.basis(here.state)
-        hessian, gradient = _equations(samples, here, penalty, basis, bend)
+        hessian, gradient = _equations(samples, here, penalty, basis)
         there: _Point | None = None
         while there is None and damping < _MOST:
             unknowns = _damped(hessian, gradient, damping)
@@ -80,13 +79,13 @@ def _at(
 
 
 def _equations(
-    samples: Sequence[ImageSamples], here: _Point, penalty: Penalty, basis: csr_array, bend: float
+    samples: Sequence[ImageSamples], here: _Point, penalty: Penalty, basis: csr_array
 ) -> tuple[np.ndarray, np.ndarray]:
     images = PER_IMAGE * len(here.state.centre)
     size = images + PER_EDGE * len(here.state.edge_scale)
     hessian, gradient = np.zeros((size, size)), np.zeros(size)
     for each, depth in zip(samples, here.depth, strict=True):
-        own_hessian, own_gradient = normal_equations(each, here.state, depth, penalty, bend)
+        own_hessian, own_gradient = normal_equations(each, here.state, depth, penalty, _BEND)
         starts = [PER_IMAGE * each.image, *(images + PER_EDGE * edge for edge in each.edges)]
         at = np.concatenate([np.arange(start, start + 7) for start in starts])
         hessian[np.ix_(at, at)] += own_hessian.numpy()

@@ -9,9 +9,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes, weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
-from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.cameras import register
+from dreamdrive.geometry.backends.dust3r.align.registration import pose_by_pnp, register
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
 BASE_SCALE = 0.5  # geometric mean of the scales of all pairs
@@ -58,16 +57,8 @@ def spanning_tree(
     poses come from the registration of an own pointmap rather than from PnP; points behind a camera get a
     small depth rather than depth 1.
 
-    Args:
-        maps: The pairs.
-        votes: Focal lengths by the robust rule where they are known already; not looked at if ``upstream``.
-        graph: Their graph, where that is known already; if ``upstream`` its points are as the network's.
-        upstream: Do all of it as the authors' program does.
-        stale_focals: As it does, take an image's focal length from the pair handled before; without effect
-            unless ``upstream``.
-
-    Raises:
-        InputError: See ``graph.graph_of``.
+    With ``upstream`` all of it is done as the authors' program does, votes aside; with ``stale_focals`` it
+    also takes an image's focal length from the pair handled before.
     """
     graph = graph or graph_of(maps)
     tree = _Tree(maps, graph, votes, upstream, stale_focals)
@@ -86,17 +77,11 @@ class _Tree:
         self.maps, self.graph, self.votes, self.upstream = maps, graph, votes, upstream
         self.stale_focals = stale_focals
         self.edge_of = {(int(i), int(j)): edge for edge, (i, j) in enumerate(maps.edges)}
-        self.scores = self._scores()
+        trust = np.positive if upstream else np.log
+        self.scores = np.prod([[float(trust(c).mean()) for c in pair] for pair in maps.confidence], axis=1)
         self.points: dict[int, np.ndarray] = {}
         self.poses: dict[int, np.ndarray] = {}
         self.focals: dict[int, float] = {}
-
-    def _scores(self) -> np.ndarray:
-        if self.upstream:
-            means = [[float(side.mean()) for side in pair] for pair in self.maps.confidence]
-        else:
-            means = [[float(np.log(side).mean()) for side in pair] for pair in self.maps.confidence]
-        return np.prod(means, axis=1)
 
     def _strongest_first(self) -> list[tuple[int, int]]:
         """Edges of the tree, (first, second) image."""
@@ -203,9 +188,8 @@ class _Tree:
         )
 
     def _depth(self, points: Float[np.ndarray, "h w 3"], pose: np.ndarray) -> Float[np.ndarray, "h w"]:
-        z = ((points - pose[:3, 3].astype(points.dtype)) @ pose[:3, 2].astype(points.dtype)).astype(
-            np.float32
-        )
+        centre, axis = (pose[:3, column].astype(points.dtype) for column in (3, 2))
+        z = ((points - centre) @ axis).astype(np.float32)
         if self.upstream:
             return np.where(z > 0, z, np.float32(1))
         valid = z[z > 0]

@@ -1,10 +1,12 @@
-"""What the solver moves: cameras, and the similarity of each pair."""
+"""What the solver moves: cameras and the similarity of each pair, as far as they are unknown."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse import coo_array, csr_array
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.scene.similarity import Similarity
@@ -13,20 +15,13 @@ PER_IMAGE = 7
 """Steps of an image: turn about its centre (3), shift (3), log focal length; all in the world's frame."""
 PER_EDGE = 7
 """Steps of an edge: turn about its first camera's centre (3), shift (3), log scale."""
+FocalFreedom = Literal["shared", "each"]
+_FOCAL = 6
 
 
 @dataclass(frozen=True)
 class State:
-    """Cameras and pairs in one world.
-
-    Attributes:
-        rotation: Of world_from_camera (N, 3, 3).
-        centre: Of the cameras (N, 3).
-        focal_px: (N,).
-        edge_scale: Scale s (E,) of X = s R P + T, which takes a pair's points P to the world.
-        edge_rotation: R (E, 3, 3).
-        edge_centre: T (E, 3).
-    """
+    """Cameras in one world; scale s, rotation R and centre T of each pair, X = s R P + T for its points P."""
 
     rotation: Float[np.ndarray, "n 3 3"]
     centre: Float[np.ndarray, "n 3"]
@@ -72,7 +67,41 @@ class State:
 
     @property
     def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:
-        """Poses (N, 4, 4)."""
+        """Poses of all images."""
         poses = np.tile(np.eye(4), (len(self.centre), 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = self.rotation, self.centre
         return poses
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What is unknown: one focal length for all images, or one for each; None keeps those there are.
+
+    Without ``poses`` the shape of the path is kept, and its scale solved.
+    """
+
+    focal: FocalFreedom | None = "shared"
+    poses: bool = True
+
+    def basis(self, state: State) -> csr_array:
+        """Matrix (7 N + 7 E, unknowns): step = basis @ unknowns.
+
+        Image 0 stays where it is. The scales of the pairs keep their geometric mean, or the loss would be
+        least where everything shrinks to a point.
+        """
+        images, edges = len(state.centre), len(state.edge_scale)
+        first, last = PER_IMAGE * images, PER_IMAGE * images + PER_EDGE * edges - 1
+        if self.poses:
+            unknowns = [[(row, 1.0)] for row in range(PER_IMAGE, first) if row % PER_IMAGE != _FOCAL]
+        else:
+            shifts = [[PER_IMAGE * image + 3 + axis for axis in range(3)] for image in range(images)]
+            unknowns = [list(zip(np.ravel(shifts).tolist(), state.centre.ravel().tolist(), strict=True))]
+        focals = [(PER_IMAGE * image + _FOCAL, 1.0) for image in range(images)]
+        if self.focal is not None:
+            unknowns += [focals] if self.focal == "shared" else [[focal] for focal in focals]
+        starts = range(first, last, PER_EDGE)
+        unknowns += [[(start + part, 1.0)] for start in starts for part in range(PER_EDGE - 1)]
+        unknowns += [[(start + PER_EDGE - 1, 1.0), (last, -1.0)] for start in starts[:-1]]
+        rows, values = zip(*(each for moved in unknowns for each in moved), strict=True)
+        columns = np.repeat(np.arange(len(unknowns)), [len(moved) for moved in unknowns])
+        return coo_array((values, (rows, columns)), shape=(last + 1, len(unknowns))).tocsr()

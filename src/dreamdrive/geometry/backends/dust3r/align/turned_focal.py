@@ -25,8 +25,8 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph
-from dreamdrive.geometry.backends.dust3r.align.pnp import pose_by_pnp
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.align.registration import pose_by_pnp
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 
 _SURE = 0.02  # relative; a network's own focal length counts as 0.05 off
 _UNDERSTATED = 1.5  # of 26 drawn corners of ten frames; the few images that turn share their errors
@@ -46,12 +46,7 @@ _CHUNK = 32  # pairs at a time
 
 @dataclass(frozen=True)
 class TurnedFocal:
-    """What the turns of the camera show.
-
-    Attributes:
-        focal_px: Focal length fx of all images.
-        spread: Its standard deviation, relative; infinite where nothing shows it.
-    """
+    """Focal length fx of all images, and its relative standard deviation: infinite where nothing shows it."""
 
     focal_px: float
     spread: float
@@ -63,53 +58,31 @@ class TurnedFocal:
 
 
 class _Views(NamedTuple):
-    """Second pointmaps of E pairs, P points of each; what is not there weighs 0.
+    """Second pointmaps of E pairs, P points of each; what is not there weighs 0."""
 
-    Attributes:
-        image: The pair's second image (E,).
-        believed_px: Focal length (E,) of the pair's first pointmap.
-        pixels: Relative to the principal point, rows stretched (E, P, 2).
-        points: In the frame of the pair's first camera and in units of their median depth (E, P, 3).
-        weight: Log confidences (E, P).
-        patches: Parts (E,) of the image whose errors are independent of each other.
-    """
-
-    image: Int[np.ndarray, " e"]
-    believed_px: Float[np.ndarray, " e"]
-    pixels: Float[np.ndarray, "e p 2"]
-    points: Float[np.ndarray, "e p 3"]
-    weight: Float[np.ndarray, "e p"]
-    patches: Float[np.ndarray, " e"]
+    image: Int[np.ndarray, " e"]  # the second
+    believed_px: Float[np.ndarray, " e"]  # focal length of the first pointmap
+    pixels: Float[np.ndarray, "e p 2"]  # relative to the principal point, rows stretched
+    points: Float[np.ndarray, "e p 3"]  # in the frame of the first camera, in units of their median depth
+    weight: Float[np.ndarray, "e p"]  # log confidences
+    patches: Float[np.ndarray, " e"]  # parts of the image whose errors are independent of each other
 
 
 class _Poses(NamedTuple):
-    """From the frames of E pairs to their second cameras.
-
-    Attributes:
-        turn: (E, 3, 3).
-        shift: In the units of ``_Views`` (E, 3).
-    """
+    """From the frames of E pairs to their second cameras, in the units of ``_Views``."""
 
     turn: Float[np.ndarray, "e 3 3"]
     shift: Float[np.ndarray, "e 3"]
 
 
 class _Reduced(NamedTuple):
-    """Normal equations of E pairs in the log focal length alone, their poses eliminated.
-
-    Attributes:
-        curvature: (E,).
-        slope: Of minus the cost (E,).
-        follow: What a pose does when the log focal length grows by 1 (E, 6).
-        settle: What it does on its own (E, 6).
-        floor: Variance (E,) of ``slope`` by errors of ``_ERROR``.
-    """
+    """Normal equations of E pairs in the log focal length alone, their poses eliminated."""
 
     curvature: Float[np.ndarray, " e"]
-    slope: Float[np.ndarray, " e"]
-    follow: Float[np.ndarray, "e 6"]
-    settle: Float[np.ndarray, "e 6"]
-    floor: Float[np.ndarray, " e"]
+    slope: Float[np.ndarray, " e"]  # of minus the cost
+    follow: Float[np.ndarray, "e 6"]  # what a pose does when the log focal length grows by 1
+    settle: Float[np.ndarray, "e 6"]  # what it does on its own
+    floor: Float[np.ndarray, " e"]  # variance of the slope by errors of _ERROR
 
 
 def turned_focal(maps: PairMaps, votes: FocalVotes, graph: Graph) -> TurnedFocal:
@@ -117,13 +90,8 @@ def turned_focal(maps: PairMaps, votes: FocalVotes, graph: Graph) -> TurnedFocal
 
     The spread is the greater one of two jackknives, over images and over pairs, joined by what errors of 1 %
     of the focal length across the rays would do, were they alike over an eighth of the width and else
-    independent, times what both were found to leave out. It knows nothing of an error that
-    all turns have in common, nor of a network that poses its cameras by the wrong focal length as well.
-
-    Args:
-        maps: The pairs.
-        votes: Focal lengths of their first pointmaps.
-        graph: Principal points, and fx / fy.
+    independent, times what both were found to leave out. It knows nothing of an error that all turns have in
+    common, nor of a network that poses its cameras by the wrong focal length as well.
     """
     nothing = TurnedFocal(votes.shared_px, float("inf"))
     found = [_view(maps, votes, graph, edge) for edge in range(len(maps))]

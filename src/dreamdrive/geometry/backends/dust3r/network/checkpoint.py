@@ -64,9 +64,6 @@ def normalise(state: dict[str, Tensor], source: str) -> dict[str, Tensor]:
     """The state dict with the keys of ``Dust3r``, whichever of their variants a file has.
 
     The projections of the DPT head have two names each, of which a file may hold one.
-
-    Raises:
-        InputError: The two names hold different tensors.
     """
     state = {key.removeprefix("module."): value for key, value in state.items()}
     state = {key: value for key, value in state.items() if not _UNUSED.match(key)}
@@ -98,7 +95,6 @@ def _read_pth(path: Path) -> tuple[dict[str, Tensor], NetworkConfig | None]:
 
 
 def _read_hub(path: Path) -> tuple[dict[str, Tensor], NetworkConfig]:
-    """Tensors and configuration."""
     beside = path.parent / "config.json"
     for needed in (path, beside):
         if not needed.is_file():

@@ -9,7 +9,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast, get_args
 
 from dreamdrive.errors import InputError
@@ -29,56 +29,32 @@ _FROM_SHAPES = ("enc_dim", "enc_depth", "dec_dim", "dec_depth", "patch", "head")
 
 @dataclass(frozen=True)
 class DptSizes:
-    """Widths of the DPT head; the defaults are those of all published models.
+    """Widths of the DPT head; the defaults are those of all published models."""
 
-    Attributes:
-        layer_dims: Channels of the four feature images before they are brought to a common width.
-        feature_dim: The common width.
-        last_dim: Channels at full resolution.
-    """
-
-    layer_dims: tuple[int, int, int, int] = (96, 192, 384, 768)
-    feature_dim: int = 256
-    last_dim: int = 128
+    layer_dims: tuple[int, int, int, int] = (96, 192, 384, 768)  # channels of the four feature images
+    feature_dim: int = 256  # to which these are brought
+    last_dim: int = 128  # channels at full resolution
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes and modes; the defaults are those of the published model 512_dpt.
+    """Sizes and modes of encoder and decoders; the defaults are those of the published model 512_dpt."""
 
-    Attributes:
-        enc_dim: Channels of a token in the encoder.
-        enc_depth: Layers of the encoder.
-        enc_heads: Heads of its attention.
-        dec_dim: Channels of a token in the decoders.
-        dec_depth: Layers of each decoder.
-        dec_heads: Heads of their attention.
-        patch: Side in pixels of the square a token stands for.
-        mlp_ratio: Width of the inner linear layer over that of a token.
-        head: What makes pixels of tokens.
-        dpt: Sizes of the DPT head; without meaning for the linear head.
-        depth_mode: How the length of a raw vector becomes the distance of a point.
-        conf_mode: How a raw number becomes a confidence.
-        conf_range: Least and largest confidence.
-        rope_base: Ratio of the angular frequencies of the rotary embedding.
-        image_size: Long side in pixels of the pictures it was trained with; 224 means squares.
-    """
-
-    enc_dim: int = 1024
-    enc_depth: int = 24
-    enc_heads: int = 16
+    enc_dim: int = 1024  # channels of a token
+    enc_depth: int = 24  # layers
+    enc_heads: int = 16  # of the attention
     dec_dim: int = 768
     dec_depth: int = 12
     dec_heads: int = 12
-    patch: int = 16
-    mlp_ratio: float = 4.0
+    patch: int = 16  # side in pixels of the square that a token stands for
+    mlp_ratio: float = 4.0  # width of the inner linear layer over that of a token
     head: HeadKind = "dpt"
-    dpt: DptSizes = field(default_factory=DptSizes)
-    depth_mode: DepthMode = "exp"
+    dpt: DptSizes = field(default_factory=DptSizes)  # without meaning for the linear head
+    depth_mode: DepthMode = "exp"  # how the length of a raw vector becomes the distance of a point
     conf_mode: ConfidenceMode = "exp"
-    conf_range: tuple[float, float] = (1.0, math.inf)
-    rope_base: float = 100.0
-    image_size: int = 512
+    conf_range: tuple[float, float] = (1.0, math.inf)  # least and largest
+    rope_base: float = 100.0  # ratio of the angular frequencies of the rotary embedding
+    image_size: int = 512  # long side in pixels of the pictures it was trained with; 224 means squares
 
     def __post_init__(self) -> None:
         sizes = (self.enc_depth, self.dec_depth, self.enc_heads, self.dec_heads, self.patch, self.image_size)
@@ -105,12 +81,7 @@ class NetworkConfig:
 def config_from_call(text: str, source: str) -> NetworkConfig:
     """Configuration from a constructor call as text, which is parsed and not executed.
 
-    Args:
-        text: For example ``AsymmetricCroCo3DStereo(pos_embed='RoPE100', head_type='dpt', ...)``.
-        source: Where it comes from, for messages.
-
-    Raises:
-        InputError: It is no such call, or states something that this network does not do.
+    For example ``AsymmetricCroCo3DStereo(pos_embed='RoPE100', head_type='dpt', ...)``.
     """
     try:
         call = ast.parse(text.strip(), mode="eval").body
@@ -124,11 +95,7 @@ def config_from_call(text: str, source: str) -> NetworkConfig:
 
 
 def config_from_json(text: str, source: str) -> NetworkConfig:
-    """Configuration from the hub's ``config.json``: the constructor's keywords, ``Infinity`` a number.
-
-    Raises:
-        InputError: It is no JSON object, or states something that this network does not do.
-    """
+    """Configuration from the hub's ``config.json``: the constructor's keywords, ``Infinity`` a number."""
     try:
         # The one JSON that states infinities; what it says of anything else is checked value by value.
         values = json.loads(text)
@@ -140,11 +107,7 @@ def config_from_json(text: str, source: str) -> NetworkConfig:
 
 
 def config_from_keywords(given: Mapping[str, Any], source: str) -> NetworkConfig:
-    """Configuration from the keywords of the authors' constructor, with its defaults; others are ignored.
-
-    Raises:
-        InputError: A value is of a wrong kind or names something that this network does not do.
-    """
+    """Configuration from the keywords of the authors' constructor, with its defaults; others are ignored."""
     values: dict[str, Any] = {}
     for name, (default, fits, expected) in _KEYWORDS.items():
         values[name] = value = given.get(name, default)
@@ -178,13 +141,7 @@ def config_from_shapes(
 ) -> NetworkConfig:
     """Configuration from the shapes of a state dict; published modes are assumed.
 
-    Args:
-        shapes: Shape of each tensor.
-        source: Where they come from, for messages.
-        heads: Heads of encoder and decoders, which no shape tells; None assumes 64 channels each.
-
-    Raises:
-        InputError: A tensor that tells a size is missing, or the sizes do not fit each other.
+    No shape tells the heads of encoder and decoders; None assumes 64 channels each.
     """
 
     def shape(key: str, sides: int) -> tuple[int, ...]:
@@ -221,15 +178,11 @@ def config_from_shapes(
 
 
 def check_agreement(stated: NetworkConfig, found: NetworkConfig, source: str) -> None:
-    """Compare what a checkpoint states with what its tensors show.
-
-    Raises:
-        InputError: They disagree.
-    """
+    """Refuse a checkpoint that states something else than what its tensors show."""
     trouble = [
         f"{name} is stated as {getattr(stated, name)!r}, the tensors have {getattr(found, name)!r}"
-        for name in (item.name for item in fields(NetworkConfig))
-        if name in _FROM_SHAPES and getattr(stated, name) != getattr(found, name)
+        for name in _FROM_SHAPES
+        if getattr(stated, name) != getattr(found, name)
     ]
     if trouble:
         raise InputError(

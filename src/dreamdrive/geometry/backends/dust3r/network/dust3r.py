@@ -1,5 +1,6 @@
 """The network of DUSt3R: a shared encoder, two decoders that look at each other, two heads."""
 
+from collections import OrderedDict
 from dataclasses import dataclass
 
 import torch
@@ -11,67 +12,36 @@ from dreamdrive.geometry.backends.dust3r.network.blocks import (
     DecoderBlock,
     EncoderBlock,
     Linear,
+    Rotation,
+    grid_positions,
     lower,
+    rotation,
 )
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap, make_head, pointmap
-from dreamdrive.geometry.backends.dust3r.network.rope import Rotation, grid_positions, rotation
 
 
 @dataclass(frozen=True)
 class Tokens:
-    """Encoded images, all of one shape.
-
-    Attributes:
-        values: Tokens (B, N, D), row by row.
-        rows: Rows of tokens; a token stands for a square of pixels.
-        columns: Columns of tokens; N = rows x columns.
-    """
+    """Encoded images, all of one shape: tokens row by row, each for a square of pixels."""
 
     values: Float[Tensor, "b n d"]
     rows: int
     columns: int
 
 
-class PatchEmbed(nn.Module):
-    """Squares of pixels to tokens.
-
-    Attributes:
-        patch: Side of a square in pixels.
-    """
-
-    def __init__(self, patch: int, dim: int) -> None:
-        super().__init__()
-        self.patch = patch
-        self.proj = nn.Conv2d(3, dim, patch, patch)
-
-    def forward(self, images: Float[Tensor, "b 3 h w"]) -> Tokens:
-        """Tokens of images (B, 3, H, W).
-
-        Raises:
-            ValueError: Height or width is no multiple of the side of a square.
-        """
-        height, width = images.shape[-2:]
-        if height % self.patch or width % self.patch:
-            raise ValueError(f"images are {width}x{height} px; both sides must be multiples of {self.patch}")
-        x = self.proj(images)
-        return Tokens(x.flatten(2).transpose(1, 2), *x.shape[-2:])
-
-
 class Dust3r(nn.Module):
     """The network; the names of its parts are those of the published weights.
 
     ``mask_token`` is one of them and never used: it is left from pre-training.
-
-    Attributes:
-        config: Sizes and modes.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
         self.mask_token = nn.Parameter(torch.zeros(1, 1, config.dec_dim))
-        self.patch_embed = PatchEmbed(config.patch, config.enc_dim)
+        squares = nn.Conv2d(3, config.enc_dim, config.patch, config.patch)
+        self.patch_embed = nn.Sequential(OrderedDict(proj=squares))
         self.enc_blocks = nn.ModuleList(
             EncoderBlock(config.enc_dim, config.enc_heads, config.hidden(config.enc_dim))
             for _ in range(config.enc_depth)
@@ -87,21 +57,20 @@ class Dust3r(nn.Module):
     def forward(
         self, first: Float[Tensor, "b 3 h w"], second: Float[Tensor, "b 3 u v"]
     ) -> tuple[Pointmap, Pointmap]:
-        """Points of both images in the frame of the first; the shapes of the two may differ.
-
-        Args:
-            first: Images (B, 3, H, W) in [-1, 1], sides multiples of the patch.
-            second: Images (B, 3, U, V) likewise.
-        """
+        """Points of both images in the frame of the first; the shapes of the two may differ."""
         return self.decode(self.encode(first), self.encode(second))
 
     def encode(self, images: Float[Tensor, "b 3 h w"]) -> Tokens:
-        """Encode images (B, 3, H, W) in [-1, 1], one by one: a frame's tokens serve all its pairs.
+        """Encode images in [-1, 1], one by one: a frame's tokens serve all its pairs.
 
         Raises:
             ValueError: A side is no multiple of the patch.
         """
-        tokens = self.patch_embed(images)
+        (height, width), patch = images.shape[-2:], self.config.patch
+        if height % patch or width % patch:
+            raise ValueError(f"images are {width}x{height} px; both sides must be multiples of {patch}")
+        x = self.patch_embed(images)
+        tokens = Tokens(x.flatten(2).transpose(1, 2), *x.shape[-2:])
         by = self._rotation(tokens, self.config.enc_dim // self.config.enc_heads)
         x = tokens.values
         for block in self.enc_blocks:
@@ -109,12 +78,7 @@ class Dust3r(nn.Module):
         return Tokens(self.enc_norm(x), tokens.rows, tokens.columns)
 
     def decode(self, first: Tokens, second: Tokens) -> tuple[Pointmap, Pointmap]:
-        """Points of both images of each pair in the frame of the first image.
-
-        Args:
-            first: First images of B pairs.
-            second: Second images of B pairs.
-        """
+        """Points of both images of each pair in the frame of the first image."""
         taps, other_taps = self.decoded(first, second)
         # One head after the other: they are what takes the most memory.
         mine = pointmap(self.downstream_head1(taps, first.rows, first.columns), self.config)

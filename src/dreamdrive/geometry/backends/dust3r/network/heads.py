@@ -13,23 +13,14 @@ _CHANNELS = 4  # x, y, z and confidence
 
 @dataclass(frozen=True)
 class Pointmap:
-    """What the network says of an image, in batches.
-
-    Attributes:
-        points: Points (B, H, W, 3) in the frame of the first camera, x right, y down, z forward, up to scale.
-        confidence: Confidences (B, H, W); from 1 to infinity in the published models.
-    """
+    """Points in the frame of the first camera, x right, y down, z forward, up to scale; and confidences."""
 
     points: Float[Tensor, "b h w 3"]
     confidence: Float[Tensor, "b h w"]
 
 
 class LinearHead(nn.Module):
-    """Each token of the last layer becomes a square of pixels.
-
-    Attributes:
-        patch: Side of the square.
-    """
+    """Each token of the last layer becomes a square of pixels."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -37,16 +28,12 @@ class LinearHead(nn.Module):
         self.proj = nn.Linear(config.dec_dim, _CHANNELS * config.patch**2)
 
     def forward(self, taps: list[Tensor], rows: int, columns: int) -> Float[Tensor, "b 4 h w"]:
-        """Raw channels from tokens (B, N, D) of all layers, N = rows x columns."""
+        """Raw channels from the tokens of all layers."""
         return functional.pixel_shuffle(_as_image(self.proj(taps[-1]), rows, columns), self.patch)
 
 
 class DptHead(nn.Module):
-    """Four layers of tokens, brought to four resolutions and merged from coarse to fine.
-
-    Attributes:
-        hooks: Which of the layers are read.
-    """
+    """Four layers of tokens, brought to four resolutions and merged from coarse to fine."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -55,7 +42,7 @@ class DptHead(nn.Module):
         self.dpt = Dpt(config)
 
     def forward(self, taps: list[Tensor], rows: int, columns: int) -> Float[Tensor, "b 4 h w"]:
-        """Raw channels from tokens (B, N, D) of all layers, N = rows x columns."""
+        """Raw channels from the tokens of all layers."""
         return self.dpt([_as_image(taps[hook], rows, columns) for hook in self.hooks])
 
 
@@ -85,10 +72,9 @@ class Dpt(nn.Module):
         )
 
     def forward(self, images: list[Tensor]) -> Float[Tensor, "b 4 h w"]:
-        """Raw channels from four feature images (B, D, rows, columns)."""
-        return self.head(
-            self.scratch([part(x) for part, x in zip(self.act_postprocess, images, strict=True)])
-        )
+        """Raw channels from four feature images."""
+        finer = [part(x) for part, x in zip(self.act_postprocess, images, strict=True)]
+        return self.head(self.scratch(finer))
 
 
 class Scratch(nn.Module):
@@ -129,7 +115,7 @@ class Fusion(nn.Module):
         self.resConfUnit2 = ResidualUnit(width)
 
     def forward(self, x: Float[Tensor, "b c h w"], finer: Tensor | None = None) -> Float[Tensor, "b c _ _"]:
-        """Apply to (B, C, H, W) and an image of the same shape."""
+        """Apply to features and an image of the same shape."""
         if finer is not None:
             x = x + self.resConfUnit1(finer)
         x = self.resConfUnit2(x)
@@ -145,7 +131,7 @@ class ResidualUnit(nn.Module):
         self.conv2 = nn.Conv2d(width, width, 3, padding=1)
 
     def forward(self, x: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:
-        """Apply to (B, C, H, W)."""
+        """Apply to features."""
         return x + self.conv2(functional.relu(self.conv1(functional.relu(x))))
 
 

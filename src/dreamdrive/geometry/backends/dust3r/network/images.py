@@ -19,21 +19,20 @@ SQUARE_SIZE = 224
 _MULTIPLE = 16
 
 
-def fitting(width_px: int, height_px: int, size: int = 512, *, square_ok: bool = False) -> Fitting:
+def fitting(width_px: int, height_px: int, size: int = 512) -> Fitting:
     """How frames of a size are brought to that of the network.
 
     Args:
         width_px: Width of the frame.
         height_px: Height of the frame.
         size: Length of the long side, or 224 for squares.
-        square_ok: Whether square frames stay square; otherwise they are cut to 4:3, as in training.
 
     Raises:
         InputError: Nothing would be left of one side, or a side would be no multiple of 16.
     """
     if min(width_px, height_px) < 1 or size < _MULTIPLE:
         raise InputError(f"frames of {width_px}x{height_px} px cannot be brought to {size} px")
-    found = any_fitting(width_px, height_px, size, square_ok=square_ok)
+    found = any_fitting(width_px, height_px, size)
     picture = found.size
     if min(picture) < _MULTIPLE or picture[0] % _MULTIPLE or picture[1] % _MULTIPLE:
         raise InputError(
@@ -44,7 +43,10 @@ def fitting(width_px: int, height_px: int, size: int = 512, *, square_ok: bool =
 
 
 def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = False) -> Fitting:
-    """The same rule, whether or not the network takes the picture."""
+    """The same rule, whether or not the network takes the picture.
+
+    Square frames stay square if that is asked for; otherwise they are cut to 4:3, as in training.
+    """
     shortest, longest = sorted((width_px, height_px))
     long_side = round(SQUARE_SIZE * longest / shortest) if size == SQUARE_SIZE else size
     resized = (round(width_px * long_side / longest), round(height_px * long_side / longest))
@@ -65,5 +67,5 @@ def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = F
 
 
 def as_input(pictures: Sequence[UInt8[np.ndarray, "h w 3"]]) -> Float[Tensor, "n 3 h w"]:
-    """Pictures of one shape as the network reads them: (N, 3, H, W) in [-1, 1]."""
+    """Pictures of one shape as the network reads them, in [-1, 1]."""
     return torch.from_numpy(np.stack(pictures)).permute(0, 3, 1, 2).float().div(127.5).sub(1)

@@ -13,7 +13,7 @@ from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r, Tokens
 from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap
 from dreamdrive.geometry.backends.dust3r.network.images import as_input
 from dreamdrive.geometry.backends.dust3r.network.memory import Size, plan_memory
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.progress import Progress, silent
 
 BUDGET_BYTES = 8 * 10**9
@@ -36,8 +36,8 @@ def infer(
 
     Args:
         network: The network.
-        pictures: Frames as ``images.prepare`` makes them, RGB (H, W, 3); shapes may differ.
-        edges: Pairs (E, 2) of indices of pictures.
+        pictures: Frames as ``fitting.prepare`` makes them, RGB; shapes may differ.
+        edges: Pairs of indices of pictures.
         budget_bytes: Memory that may be taken, the weights included.
         progress: Told after each batch of the frames and pairs done, of all of them.
 

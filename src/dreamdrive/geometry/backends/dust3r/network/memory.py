@@ -25,23 +25,13 @@ _MOST_AT_ONCE = 8  # larger batches are no faster on a processor
 
 @dataclass(frozen=True)
 class MemoryPlan:
-    """Bytes that the inference on a set of pairs takes.
-
-    Attributes:
-        weights: The network.
-        tokens: The encoded frames, kept until the last pair.
-        outputs: Points and confidences of all pairs.
-        image: Working memory to encode one frame of the largest shape.
-        pair: Working memory to decode one pair of the largest shape.
-        images_at_once: Frames encoded in one batch.
-        pairs_at_once: Pairs decoded in one batch.
-    """
+    """Bytes that the inference on a set of pairs takes, and how many are looked at in one batch."""
 
     weights: int
-    tokens: int
+    tokens: int  # of the encoded frames, kept until the last pair
     outputs: int
-    image: int
-    pair: int
+    image: int  # working memory to encode one frame of the largest shape
+    pair: int  # and to decode one pair
     images_at_once: int
     pairs_at_once: int
 
@@ -65,13 +55,7 @@ class MemoryPlan:
 def plan_memory(
     network: Dust3r, sizes: Sequence[Size], edges: Int[np.ndarray, "e 2"], budget_bytes: int
 ) -> MemoryPlan:
-    """What the inference on ``edges`` will take, in batches as large as the budget allows.
-
-    Args:
-        network: The network.
-        sizes: Height and width of each frame.
-        edges: Pairs (E, 2) of frames.
-        budget_bytes: How much there is, the weights included.
+    """What the inference on pairs of frames will take, in batches as large as the budget allows.
 
     Raises:
         InputError: Not even one pair at a time fits.
@@ -107,10 +91,8 @@ def _decoding(config: NetworkConfig, first: Size, second: Size) -> int:
     tokens = _tokens(config, first) + _tokens(config, second)
     block = _TOKEN_COPIES * config.dec_dim + 2 * config.hidden(config.dec_dim)
     kept = tokens * (config.enc_dim + config.dec_depth * config.dec_dim)
-    head = max(_area(first), _area(second)) * (
-        _LAST_COPIES * config.dpt.last_dim if config.head == "dpt" else 16
-    )
-    return _FLOAT * (kept + max(tokens * block, head))
+    wide = _LAST_COPIES * config.dpt.last_dim if config.head == "dpt" else 16
+    return _FLOAT * (kept + max(tokens * block, max(_area(first), _area(second)) * wide))
 
 
 def _tokens(config: NetworkConfig, size: Size) -> int:

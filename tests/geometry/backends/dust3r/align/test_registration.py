@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.geometry.cameras.registration import register
+from dreamdrive.geometry.backends.dust3r.align.registration import register
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.3]).as_matrix()
 

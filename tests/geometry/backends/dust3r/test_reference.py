@@ -19,9 +19,15 @@ from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
-from dreamdrive.geometry.backends.dust3r.reference.adam import Schedule, descend
-from dreamdrive.geometry.backends.dust3r.reference.objective import Objective, Raw, half_areas, raw_parameters
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive.geometry.backends.dust3r.reference import (
+    Objective,
+    Raw,
+    Schedule,
+    descend,
+    half_areas,
+    raw_parameters,
+)
 from dreamdrive.splat.torch_threads import one_torch_thread
 from geometry.simulated_pairs import Noise, pair_maps
 

@@ -1,6 +1,6 @@
-"""The loss of global alignment as its authors' program writes it: raw parameters, all edges stacked.
+"""Global alignment as its authors' program does it: raw parameters, all edges stacked, Adam.
 
-Kept as the reference that the solver is measured against. With the points X of image i in the world, the
+The measure of what is done here; no clip goes through it. With the points X of image i in the world, the
 points P of an edge, its similarity T and w = ln confidence (Wang et al. 2024, eq. 5):
     L = sum over edges and both images, sum over pixels, w |X - T P| / A
 """
@@ -15,28 +15,23 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.align import BASE_SCALE, Graph, Start
-from dreamdrive.geometry.backends.dust3r.pairmaps import PairMaps
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.similarity import Similarity
 
 _FOCAL_BREAK = 20.0
 Normalisation = Literal["pooled", "modular"]
+Schedule = Literal["cosine", "linear"]
+BETAS = (0.9, 0.9)
 
 
 @dataclass(frozen=True)
 class Raw:
-    """Parameters as the authors' program has them; quaternions are xyzw and of any length.
+    """Parameters as the authors' program has them; quaternions are xyzw and of any length."""
 
-    Attributes:
-        pw_poses: Quaternion, signed log1p of translation / scale, log scale (E, 8) of the edges.
-        im_poses: Quaternion, signed log1p of translation (N, 7) of world_from_camera.
-        im_focals: 20 times the log focal length (N, 1).
-        im_depthmaps: Log depth (N, pixels of the largest image), row by row, padded at the end.
-    """
-
-    pw_poses: Float[Tensor, "e 8"]
-    im_poses: Float[Tensor, "n 7"]
-    im_focals: Float[Tensor, "n 1"]
-    im_depthmaps: Float[Tensor, "n a"]
+    pw_poses: Float[Tensor, "e 8"]  # of edges: quaternion, signed log1p of translation / scale, log scale
+    im_poses: Float[Tensor, "n 7"]  # quaternion, signed log1p of translation of world_from_camera
+    im_focals: Float[Tensor, "n 1"]  # 20 times the log focal length
+    im_depthmaps: Float[Tensor, "n a"]  # log depth, row by row, padded at the end
 
     @property
     def tensors(self) -> list[Tensor]:
@@ -58,7 +53,7 @@ def raw_parameters(start: Start) -> Raw:
 
 
 def half_areas(maps: PairMaps, normalisation: Normalisation) -> Float[np.ndarray, "e 2"]:
-    """The divisor A (E, 2) of each edge's first and second image.
+    """The divisor A of each edge's first and second image.
 
     ``pooled`` is the number of pixels of all first images, or of all second images; ``modular`` the mean over
     edges of the means over pixels. They are the same where all images are of one size.
@@ -126,6 +121,36 @@ class Objective:
         ]
         maps = [d[: h * w].reshape(h, w) for d, (h, w) in zip(depth, self.sizes, strict=True)]
         return Start(poses, focals, tuple(maps), tuple(pairs))
+
+
+def descend(
+    objective: Objective,
+    raw: Raw,
+    steps: int = 300,
+    *,
+    schedule: Schedule = "cosine",
+    of: int | None = None,
+    rate: float = 0.01,
+    last_rate: float = 1e-6,
+) -> Float[np.ndarray, " _"]:
+    """Adam with a falling rate moves the parameters in place; the loss before each step comes back.
+
+    A step moves a parameter by about the rate at most, and the rates of 300 steps sum to 1.5: the log of a
+    focal length, being a 20th of its parameter, never moves by more than 0.075.
+    The rate falls over a whole schedule ``of`` so many steps, of which the first ``steps`` are made.
+    """
+    optimiser = torch.optim.Adam(raw.tensors, lr=rate, betas=BETAS, eps=1e-8)
+    losses: list[float] = []
+    for step in range(steps):
+        t = step / (of or steps)
+        share = (1 + np.cos(np.pi * t)) / 2 if schedule == "cosine" else 1 - t
+        optimiser.param_groups[0]["lr"] = float(last_rate + (rate - last_rate) * share)
+        optimiser.zero_grad()
+        loss = objective(raw)
+        loss.backward()
+        optimiser.step()
+        losses.append(float(loss.detach()))
+    return np.array(losses)
 
 
 def pair_transforms(raw: Raw) -> tuple[Float[Tensor, " e"], Float[Tensor, "e 3 3"], Float[Tensor, "e 3"]]:

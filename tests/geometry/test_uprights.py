@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dreamdrive.geometry.depth.flanks import fill_flanks
+from dreamdrive.geometry.depth.confidence import fill_flanks
 from dreamdrive.geometry.depth.one_frame import Swept
 
 SHAPE = (60, 80)

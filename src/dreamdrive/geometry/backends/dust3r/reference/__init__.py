@@ -1,1 +1,0 @@
-"""What the authors' program does, as the measure of what is done here; no clip goes through it."""
