@@ -21,9 +21,6 @@ def path_of(action: Waypoints | Steering, times_s: Float[np.ndarray, " t"]) -> T
     straight ahead, and the camera looks along the path. Speed and turn run the same way between their four
     values; the first of them holds before it. What was asked for last goes on: the velocity of waypoints,
     speed and turn of steering.
-
-    Raises:
-        ValueError: The times do not start at 0.
     """
     if times_s[0] != 0:
         raise ValueError(f"a path starts at time 0, not {times_s[0]:g}")

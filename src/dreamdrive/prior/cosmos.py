@@ -45,9 +45,6 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
 
     The poses of ``requested`` are what was asked for, with the first frame at the identity. They were not
     measured in the frames and are not ``known``: how well the model keeps to them, the geometry has to find.
-
-    Raises:
-        InputError: The photo, the path, the size or the weights cannot be used.
     """
     path = _path(control)
     size, (count, index) = _size(control), _wanted(control)
@@ -115,9 +112,6 @@ def relative_poses(path: Trajectory, steps: int, rate_hz: float) -> Float[np.nda
 
     Row i holds ``inv(T_i) @ T_(i+1)``, camera to world with x right, y down, z ahead: the translation in
     metres times ``PER_METRE``, then the first and the second column of the rotation (Zhou et al. 2019).
-
-    Raises:
-        InputError: The path is shorter than that.
     """
     length_s, wanted_s = float(path.times_s[-1] - path.times_s[0]), steps / rate_hz
     if length_s < wanted_s - 1e-6:

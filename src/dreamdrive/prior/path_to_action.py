@@ -34,11 +34,7 @@ CAMERA_HEIGHT_M = 1.5
 
 
 def waypoints(path: Trajectory) -> Waypoints:
-    """Where the path is at ``AT_S``.
-
-    Raises:
-        InputError: The path is too short, or no car drives it.
-    """
+    """Where the path is at ``AT_S``."""
     _check_length(path)
     places = from_first(path).at(np.array(AT_S))[:, :3, 3]
     return _checked(Waypoints(right_m=_four(places[:, 0]), ahead_m=_four(places[:, 2])))
@@ -49,9 +45,6 @@ def steering(path: Trajectory) -> Steering:
 
     The speed is the slope of a cubic spline through the positions. The turn is that of the heading over the
     distance; what rolls or pitches the camera is no part of it.
-
-    Raises:
-        InputError: The path is too short, has fewer than three poses, or no car drives it.
     """
     _check_length(path)
     if len(path) < 3:
@@ -68,11 +61,7 @@ def steering(path: Trajectory) -> Steering:
 
 
 def command(path: Trajectory) -> Command:
-    """The word for where the path is after two seconds, see ``STANDING_M`` and ``ASIDE_M``.
-
-    Raises:
-        InputError: The path is too short, or no car drives it.
-    """
+    """The word for where the path is after two seconds, see ``STANDING_M`` and ``ASIDE_M``."""
     at = waypoints(path)
     right, ahead = at.right_m[-1], at.ahead_m[-1]
     if np.hypot(right, ahead) < STANDING_M:
@@ -83,11 +72,7 @@ def command(path: Trajectory) -> Command:
 
 
 def goal(path: Trajectory, camera: Camera, height_m: float = CAMERA_HEIGHT_M) -> Goal:
-    """Where the first frame shows the road under the end of the path; the camera's pose does not count.
-
-    Raises:
-        InputError: That place is behind the camera or outside the frame.
-    """
+    """Where the first frame shows the road under the end of the path; the camera's pose does not count."""
     end = from_first(path).world_from_camera[-1, :3, 3] + np.array([0.0, height_m, 0.0])
     column, row, depth = camera.at(np.eye(4)).project(end[None])[0]
     if depth <= 0:

@@ -81,11 +81,7 @@ class Settings:
 
 
 def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
-    """What ``config.json`` of unet and controlnet say beyond what diffusers' classes take.
-
-    Raises:
-        InputError: Plain Stable Diffusion, or a variant that is not built here.
-    """
+    """What ``config.json`` of unet and controlnet say beyond what diffusers' classes take."""
     if "neighboring_view_pair" not in unet:
         raise InputError(f"unet/config.json has no neighboring_view_pair: {_PLAIN_SD}")
     if "bbox_embedder_param" not in controlnet:

@@ -87,9 +87,6 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
     """Load a folder (see ``EXPECTED``); nothing in it is executed, nothing is fetched.
 
     On a GPU the networks run in half precision, elsewhere in float32.
-
-    Raises:
-        InputError: Parts are missing or damaged, are of another model or variant, or do not fit into memory.
     """
     files = _find_parts(folder)
     configs = {

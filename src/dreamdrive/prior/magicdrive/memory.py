@@ -31,11 +31,7 @@ def needed_bytes(networks: list[nn.Module], settings: Settings, width: int, elem
 
 
 def check_memory(needed: int, device: torch.device) -> None:
-    """Refuse what cannot fit.
-
-    Raises:
-        InputError: More is needed than is free.
-    """
+    """Refuse what cannot fit."""
     free = free_bytes(device)
     if free is not None and needed > free:
         where = "the GPU" if device.type == "cuda" else "this machine"

@@ -39,9 +39,6 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
     """Six pictures of every time step, each of them sampled by itself, or all together.
 
     Always sampled together is the whole length of the weights, at 12 Hz from the layout's time 0.
-
-    Raises:
-        InputError: The layout or the weights cannot be used, or they do not fit into memory.
     """
     layout, weights = _inputs(control)
     wanted = None if temporal else _time_steps(control, None)

@@ -46,9 +46,6 @@ def generate(
     """Frames and latents of time steps, by time, then camera.
 
     The temporal variant samples all time steps of its length, others each wanted one by itself.
-
-    Raises:
-        InputError: Latents or frames are not finite.
     """
     together = run.parts.settings.frames
     sampled = wanted if together == 1 else np.arange(together)

@@ -77,11 +77,7 @@ def sample(
 
 @torch.inference_mode()
 def decode(vae: AutoencoderKL, latents: Float[Tensor, "bn c h w"]) -> UInt8[np.ndarray, "bn _ _ 3"]:
-    """Pictures of latents, a few at a time.
-
-    Raises:
-        InputError: They are not finite.
-    """
+    """Pictures of latents, a few at a time."""
     scaled = (latents / vae.config["scaling_factor"]).to(vae.dtype)
     pictures: list[np.ndarray] = []
     for chunk in scaled.split(DECODE_PICTURES):

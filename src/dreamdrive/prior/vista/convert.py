@@ -101,9 +101,6 @@ def write_tensors(
     """Write a ``.safetensors``: length and text of the header, then the numbers, as each tensor is read.
 
     The library's own writer wants all tensors at once. ``tell`` is told how many are written.
-
-    Raises:
-        InputError: A number is too large for the type, or not finite.
     """
     kind, code, width = _DTYPES[dtype]
     header: dict[str, Any] = {"__metadata__": {"format": "pt"}}

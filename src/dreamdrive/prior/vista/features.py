@@ -150,9 +150,6 @@ def extract(
 
     ``latents`` of all frames are scaled and clean; of the frames, the first of each window is described. Of
     frames in two windows, which are in order, the first one counts. ``tell`` is called after every window.
-
-    Raises:
-        InputError: The features are not finite.
     """
     chosen = options or FeatureOptions()
     described = [engine.describe(to_images(frames[w.span.start : w.span.start + 1])) for w in windows]

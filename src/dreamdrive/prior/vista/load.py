@@ -11,21 +11,13 @@ from dreamdrive.prior.vista.stored import open_weights
 
 
 def open_networks(weights: Path, kind: Kind | None) -> Networks:
-    """Check weights of a kind, or of any, without loading; on a GPU the UNet will compute in float16.
-
-    Raises:
-        InputError: The weights cannot be used.
-    """
+    """Check weights of a kind, or of any, without loading; on a GPU the UNet will compute in float16."""
     device = chosen_device()
     return Networks(open_weights(weights, kind), device, half=device.type == "cuda")
 
 
 def check_fit(networks: Networks, job: Job) -> None:
-    """Whether there is memory for a job, before anything is loaded.
-
-    Raises:
-        InputError: There is not; the message says how much is missing and what to do.
-    """
+    """Whether there is memory for a job, before anything is loaded."""
     shared = networks.device.type != "cuda"
     free = Free(free_bytes(networks.device), None if shared else free_bytes(), shared=shared)
     check_memory(networks.stored, job, free, half=networks.half)

@@ -45,9 +45,6 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         control: ``path`` is a photo, or a video or folder whose first frames are kept (up to three by Vista,
             one by SVD). ``frames`` counts the frames made: its STOP says how many rounds are needed.
         progress: Told of every step of the sampler, of decoding and of every window of features.
-
-    Raises:
-        InputError: The input, an option or the weights cannot be used, or memory does not suffice.
     """
     if control.path is None or control.weights is None:
         raise InputError(f"the prior {kind.name} needs an input, a photo, and --weights")

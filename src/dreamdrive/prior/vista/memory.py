@@ -103,11 +103,7 @@ def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
 
 
 def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
-    """Refuse a run that does not fit; ``half`` is whether the UNet computes in float16.
-
-    Raises:
-        InputError: It does not fit; the message names a size that does.
-    """
+    """Refuse a run that does not fit, naming a size that does; with ``half`` the UNet computes in float16."""
     plan = plan_memory(stored, job, half=half)
     if plan.fits(free):
         return

@@ -13,12 +13,7 @@ from dreamdrive.scene.trajectory import Trajectory
 
 
 def waypoints_by_round(path: Trajectory, starts_s: Float[np.ndarray, " r"], last_s: float) -> list[Waypoints]:
-    """The waypoints of rounds that start at ``starts_s``, each from where the path is then.
-
-    Raises:
-        InputError: The path does not last until ``last_s``, the time of the last frame, or for all waypoints;
-            or no car drives it.
-    """
+    """The waypoints of rounds that start at ``starts_s``, each from where the path is then."""
     path = from_first(path)
     needed_s = max(last_s, float(starts_s[-1]) + AT_S[-1])
     if path.times_s[-1] < needed_s - 1e-6:

@@ -92,9 +92,6 @@ def watch(unet: VideoUNet, name: str, keep: Callable[[Tensor], None]) -> Any:
 
     Returns:
         What to ``remove()`` afterwards.
-
-    Raises:
-        AttributeError: There is no such block.
     """
 
     def hand_over(module: nn.Module, args: object, output: Any) -> None:
