@@ -14,7 +14,7 @@ from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.path_to_action import from_first
+from dreamdrive.prior.path import from_first
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent

@@ -16,8 +16,7 @@ from torch import Tensor
 from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS
-from dreamdrive.prior.action_to_path import path_of
-from dreamdrive.prior.path_to_action import waypoints
+from dreamdrive.prior.path import path_of, waypoints_by_round
 from dreamdrive.prior.vista.condition import numbers_of
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.memory import Job
@@ -96,7 +95,7 @@ def test_a_path_is_told_as_its_waypoints(
         "dreamdrive.prior.vista.make.numbers_of", lambda action: told.append(action) or numbers_of(action)
     )
     made = PRIORS["vista"](replace(control, frames="1:4", trajectory=tmp_path / "path.json"))
-    assert told == [waypoints(path)]
+    assert told == waypoints_by_round(path, np.zeros(1), 0.0)
     assert made.requested is not None
     np.testing.assert_allclose(made.requested.world_from_camera, path.world_from_camera[:3], atol=1e-9)
     assert made.known.world_from_camera is None

@@ -13,7 +13,7 @@ from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.path_to_action import STEERING_RATIO
+from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.decode import decode_in_chunks
@@ -23,7 +23,6 @@ from dreamdrive.prior.vista.features import BLOCK, Window, extract
 from dreamdrive.prior.vista.kinds import SVD, Kind
 from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import Job, smaller_size
-from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
 from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
 from dreamdrive.progress import Progress
