@@ -176,8 +176,8 @@ def test_what_it_cannot_use_is_refused(control: Control, changes: dict[str, obje
 def test_too_little_memory_is_told_before_anything_is_loaded(
     control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dreamdrive.prior.vista.load.free_bytes", lambda *device: 10_000_000)
-    monkeypatch.setattr("dreamdrive.prior.vista.networks.Networks._load", lambda *_: pytest.fail("loaded"))
+    monkeypatch.setattr("dreamdrive.prior.vista.engine.free_bytes", lambda *device: 10_000_000)
+    monkeypatch.setattr(Engine, "_load", lambda *_: pytest.fail("loaded"))
     with pytest.raises(InputError, match=r"0\.0 GB are free: no smaller size fits"):
         PRIORS["vista"](control)
 
@@ -186,10 +186,10 @@ def test_too_little_memory_is_told_before_anything_is_loaded(
 def test_memory_is_planned_for_all_frames_that_are_made(
     control: Control, monkeypatch: pytest.MonkeyPatch, frames: str, made: int
 ) -> None:
-    def stop(networks: object, job: Job) -> None:
+    def stop(engine: Engine, job: Job) -> None:
         raise InputError(f"{job.frames} of {job.per_round}")
 
-    monkeypatch.setattr("dreamdrive.prior.vista.make.check_fit", stop)
+    monkeypatch.setattr(Engine, "check_fit", stop)
     with pytest.raises(InputError, match=f"^{made} of {FRAMES}$"):
         PRIORS["vista"](replace(control, frames=frames))
 

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.vista.decode import CHUNK
 from dreamdrive.prior.vista.picture import SIDE, nearest_side
 from dreamdrive.prior.vista.stored import Stored
 
+CHUNK = 14
+"""Frames that Vista decodes at once."""
 Step = Literal["image encoder", "encoder", "UNet", "decoder"]
 MAKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet", "decoder")
 LOOKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet")
