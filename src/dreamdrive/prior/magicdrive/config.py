@@ -5,9 +5,8 @@ from typing import Any
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.checked import build
-from dreamdrive.prior.magicdrive.boxes import CLASSES
 from dreamdrive.prior.magicdrive.cameras import NUSCENES, crop
-from dreamdrive.prior.magicdrive.raster import CHANNELS
+from dreamdrive.prior.magicdrive.condition import CHANNELS, CLASSES
 
 EXPECTED = (
     "a folder with unet/ and controlnet/ of MagicDrive (of MagicDrive-t for --prior magicdrive-t) and "
