@@ -12,11 +12,9 @@ from tests.prior.magicdrive.tiny import official_configs, tiny_configs
 from torch import Tensor
 
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock
-from dreamdrive.prior.magicdrive.boxes import box_corners
-from dreamdrive.prior.magicdrive.condition import Conditions
+from dreamdrive.prior.magicdrive.condition import Conditions, box_corners
 from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_settings
-from dreamdrive.prior.magicdrive.embed import MapEncoder, fourier
-from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet
+from dreamdrive.prior.magicdrive.networks import BevControlNet, MapEncoder, fourier, multiview_unet
 from dreamdrive.prior.magicdrive.sample import sample, unipc
 from dreamdrive.world.mesh import upright
 

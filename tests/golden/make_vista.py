@@ -18,12 +18,11 @@ from tests.prior.vista.test_unet import look, place_of
 from torch import Tensor
 
 from dreamdrive.prior.vista.condition import NUMBERS, clip_pixels, embed_action
-from dreamdrive.prior.vista.decode import decode_in_chunks
 from dreamdrive.prior.vista.keys import PARTS, UNET, recipes_of
 from dreamdrive.prior.vista.kinds import VISTA
-from dreamdrive.prior.vista.rollout import SCALE, roll_out
-from dreamdrive.prior.vista.sampler import Branches, Fixed, denoise, guidance, sample, sigmas
-from dreamdrive.prior.vista.unet import watch
+from dreamdrive.prior.vista.networks import watch
+from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out
+from dreamdrive.prior.vista.sampler import Branches, denoise, guidance, sample, sigmas
 
 Tensors = dict[str, Tensor]
 PER_LEVEL = 2
@@ -153,8 +152,8 @@ def _sampler(rng: np.random.Generator) -> Tensors:
             plain = plain + 0.1 * fixed[:, None, None, None]
             return plain, plain + 0.2 * found["ctx"][:, :, None, None]
 
-        fixed = Fixed(mask_of(known, frames), found["cond_frame"])
-        found[f"{guider}.{known}.out"] = sample(velocity, found["noise"], scale, fixed, steps)
+        mask, clean = mask_of(known, frames), found["cond_frame"]
+        found[f"{guider}.{known}.out"] = sample(velocity, found["noise"], scale, mask, clean, steps)
         inputs = [x * (s**2 + 1) ** 0.5 for x, s in zip(entered, sigmas(steps), strict=False)]
         found[f"{guider}.{known}.x_in"] = torch.stack(inputs)
     return found
@@ -171,8 +170,8 @@ def _sampler_tiny_unet(rng: np.random.Generator) -> Tensors:
         "denoise_sigma5_out": denoise(velocity, noisy, 5.0, torch.ones(frames), mask_of("c0", frames)),
     }
     for name, schedule in (("vanilla_c01", "constant"), ("triangle_c0", "triangle")):
-        fixed, scale = Fixed(mask_of(name, frames), given["cond_frame"]), guidance(schedule, frames)  # type: ignore[arg-type]
-        made[f"out.{name}"] = sample(velocity, given["noise"], scale, fixed, TINY_STEPS)
+        mask, scale = mask_of(name, frames), guidance(schedule, frames)  # type: ignore[arg-type]
+        made[f"out.{name}"] = sample(velocity, given["noise"], scale, mask, given["cond_frame"], TINY_STEPS)
     return {**given, **made}
 
 

@@ -24,9 +24,6 @@ def parse_action(text: str) -> Action:
     """An action from words like those of ``EXAMPLES``: metres, metres a second, radians; left is positive.
 
     Four numbers hold at 0.5, 1, 1.5 and 2 seconds; a goal is the share of the first frame's width and height.
-
-    Raises:
-        InputError: The text has another form.
     """
     words = [word.partition("=") for word in text.split()]
     given = {name: value for name, sign, value in words if sign}

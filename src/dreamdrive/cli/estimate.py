@@ -22,10 +22,6 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
 
     Returns:
         The estimate, and what is missing from it, a sentence each.
-
-    Raises:
-        InputError: There is neither a scene nor the stages of one, or they are damaged or do not belong
-            together.
     """
     from dreamdrive.evaluate import Estimate
     from dreamdrive.scene.clip import Clip

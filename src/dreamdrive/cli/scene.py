@@ -11,11 +11,7 @@ if TYPE_CHECKING:
 
 
 def open_scene(out: Path) -> "Scene":
-    """The scene in an output folder of ``generate``, or in a scene folder itself.
-
-    Raises:
-        InputError: There is none.
-    """
+    """The scene in an output folder of ``generate``, or in a scene folder itself."""
     from dreamdrive.stored import load_scene
 
     if not out.exists():

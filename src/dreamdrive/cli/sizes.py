@@ -6,11 +6,7 @@ from dreamdrive.errors import InputError
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Width and height from ``480x270``.
-
-    Raises:
-        InputError: The text has another form, or means more pixels than a video can have.
-    """
+    """Width and height from ``480x270``."""
     match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip())
     if match is None:
         raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 480x270")

@@ -45,11 +45,7 @@ def interval(low: float | None, high: float | None) -> str:
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
-    """Write values as JSON, whole or not at all; a number that is not finite becomes null.
-
-    Raises:
-        InputError: The place cannot be written to.
-    """
+    """Write values as JSON, whole or not at all; a number that is not finite becomes null."""
     with new_file(path) as partial:
         partial.write_text(json.dumps(_plain(values), indent=2, allow_nan=False) + "\n")
 

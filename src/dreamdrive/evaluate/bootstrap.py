@@ -119,9 +119,6 @@ def half_distances(
     """Mean distances of a random half of the real samples to the other half, and to a half of each fake set.
 
     Sets of one length are halved alike, so that a fake half shows what the real half shows that it replaces.
-
-    Raises:
-        InputError: A set is too small to be halved.
     """
     for features in (real, *fakes):
         if len(features) < MIN_SAMPLES:

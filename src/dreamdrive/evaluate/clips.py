@@ -18,11 +18,7 @@ MAX_BYTES = 4_000_000_000
 
 
 def open_clips(path: Path) -> dict[str, Source]:
-    """The clips of a set by name, in natural order: those in a folder, or one folder of images, or one video.
-
-    Raises:
-        InputError: There is no clip, or two have one name.
-    """
+    """The clips of a set by name, in natural order: those in a folder, or a folder of images, or a video."""
     if not path.exists():
         raise InputError(f"{path} does not exist; expected a folder of clips, or one clip")
     if not path.is_dir() or _holds_images(path):
@@ -55,11 +51,7 @@ def pairs_of(real: Mapping[str, Source], fake: Mapping[str, Source]) -> list[tup
 
 
 def read_frames(source: Source) -> UInt8[np.ndarray, "f h w 3"]:
-    """All frames of a clip as RGB.
-
-    Raises:
-        InputError: A frame is unreadable or of another size, or there are too many to hold in memory.
-    """
+    """All frames of a clip as RGB."""
     frames: list[UInt8[np.ndarray, "h w 3"]] = []
     wanted = range(UNBOUNDED) if isinstance(source, Video) else range(source.count())
     for raw in source.read(wanted):

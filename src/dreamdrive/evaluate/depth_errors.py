@@ -56,11 +56,7 @@ class Trust:
 
 
 def depth_errors(found: Float[np.ndarray, " n"], true: Float[np.ndarray, " n"]) -> DepthErrors | None:
-    """The errors of positive depths (N,), both in metres; None for no pixels.
-
-    Raises:
-        ValueError: A depth is not positive and finite.
-    """
+    """The errors of positive depths (N,), both in metres; None for no pixels."""
     if not len(true):
         return None
     d, t = _positive(found), _positive(true)

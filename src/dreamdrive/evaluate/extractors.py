@@ -83,11 +83,7 @@ class Toolbox:
 def open_toolbox(
     files: WeightFiles, *, resize: Resize = "tf1", windows: bool = True, stlpips_kind: Stlpips = "alex"
 ) -> Toolbox:
-    """Load every network whose weights are there; those of video only if windows are wanted.
-
-    Raises:
-        InputError: A file that was given is not what it should be.
-    """
+    """Load every network whose weights are there; those of video only if windows are wanted."""
     box = Toolbox()
     box.likenesses["psnr"] = lambda a, b: np.array([psnr(*pair) for pair in _scaled(a, b)])
     box.likenesses["ssim"] = lambda a, b: np.array([ssim(*pair) for pair in _scaled(a, b)])

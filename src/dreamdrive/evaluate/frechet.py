@@ -64,9 +64,6 @@ def polynomial_mmd(
     The defaults are those of KID (Binkowski et al. 2018); unbiased, without the similarity of each sample to
     itself, its expectation does not depend on the number of samples, and it may be slightly negative.
     ``degree=2, offset=0, unbiased=False`` is that of JEDi (Luo et al. 2024), without its factor of 100.
-
-    Raises:
-        InputError: Fewer than two samples, or features that are not finite.
     """
     a, b = _checked(real, fake)
 
@@ -86,11 +83,7 @@ def polynomial_mmd(
 def kernel_distance(
     real: Float[np.ndarray, "n d"], fake: Float[np.ndarray, "m d"], *, seed: int = 0
 ) -> float:
-    """KID or KVD: ``polynomial_mmd`` of all samples, or beyond 1000 its mean over 100 random subsets of 1000.
-
-    Raises:
-        InputError: Fewer than two samples, or features that are not finite.
-    """
+    """KID or KVD: ``polynomial_mmd`` of all samples, beyond 1000 its mean over 100 random subsets of 1000."""
     if max(len(real), len(fake)) <= KERNEL_SUBSET_SIZE:
         return polynomial_mmd(real, fake)
     rng = np.random.default_rng(seed)

@@ -79,11 +79,7 @@ def _drawn(path: Path, estimate: Estimate) -> Drive:
 
 
 def of_drive(made: Drive, estimate: Estimate, path: Path) -> GeometryTruth:
-    """The exact truth of a simulated drive; a pixel takes that of the true pixel under its centre.
-
-    Raises:
-        InputError: The drive has too few frames, or frames of another shape.
-    """
+    """The exact truth of a simulated drive; a pixel takes that of the true pixel under its centre."""
     _check_frames(len(made.cameras), estimate, path)
     sizing = _sizing((made.cameras[0].width_px, made.cameras[0].height_px), estimate, path)
     rows = estimate.index
@@ -95,11 +91,7 @@ def of_drive(made: Drive, estimate: Estimate, path: Path) -> GeometryTruth:
 
 
 def of_recording(recorded: Recorded, estimate: Estimate, path: Path) -> GeometryTruth:
-    """The truth of a recording; of several points in a pixel the nearest counts, which hides the others.
-
-    Raises:
-        InputError: It has too few frames, or frames of another shape.
-    """
+    """The truth of a recording; of several points in a pixel the nearest counts, which hides the others."""
     _check_frames(len(recorded.world_from_camera), estimate, path)
     sizing = _sizing(recorded.size, estimate, path)
     poses = [recorded.world_from_camera[i] for i in estimate.index.tolist()]

@@ -63,11 +63,7 @@ class Recorded:
     boxes: Sequence[Sequence[Cuboid]] | None
 
     def points(self, frame: int) -> Points:
-        """The points of a frame, from its file.
-
-        Raises:
-            InputError: The file is damaged or holds something else.
-        """
+        """The points of a frame, from its file."""
         path = self.depth_files[frame]
         u, v, depth_m = _picture(path, self.size) if path.suffix == ".png" else _table(path)
         place_px = np.column_stack([u, v]) + 0.5
@@ -86,9 +82,6 @@ def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
     Args:
         folder: The recording.
         camera: The one whose frames are asked for, ``NAME_camera``: the name of the scene's input.
-
-    Raises:
-        InputError: The file is damaged or knows no such camera.
     """
     file = folder / "cameras.json"
     found = pandaset_camera(read_json(file, "--truth"), f"--truth {file}", camera)
@@ -103,11 +96,7 @@ def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
 
 
 def read_poses_txt(folder: Path) -> Recorded:
-    """A folder with ``poses.txt`` (KITTI or TUM), ``meta.json`` and, where there is one, ``lidar_depth``.
-
-    Raises:
-        InputError: A file is missing, damaged or holds something else.
-    """
+    """A folder with ``poses.txt`` (KITTI or TUM), ``meta.json`` and, where there is one, ``lidar_depth``."""
     poses = read_pose_file(folder / "poses.txt", "--truth").world_from_camera
     file = folder / "meta.json"
     values = read_json(file, "--truth")

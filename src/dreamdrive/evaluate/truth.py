@@ -54,11 +54,7 @@ class Truth:
 
 
 def views_of(scene: Scene, truth: Truth) -> tuple[Camera, ...]:
-    """The scene's own cameras with the pixels of the truth.
-
-    Raises:
-        InputError: The scene has another number of frames, or frames of another shape.
-    """
+    """The scene's own cameras with the pixels of the truth."""
     if len(scene.cameras) != len(truth.cameras):
         raise InputError(
             f"the scene has {len(scene.cameras)} frames but the truth has {len(truth.cameras)}; "

@@ -33,9 +33,6 @@ def warp_error(clip: Clip, gap: int) -> WarpError:
     built-in street (320x192, seed 1) it left 13.9 grey levels over 8 frames, and 15.4 once corrupted by
     ``generated``, where this leaves 7.4 and 10.0. Only pixels count whose flow comes back to within half a
     pixel; what is hidden in one of the frames, or cannot be followed, is left out.
-
-    Raises:
-        ValueError: The clip has no two frames that far apart.
     """
     if not 1 <= gap < len(clip):
         raise ValueError(f"warp error: a clip of {len(clip)} frames has none {gap} apart")

@@ -34,9 +34,6 @@ def appearance(
 
     Returns:
         Features (F, H // 2, W // 2, 15), half precision, 0 where not valid.
-
-    Raises:
-        ValueError: H or W is odd.
     """
     count, height, width = valid.shape
     if height % STRIDE or width % STRIDE:

@@ -14,7 +14,7 @@ from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.path_to_action import from_first
+from dreamdrive.prior.path import from_first
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent
@@ -45,9 +45,6 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
 
     The poses of ``requested`` are what was asked for, with the first frame at the identity. They were not
     measured in the frames and are not ``known``: how well the model keeps to them, the geometry has to find.
-
-    Raises:
-        InputError: The photo, the path, the size or the weights cannot be used.
     """
     path = _path(control)
     size, (count, index) = _size(control), _wanted(control)
@@ -115,9 +112,6 @@ def relative_poses(path: Trajectory, steps: int, rate_hz: float) -> Float[np.nda
 
     Row i holds ``inv(T_i) @ T_(i+1)``, camera to world with x right, y down, z ahead: the translation in
     metres times ``PER_METRE``, then the first and the second column of the rotation (Zhou et al. 2019).
-
-    Raises:
-        InputError: The path is shorter than that.
     """
     length_s, wanted_s = float(path.times_s[-1] - path.times_s[0]), steps / rate_hz
     if length_s < wanted_s - 1e-6:

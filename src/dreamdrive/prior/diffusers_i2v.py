@@ -42,11 +42,7 @@ class Kind:
 
 
 def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
-    """A clip that goes on from a photo; Z_ref is ``features["appearance"]``.
-
-    Raises:
-        InputError: The pipeline is none from photo to video, or it does not take what is asked for.
-    """
+    """A clip that goes on from a photo; Z_ref is ``features["appearance"]``."""
     from PIL import Image
 
     assert control.weights is not None  # by ``Prior.check``
@@ -83,11 +79,7 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
 
 
 def find_kind(folder: Path) -> Kind:
-    """The class of the pipeline in a folder, if it makes videos from photos.
-
-    Raises:
-        InputError: It is none of diffusers, has not the arguments of such pipelines, or needs a package.
-    """
+    """The class of the pipeline in a folder, if it makes videos from photos."""
     import diffusers
     from diffusers.pipelines.pipeline_utils import DiffusionPipeline
 
@@ -164,11 +156,7 @@ def _size(kind: Kind, control: Control) -> tuple[int, int]:
 
 
 def _own_frames(kind: Kind, control: Control) -> int:
-    """How many frames a model makes whose pipeline leaves that to its network, as SVD's does.
-
-    Raises:
-        InputError: Its network does not tell, and nor does ``--frames``.
-    """
+    """How many frames a model makes whose pipeline leaves that to its network, as SVD's does."""
     assert control.weights is not None  # by ``Prior.check``
     config = control.weights / "unet" / "config.json"
     told = read_json(config, "--weights").get("num_frames") if config.is_file() else None

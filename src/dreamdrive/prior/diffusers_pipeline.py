@@ -24,11 +24,7 @@ PROMPT = "The view ahead from a car that drives along a street."
 
 
 def class_name(folder: Path) -> str:
-    """The class of the pipeline in a folder.
-
-    Raises:
-        InputError: It is no folder of a pipeline, or the pipeline brings code of its own.
-    """
+    """The class of the pipeline in a folder."""
     index = folder / "model_index.json"
     if not index.is_file():
         raise InputError(
@@ -44,9 +40,6 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
     """A pipeline from its folder, on the GPU where there is one; nothing is downloaded or unpickled.
 
     ``options`` are further arguments of ``from_pretrained``.
-
-    Raises:
-        InputError: A part is missing, is of another kind or has no weights as ``.safetensors``.
     """
     gpu = chosen_device().type == "cuda"
     try:
@@ -69,11 +62,7 @@ def load(kind: Any, folder: Path, **options: Any) -> Any:
 
 
 def run(pipeline: Any, steps: int, progress: Progress, *, seed: int, **arguments: Any) -> Any:
-    """What a pipeline returns; its noise is drawn on the CPU, so that a seed is the same everywhere.
-
-    Raises:
-        InputError: It refuses an argument, or the GPU has not the memory.
-    """
+    """What a pipeline returns; its noise is drawn on the CPU, so that a seed is the same everywhere."""
 
     def tell(_: object, step: int, __: object, values: dict[str, Any]) -> dict[str, Any]:
         progress(step + 1, steps)
@@ -94,22 +83,14 @@ def run(pipeline: Any, steps: int, progress: Progress, *, seed: int, **arguments
 
 
 def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
-    """The picture that the video starts from.
-
-    Raises:
-        InputError: There is none, or it cannot be used.
-    """
+    """The picture that the video starts from."""
     if control.path is None:
         raise InputError(f"the prior {prior} needs an input: a photo, or a recording for its first frame")
     return read_photo(control.path, size, control.intrinsics, control.hfov_deg)
 
 
 def wanted_frames(control: Control, usual: int) -> tuple[int, Int[np.ndarray, " f"]]:
-    """How many frames to make, ``usual`` unless told, and which to keep, before anything is loaded or made.
-
-    Raises:
-        InputError: Fewer than two frames are selected, or none can be withheld of those.
-    """
+    """How many frames to make, ``usual`` unless told, and which to keep; before anything is loaded."""
     selection = Selection.parse(control.frames)
     count = usual if selection.stop is None or selection.stop <= 0 else selection.stop
     index = np.array(selection.resolve(count, "the video to be made"))
@@ -132,9 +113,6 @@ def make_clip(
 
     ``wanted`` is what ``wanted_frames`` gave; some models make fewer, as a whole number of latents. ``asked``
     is the path that was asked for, one pose a frame of the video.
-
-    Raises:
-        InputError: The frames are not finite, or too few were made.
     """
     check_finite(video, "frames")
     count, kept = wanted

@@ -17,9 +17,6 @@ def reduce(
     The first component has variance 1, the others keep their share of it; signs are such that the largest
     entry of a direction is positive, so that the same features always give the same numbers. There are at
     most as many components as features.
-
-    Raises:
-        ValueError: There are no frames, or no channels are asked for.
     """
     if not len(features) or channels < 1:
         raise ValueError(f"cannot keep {channels} components of {len(features)} frames")

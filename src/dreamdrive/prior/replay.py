@@ -14,9 +14,6 @@ def replay(control: Control, progress: Progress = silent) -> Clip:
     """Read a recording of any data set.
 
     Z_ref is ``features["appearance"]``, and what a file adds to it.
-
-    Raises:
-        InputError: There is no input, or it cannot be used.
     """
     if control.path is None:
         raise InputError("the prior replay needs an input: a video or a folder of images")

@@ -18,11 +18,7 @@ PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
 
 @contextmanager
 def enough_memory(advice: str) -> Generator[None]:
-    """Work that may find the GPU too small; ``advice`` is what to do then, for the message.
-
-    Raises:
-        InputError: The GPU has not the memory.
-    """
+    """Work that may find the GPU too small: then an InputError, with ``advice`` on what to do."""
     try:
         yield
     except torch.OutOfMemoryError as error:
@@ -30,11 +26,7 @@ def enough_memory(advice: str) -> Generator[None]:
 
 
 def check_finite(values: Tensor | Shaped[np.ndarray, "..."], what: str) -> None:
-    """Refuse what damaged weights, or numbers too large for their type, lead to; ``what`` the network made.
-
-    Raises:
-        InputError: A number is NaN or infinite.
-    """
+    """Refuse NaN and infinity, which damaged weights or overflow lead to; ``what`` the network made."""
     finite = torch.isfinite(values).all() if isinstance(values, Tensor) else np.isfinite(values).all()
     if not bool(finite):
         raise InputError(

@@ -27,9 +27,6 @@ def street_world(control: Control, progress: Progress = silent) -> Clip:
     """A clip of simulated frames, as a calibrated dashcam gives it; Z_ref is ``features["appearance"]``.
 
     The street is that of the layout ``control.path``, or one that ``control.seed`` decides.
-
-    Raises:
-        InputError: The layout is wrong, the size is odd, or the frames cannot be selected.
     """
     size = control.size or SIZE
     if size[0] % 2 or size[1] % 2:

@@ -9,7 +9,6 @@ import torch
 from tests.golden.reading import arrays, close
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.magicdrive.boxes import CLASSES, KINDS, as_published, box_corners, layout_boxes
 from dreamdrive.prior.magicdrive.cameras import (
     NUSCENES,
     car_from_camera,
@@ -18,8 +17,19 @@ from dreamdrive.prior.magicdrive.cameras import (
     map_from_car,
     rig,
 )
-from dreamdrive.prior.magicdrive.condition import prompt_of, see
-from dreamdrive.prior.magicdrive.raster import AREAS, CHANNELS, LINES, draw_map
+from dreamdrive.prior.magicdrive.condition import (
+    AREAS,
+    CHANNELS,
+    CLASSES,
+    KINDS,
+    LINES,
+    as_published,
+    box_corners,
+    draw_map,
+    layout_boxes,
+    prompt_of,
+    see,
+)
 from dreamdrive.scene.layout import (
     Area,
     AreaKind,

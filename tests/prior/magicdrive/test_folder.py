@@ -11,7 +11,7 @@ from safetensors.torch import load_file, save_file
 from tests.prior.magicdrive.tiny import WORDS, Written, write_folder
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.magicdrive import memory
+from dreamdrive.prior.magicdrive import folder as weights
 from dreamdrive.prior.magicdrive.folder import Parts, read_parts
 from dreamdrive.prior.magicdrive.networks import plain_settings
 
@@ -19,7 +19,7 @@ CPU = torch.device("cpu")
 
 
 def read(folder: Written, temporal: bool = False) -> Parts:
-    return read_parts(folder.path, temporal=temporal, device=CPU)
+    return read_parts(folder.path, temporal=temporal)
 
 
 def refused(folder: Written, message: str, temporal: bool = False) -> None:
@@ -154,6 +154,6 @@ def test_another_tokenizer_is_refused(folder: Written) -> None:
 def test_what_does_not_fit_into_memory_is_refused_before_loading(
     folder: Written, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(memory, "free_bytes", lambda device: 1_000_000)
+    monkeypatch.setattr(weights, "free_bytes", lambda device: 1_000_000)
     folder.weights("unet").write_bytes(b"never read")
     refused(folder, r"needs about 1\.\d GB with these weights, and this machine has 0\.0 GB free")

@@ -104,15 +104,14 @@ def test_everything_asked_for_has_a_say(once: Clip, inputs: Control, tmp_path: P
         assert np.abs(latents - once.latents).max() > 1e-4
 
 
-@pytest.mark.parametrize("where", ["run.sample", "sample.denoised"])
+@pytest.mark.parametrize("where", ["sample", "denoised"])
 def test_numbers_that_are_not_finite_are_refused(
     inputs: Control, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    from dreamdrive.prior.magicdrive import run, sample
+    from dreamdrive.prior.magicdrive import sample
 
-    module, name = {"run": run, "sample": sample}[where.split(".")[0]], where.split(".")[1]
-    right = getattr(module, name)
-    monkeypatch.setattr(module, name, lambda *given, **more: right(*given, **more) * np.nan)
+    right = getattr(sample, where)
+    monkeypatch.setattr(sample, where, lambda *given, **more: right(*given, **more) * np.nan)
     with pytest.raises(InputError, match="gave latents that hold NaN"):
         MAGICDRIVE(inputs)
 
@@ -121,7 +120,7 @@ def test_a_gpu_that_is_too_small_is_a_message(inputs: Control, monkeypatch: pyte
     def full(*given: object, **more: object) -> None:
         raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2 GiB")
 
-    monkeypatch.setattr("dreamdrive.prior.magicdrive.run.sample", full)
+    monkeypatch.setattr("dreamdrive.prior.magicdrive.sample.sample", full)
     with pytest.raises(InputError, match=r"memory does not suffice .*take the weights for 400x224"):
         MAGICDRIVE(inputs)
 
@@ -190,7 +189,7 @@ def test_importing_the_priors_loads_no_network_library() -> None:
 
 def test_a_missing_package_is_named(inputs: Control, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.startswith("dreamdrive.prior.magicdrive.")]:
-        if name.rsplit(".", 1)[1] in ("folder", "run"):
+        if name.rsplit(".", 1)[1] in ("folder", "sample"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "transformers", None)
     with pytest.raises(InputError, match=r"cannot start .*transformers.*video-prior"):

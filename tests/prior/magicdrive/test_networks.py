@@ -18,9 +18,8 @@ from torch import Tensor
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock, sparse_causal
 from dreamdrive.prior.magicdrive.condition import Conditions
 from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_settings
-from dreamdrive.prior.magicdrive.embed import MapEncoder, fourier
-from dreamdrive.prior.magicdrive.memory import needed_bytes
-from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised, multiview_unet
+from dreamdrive.prior.magicdrive.folder import needed_bytes
+from dreamdrive.prior.magicdrive.networks import BevControlNet, MapEncoder, denoised, fourier, multiview_unet
 from dreamdrive.prior.magicdrive.sample import sample, unipc
 
 FEATURES = 1e-5
@@ -63,7 +62,7 @@ def conditions(golden: Table) -> Conditions:
 
 
 def tokens(controlnet: BevControlNet, c: Conditions) -> Tensor:
-    return controlnet.tokens(c.text, c.cameras, c.corners_m, c.classes, c.present)
+    return controlnet.tokens(c)
 
 
 def test_golden_embedders(networks, conditions, golden) -> None:

@@ -9,8 +9,7 @@ from torch import Tensor, nn
 from dreamdrive.prior.vista.configs import config_of
 from dreamdrive.prior.vista.keys import UNET, Part, recipes_of
 from dreamdrive.prior.vista.kinds import VISTA
-from dreamdrive.prior.vista.networks import make_empty
-from dreamdrive.prior.vista.unet import VideoUNet
+from dreamdrive.prior.vista.networks import VideoUNet, make_empty
 
 _STATE = "vista/tiny_unet_state_fp16.safetensors"
 

@@ -16,8 +16,7 @@ from torch import Tensor
 from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS
-from dreamdrive.prior.action_to_path import path_of
-from dreamdrive.prior.path_to_action import waypoints
+from dreamdrive.prior.path import path_of, waypoints_by_round
 from dreamdrive.prior.vista.condition import numbers_of
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.memory import Job
@@ -96,7 +95,7 @@ def test_a_path_is_told_as_its_waypoints(
         "dreamdrive.prior.vista.make.numbers_of", lambda action: told.append(action) or numbers_of(action)
     )
     made = PRIORS["vista"](replace(control, frames="1:4", trajectory=tmp_path / "path.json"))
-    assert told == [waypoints(path)]
+    assert told == waypoints_by_round(path, np.zeros(1), 0.0)
     assert made.requested is not None
     np.testing.assert_allclose(made.requested.world_from_camera, path.world_from_camera[:3], atol=1e-9)
     assert made.known.world_from_camera is None
@@ -177,8 +176,8 @@ def test_what_it_cannot_use_is_refused(control: Control, changes: dict[str, obje
 def test_too_little_memory_is_told_before_anything_is_loaded(
     control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dreamdrive.prior.vista.load.free_bytes", lambda *device: 10_000_000)
-    monkeypatch.setattr("dreamdrive.prior.vista.networks.Networks._load", lambda *_: pytest.fail("loaded"))
+    monkeypatch.setattr("dreamdrive.prior.vista.engine.free_bytes", lambda *device: 10_000_000)
+    monkeypatch.setattr(Engine, "_load", lambda *_: pytest.fail("loaded"))
     with pytest.raises(InputError, match=r"0\.0 GB are free: no smaller size fits"):
         PRIORS["vista"](control)
 
@@ -187,10 +186,10 @@ def test_too_little_memory_is_told_before_anything_is_loaded(
 def test_memory_is_planned_for_all_frames_that_are_made(
     control: Control, monkeypatch: pytest.MonkeyPatch, frames: str, made: int
 ) -> None:
-    def stop(networks: object, job: Job) -> None:
+    def stop(engine: Engine, job: Job) -> None:
         raise InputError(f"{job.frames} of {job.per_round}")
 
-    monkeypatch.setattr("dreamdrive.prior.vista.make.check_fit", stop)
+    monkeypatch.setattr(Engine, "check_fit", stop)
     with pytest.raises(InputError, match=f"^{made} of {FRAMES}$"):
         PRIORS["vista"](replace(control, frames=frames))
 

@@ -9,10 +9,10 @@ from tests.golden.reading import cases, close, tensors
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from dreamdrive.prior.vista.decode import CHUNK, SHARED, chunks, decode_in_chunks
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import SVD, VISTA
-from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
+from dreamdrive.prior.vista.memory import CHUNK
+from dreamdrive.prior.vista.rollout import SCALE, SHARED, chunks, decode_in_chunks, roll_out, rounds_for
 from dreamdrive.prior.vista.sampler import Branches, Velocity
 
 FILE = "vista/rollout_standin.safetensors"

@@ -10,10 +10,8 @@ from torch import Tensor
 
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import VISTA
-from dreamdrive.prior.vista.networks import Networks
 from dreamdrive.prior.vista.sampler import (
     Branches,
-    Fixed,
     Schedule,
     Velocity,
     denoise,
@@ -63,8 +61,8 @@ def test_golden_runs_with_a_linear_network(name: str) -> None:
 
     scale = guidance(NAMES[guider], frames) if guider in NAMES else given[f"linear_scale_{frames}"].flatten()
     wanted = given[f"{name}.x_in"]
-    fixed = Fixed(mask_of(known, frames), given["cond_frame"])
-    made = sample(velocity, given["noise"], scale, fixed, len(wanted))
+    mask = mask_of(known, frames)
+    made = sample(velocity, given["noise"], scale, mask, given["cond_frame"], len(wanted))
     close(made, given[f"{name}.out"], LIMIT)
     for x, sigma, expected in zip(entered, sigmas(len(wanted)), wanted, strict=False):
         close(x * (sigma**2 + 1) ** 0.5, expected, LIMIT)
@@ -77,21 +75,20 @@ def mask_of(known: str, frames: int) -> Tensor:
     return mask
 
 
-class Held(Networks):
+class Held(Engine):
     """The golden UNet where a stored model would be."""
 
     def __init__(self, vector: Tensor) -> None:
         unet = golden_unet()
         unet.add_time_proj = Given(vector)  # type: ignore[assignment]
-        super().__init__(Stored(Path("golden"), VISTA, {}), torch.device("cpu"), half=False)
+        super().__init__(Stored(Path("golden"), VISTA, {}), torch.device("cpu"))
         self._held = "unet", unet
 
 
 def tiny_velocity(given: Table) -> Velocity:
     """What the engine makes of a round's conditions."""
     context, image = given["crossattn"][0, 0], unet_config()["context_dim"]
-    engine = Engine(Held(given["vector"][0]))
-    return engine.velocity(Seen(context[:image], given["concat"][0], context[image:]))
+    return Held(given["vector"][0]).velocity(Seen(context[:image], given["concat"][0], context[image:]))
 
 
 TINY = "vista/sampler_tiny_unet.safetensors"
@@ -111,5 +108,6 @@ def test_golden_engine_runs_with_a_tiny_unet(name: str) -> None:
     given = tensors(TINY)
     (guider, known), frames = name.split("_"), len(given["noise"])
     scale = guidance("constant" if guider == "vanilla" else "triangle", frames)
-    fixed, expected = Fixed(mask_of(known, frames), given["cond_frame"]), given[f"out.{name}"]
-    close(sample(tiny_velocity(given), given["noise"], scale, fixed, TINY_STEPS), expected, 2 * LIMIT)
+    velocity, mask = tiny_velocity(given), mask_of(known, frames)
+    made = sample(velocity, given["noise"], scale, mask, given["cond_frame"], TINY_STEPS)
+    close(made, given[f"out.{name}"], 2 * LIMIT)

@@ -11,8 +11,7 @@ from tests.prior.vista.tiny import configs
 from torch import Tensor
 
 from dreamdrive.prior.vista.kinds import SVD, VISTA
-from dreamdrive.prior.vista.networks import make_empty
-from dreamdrive.prior.vista.unet import VideoUNet, watch
+from dreamdrive.prior.vista.networks import VideoUNet, make_empty, watch
 
 LIMIT = 3e-5
 """Of the largest value; float32 differs by 2e-6 through all layers, and more where they are more."""

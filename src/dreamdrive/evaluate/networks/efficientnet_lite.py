@@ -85,11 +85,7 @@ class EfficientNetLite0(nn.Module):
 
 
 def load_efficientnet_lite0() -> EfficientNetLite0:
-    """The network with the weights of the installed package; its classifier is not used.
-
-    Raises:
-        MissingWeightsError: The package is not installed.
-    """
+    """The network with the weights of the installed package; its classifier is not used."""
     return load_network(EfficientNetLite0, FILE.locate(), FILE.path, ignored=("_fc.",))
 
 

@@ -90,11 +90,7 @@ class I3d(nn.Module):
 
 
 def load_i3d(path: Path) -> I3d:
-    """The network with the weights of a file.
-
-    Raises:
-        InputError: The file is not that of the network.
-    """
+    """The network with the weights of a file."""
     return load_network(I3d, path, FILE)
 
 
@@ -105,11 +101,7 @@ def prepare(frames: UInt8[Tensor, "t h w 3"]) -> Float[Tensor, "1 3 t 224 224"]:
 
 
 def i3d_features(network: I3d, frames: UInt8[Tensor, "t h w 3"]) -> Float[Tensor, " 400"]:
-    """Features for FVD of one clip of RGB frames: the logits.
-
-    Raises:
-        InputError: The clip has fewer than 9 frames.
-    """
+    """Features for FVD of one clip of RGB frames: the logits."""
     if len(frames) < MIN_FRAMES:
         raise InputError(
             f"FVD needs clips of {MIN_FRAMES} frames or more, got {len(frames)}; use longer ones"

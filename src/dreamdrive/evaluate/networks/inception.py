@@ -183,11 +183,7 @@ class Inception(nn.Module):
 
 
 def load_inception(path: Path) -> Inception:
-    """The network with the weights of a file; its classifier is not used.
-
-    Raises:
-        InputError: The file is not that of the network.
-    """
+    """The network with the weights of a file; its classifier is not used."""
     return load_network(Inception, path, FILE, ignored=("fc.",))
 
 

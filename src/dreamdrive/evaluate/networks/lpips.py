@@ -127,11 +127,7 @@ TRUNKS = {"vgg": vgg, "alex": alex}
 
 
 def load_lpips(trunk: Path, heads: Path) -> PerceptualDistance:
-    """LPIPS with the weights of two files; which network it is follows from the trunk.
-
-    Raises:
-        InputError: A file is not what is expected, or they are of different networks.
-    """
+    """LPIPS with the weights of two files; which network it is follows from the trunk."""
     state = {k: v for k, v in read_state(trunk, TRUNK_FILE).items() if not k.startswith("classifier.")}
     first = state.get("features.0.weight")
     kind = {3: "vgg", 11: "alex"}.get(0 if first is None else first.shape[-1])

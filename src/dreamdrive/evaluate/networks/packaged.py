@@ -29,11 +29,7 @@ class PackagedFile:
     install: str
 
     def locate(self) -> Path:
-        """Where the file is.
-
-        Raises:
-            MissingWeightsError: The package is not installed, or its file is another.
-        """
+        """Where the file is; MissingWeightsError where the package is missing or the file is another."""
         try:
             found = Path(str(metadata.distribution(self.package).locate_file(self.path)))
         except metadata.PackageNotFoundError:
@@ -45,11 +41,7 @@ class PackagedFile:
         return found
 
     def checked(self, path: Path) -> Path:
-        """A copy of the file that lies elsewhere.
-
-        Raises:
-            InputError: It cannot be read, or holds something else.
-        """
+        """A copy of the file that lies elsewhere; InputError where it is unreadable or another."""
         got = sha256(path)
         if got != self.sha256:
             raise InputError(

@@ -60,11 +60,7 @@ TRUNKS = {"alex": alex, "vgg": vgg}
 
 
 def load_stlpips(kind: str) -> PerceptualDistance:
-    """``alex`` or ``vgg`` with the weights of the installed package; it takes images in [-1, 1].
-
-    Raises:
-        MissingWeightsError: The package is not installed.
-    """
+    """``alex`` or ``vgg`` with the weights of the installed package; it takes images in [-1, 1]."""
     path = FILES[kind].locate()
     trunk: dict[str, Tensor] = {}
     heads: dict[str, Tensor] = {}

@@ -123,12 +123,7 @@ class TransNet(nn.Module):
 
 
 def load_transnet(path: Path | None = None) -> TransNet:
-    """The network with the weights of a file or of the installed package; its classifiers are not used.
-
-    Raises:
-        MissingWeightsError: The package is not installed.
-        InputError: The file is not the one that figures are defined by.
-    """
+    """The network with the weights of a file or of the installed package; its classifiers are not used."""
     found = FILE.locate() if path is None else FILE.checked(path)
     return load_network(TransNet, found, FILE.path, ignored=("cls_layer1.", "cls_layer2."))
 

@@ -84,11 +84,7 @@ def full_intrinsics(camera: Mounted) -> Float[np.ndarray, "3 3"]:
 
 
 def rig(size: tuple[int, int]) -> tuple[Camera, ...]:
-    """Pinholes of the pictures that the network makes, their poses relative to the front camera.
-
-    Raises:
-        InputError: There is no such part of the full picture.
-    """
+    """Pinholes of the pictures that the network makes, their poses relative to the front camera."""
     scale, left, top = crop(size)
     front_from_car = np.linalg.inv(car_from_camera(NUSCENES[0]))
     cameras = [
@@ -111,9 +107,6 @@ def crop(size: tuple[int, int]) -> tuple[float, float, float]:
 
     The bottom is kept and the sides are cut alike: 400x224 is a quarter of the full size without its first
     row, 800x424 half of it without 26 rows, 736x272 half of it without 178 rows and 32 columns on each side.
-
-    Raises:
-        InputError: The size is larger than what is cut from.
     """
     width, height = size
     scale = 0.5 if size == (736, 272) else width / FULL_SIZE[0]

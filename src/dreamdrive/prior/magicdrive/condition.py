@@ -1,13 +1,14 @@
-"""From a layout to what MagicDrive's networks read."""
+"""From a layout to what MagicDrive's networks read: its map as a raster, its road users as corners, words."""
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int
 from torch import Tensor
 
-from dreamdrive.prior.magicdrive.boxes import as_published, layout_boxes, listed
+from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.cameras import (
     NUSCENES,
     car_from_camera,
@@ -15,13 +16,67 @@ from dreamdrive.prior.magicdrive.cameras import (
     full_intrinsics,
     map_from_car,
 )
-from dreamdrive.prior.magicdrive.raster import draw_map
-from dreamdrive.scene.layout import Layout
+from dreamdrive.scene.layout import AreaKind, BoxKind, Layout, LineKind, track_function
+from dreamdrive.world import upright
 
 LOCATION = "boston-seaport"
 """Where nuScenes was recorded that drives on the right, as drawn streets do."""
 DESCRIPTION = "City street, parked cars, houses, sunny"
 """What is seen unless told, in the manner of nuScenes' descriptions."""
+CLASSES = (
+    "car",
+    "truck",
+    "construction_vehicle",
+    "bus",
+    "trailer",
+    "barrier",
+    "motorcycle",
+    "bicycle",
+    "pedestrian",
+    "traffic_cone",
+)
+"""Of boxes, in the order of the network's class tokens."""
+KINDS: dict[BoxKind, str] = {
+    "car": "car",
+    "van": "car",  # nuScenes counts vans among the cars
+    "truck": "truck",
+    "bicycle": "bicycle",
+    "pedestrian": "pedestrian",
+}
+_UNIT = np.array(
+    [[1, -1, 0], [1, -1, 1], [-1, -1, 1], [-1, -1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1], [-1, 1, 0]]
+) * [0.5, 0.5, 1.0]
+"""Corners in the network's order, of a box that stands on its origin: x ahead, y left, z up."""
+CHANNELS = (
+    "drivable_area",
+    "ped_crossing",
+    "walkway",
+    "stop_line",
+    "carpark_area",
+    "road_divider",
+    "lane_divider",
+    "road_block",
+)
+"""Of the raster, in the network's order. Layouts have no road blocks: that channel is always empty."""
+RANGE_M = 100.0
+"""Side of the square around the LiDAR that the raster shows."""
+AREAS: dict[AreaKind, tuple[str, ...]] = {
+    "road": ("drivable_area",),
+    "crossing": ("drivable_area", "ped_crossing"),
+    "parking": ("drivable_area", "carpark_area"),
+    "sidewalk": ("walkway",),
+    "grass": (),
+}
+"""Which channels an area fills; it clears those of other areas, since later areas lie on earlier ones."""
+LINES: dict[LineKind, str | None] = {
+    "lane_divider": "lane_divider",
+    "road_divider": "road_divider",
+    "stop_line": "stop_line",
+    "road_edge": None,
+}
+"""Which channel a line is drawn in; nuScenes has none along the edge of the road."""
+_LINE_CELLS = 2
+"""Width of a line, as the devkit of nuScenes draws it."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +153,75 @@ def see(
 
 def _rounded(values: np.ndarray) -> Float32[np.ndarray, "..."]:
     return values.astype(np.float16).astype(np.float32)
+
+
+def box_corners(
+    lidar_from_box: Float[np.ndarray, "b 4 4"], size_m: Float[np.ndarray, "b 3"]
+) -> Float[np.ndarray, "b 8 3"]:
+    """Corners of boxes by the poses of the middle of their footprints, and length, width and height."""
+    local = _UNIT * size_m[:, None]
+    return local @ np.swapaxes(lidar_from_box[:, :3, :3], 1, 2) + lidar_from_box[:, None, :3, 3]
+
+
+def layout_boxes(
+    layout: Layout, lidar_from_map: Float[np.ndarray, "4 4"], time_s: float
+) -> tuple[Float[np.ndarray, "b 8 3"], Int[np.ndarray, " b"]]:
+    """True corners of all boxes at a time, and their classes."""
+    places = [track_function(box.track)(np.array([time_s]))[0] for box in layout.boxes]
+    poses = np.array([lidar_from_map @ upright(place) for place in places]).reshape(-1, 4, 4)
+    sizes = np.array([box.size_m for box in layout.boxes], dtype=np.float64).reshape(-1, 3)
+    classes = np.array([CLASSES.index(KINDS[box.kind]) for box in layout.boxes], dtype=np.int64)
+    return box_corners(poses, sizes), classes
+
+
+def as_published(corners_m: Float[np.ndarray, "b 8 3"]) -> Float[np.ndarray, "b 8 3"]:
+    """Corners as the published networks were taught: half a box height too high.
+
+    nuScenes tells the centre of a box, and the authors' data path takes it for the bottom.
+    """
+    raised = corners_m.copy()
+    raised[..., 2] += 0.5 * np.ptp(corners_m[..., 2], axis=1, keepdims=True)
+    return raised
+
+
+def listed(
+    corners_m: Float[np.ndarray, "b 8 3"], camera_from_lidar: Float[np.ndarray, "n 4 4"]
+) -> Bool[np.ndarray, "n b"]:
+    """Which camera lists which box: those with a true corner before it, inside the picture or not."""
+    depth = np.einsum("nd,bkd->nbk", camera_from_lidar[:, 2, :3], corners_m)
+    return (depth + camera_from_lidar[:, 2, 3, None, None] > 0).any(axis=-1)
+
+
+def check_map(layout: Layout, name: str) -> None:
+    """Refuse a map without a road, without which the pictures would show no street."""
+    if not any(area.kind == "road" for area in layout.areas):
+        raise InputError(f"{name}: no area is of kind road, which MagicDrive's map needs; add one to $.areas")
+
+
+def draw_map(
+    layout: Layout, lidar_from_map: Float[np.ndarray, "4 4"], cells: int
+) -> Float32[np.ndarray, "8 x y"]:
+    """The raster of one time step: areas and lines, 0 or 1 for each channel; nothing that moves is drawn.
+
+    Rows go from left to right of the car, columns from back to front.
+    """
+    layers = {name: np.zeros((cells, cells), dtype=np.uint8) for name in CHANNELS}
+    surfaces = {name for names in AREAS.values() for name in names}
+
+    def placed(points: list[tuple[float, float]]) -> np.ndarray:
+        across = np.asarray(points) @ lidar_from_map[:2, :2].T + lidar_from_map[:2, 3]
+        pixels = np.round((across / RANGE_M + 0.5) * cells).astype(np.int32)
+        return pixels[:, ::-1]  # OpenCV takes the column first, which is the way ahead
+
+    for area in layout.areas:
+        rings = [placed(ring) for ring in (area.polygon, *area.holes)]
+        for name in surfaces:
+            cv2.fillPoly(layers[name], rings, int(name in AREAS[area.kind]))
+    for line in layout.lines:
+        channel = LINES[line.kind]
+        if channel is not None:
+            cv2.polylines(layers[channel], [placed(line.points)], False, 1, _LINE_CELLS)
+    return np.stack([layers[name] for name in CHANNELS]).astype(np.float32)
 
 
 def prompt_of(description: str | None) -> str:

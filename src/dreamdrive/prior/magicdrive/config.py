@@ -5,9 +5,8 @@ from typing import Any
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.checked import build
-from dreamdrive.prior.magicdrive.boxes import CLASSES
 from dreamdrive.prior.magicdrive.cameras import NUSCENES, crop
-from dreamdrive.prior.magicdrive.raster import CHANNELS
+from dreamdrive.prior.magicdrive.condition import CHANNELS, CLASSES
 
 EXPECTED = (
     "a folder with unet/ and controlnet/ of MagicDrive (of MagicDrive-t for --prior magicdrive-t) and "
@@ -81,11 +80,7 @@ class Settings:
 
 
 def read_settings(unet: dict[str, Any], controlnet: dict[str, Any]) -> Settings:
-    """What ``config.json`` of unet and controlnet say beyond what diffusers' classes take.
-
-    Raises:
-        InputError: Plain Stable Diffusion, or a variant that is not built here.
-    """
+    """What ``config.json`` of unet and controlnet say beyond what diffusers' classes take."""
     if "neighboring_view_pair" not in unet:
         raise InputError(f"unet/config.json has no neighboring_view_pair: {_PLAIN_SD}")
     if "bbox_embedder_param" not in controlnet:

@@ -16,9 +16,9 @@ from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
+from dreamdrive.machine import free_bytes
 from dreamdrive.models import check_sizes, fill, read_state, sha256
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
-from dreamdrive.prior.magicdrive.memory import check_memory, needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings
 
 _DIFFUSERS = tuple(f"diffusion_pytorch_model.{end}" for end in ("safetensors", "fp16.safetensors", "bin"))
@@ -34,6 +34,15 @@ _PARTS = {
 _OLD_NAME = re.compile(r"(?<=\.)(query|key|value|proj_attn)(?=\.)")
 _NEW_NAMES = {"query": "to_q", "key": "to_k", "value": "to_v", "proj_attn": "to_out.0"}
 """Of the attention in autoencoders that were written before 2023, as that of Stable Diffusion 1.5."""
+_UNET_TENSORS = 33
+"""Tensors of the UNet's first level that live at once, residuals included: counted at the official sizes,
+without the weights of attention, which torch does not keep."""
+_DECODED_CHANNELS = 800
+"""Channels that live at once in the decoder, per pixel of the picture: counted likewise."""
+_PROGRAM_BYTES = 1_000_000_000
+"""Of Python, the libraries and what convolutions set aside; a guess."""
+DECODE_PICTURES = 2
+"""Pictures that are decoded at a time."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +92,10 @@ def vae_stride(vae: AutoencoderKL) -> int:
     return 2 ** (len(vae.config["block_out_channels"]) - 1)
 
 
-def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = None) -> Parts:
+def read_parts(folder: Path, *, temporal: bool) -> Parts:
     """Load a folder (see ``EXPECTED``); nothing in it is executed, nothing is fetched.
 
     On a GPU the networks run in half precision, elsewhere in float32.
-
-    Raises:
-        InputError: Parts are missing or damaged, are of another model or variant, or do not fit into memory.
     """
     files = _find_parts(folder)
     configs = {
@@ -101,7 +107,7 @@ def read_parts(folder: Path, *, temporal: bool, device: torch.device | None = No
         check_sizes(config, f"--weights {folder / part / _PARTS[part][0]}")
     settings = read_settings(configs["unet"], configs["controlnet"])
     _check_variant(settings, temporal)
-    device = device or chosen_device()
+    device = chosen_device()
     dtype = torch.float16 if device.type == "cuda" else torch.float32
     with torch.device("meta"):
         unet = _built("unet", lambda: multiview_unet(configs["unet"], settings))
@@ -213,3 +219,26 @@ def _tokenizer(folder: Path) -> CLIPTokenizer:
         return CLIPTokenizer.from_pretrained(str(folder), local_files_only=True)
     except Exception as error:  # the one broad except: tokenizers raises no narrower one
         raise InputError(f"{folder} is no tokenizer of CLIP ({error}); expected {EXPECTED}") from error
+
+
+def needed_bytes(networks: list[nn.Module], settings: Settings, width: int, element_bytes: int) -> int:
+    """Estimate of the peak: all weights, and the larger of one denoising branch and one chunk of the decoder.
+
+    ``width`` is that of the UNet's first level; parameters may be on the meta device.
+    """
+    pixels = settings.size[0] * settings.size[1]
+    parameters = sum(each.numel() for network in networks for each in network.parameters())
+    branch = _UNET_TENSORS * width * (pixels // 64) * settings.views * settings.frames
+    decoding = _DECODED_CHANNELS * pixels * DECODE_PICTURES
+    return element_bytes * (parameters + max(branch, decoding)) + _PROGRAM_BYTES
+
+
+def check_memory(needed: int, device: torch.device) -> None:
+    """Refuse what cannot fit."""
+    free = free_bytes(device)
+    if free is not None and needed > free:
+        where = "the GPU" if device.type == "cuda" else "this machine"
+        raise InputError(
+            f"MagicDrive needs about {needed / 1e9:.1f} GB with these weights, and {where} has "
+            f"{free / 1e9:.1f} GB free; close other programs or take a larger machine"
+        )

@@ -13,9 +13,8 @@ from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.magicdrive.cameras import NUSCENES, car_from_camera, map_from_car, rig
-from dreamdrive.prior.magicdrive.condition import prompt_of
+from dreamdrive.prior.magicdrive.condition import check_map, prompt_of
 from dreamdrive.prior.magicdrive.config import EXPECTED
-from dreamdrive.prior.magicdrive.raster import check_map
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE, enough_memory
 from dreamdrive.progress import Progress, silent
@@ -39,9 +38,6 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
     """Six pictures of every time step, each of them sampled by itself, or all together.
 
     Always sampled together is the whole length of the weights, at 12 Hz from the layout's time 0.
-
-    Raises:
-        InputError: The layout or the weights cannot be used, or they do not fit into memory.
     """
     layout, weights = _inputs(control)
     wanted = None if temporal else _time_steps(control, None)
@@ -50,7 +46,7 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
         raise InputError(f"--fps {rate_hz:g}: expected more than 0")
     try:
         from dreamdrive.prior.magicdrive.folder import read_parts
-        from dreamdrive.prior.magicdrive.run import Run, generate
+        from dreamdrive.prior.magicdrive.sample import Run, generate
     except ImportError as error:
         raise InputError(f"the prior magicdrive cannot start ({error}): {INSTALL}") from None
     with enough_memory("take the weights for 400x224, which need least, or a GPU with more memory"):

@@ -1,7 +1,8 @@
-"""Sampling: UniPC with guidance, each branch by itself to save memory, and the decoder in chunks."""
+"""From a layout and loaded networks to pictures and their latents: UniPC with guidance, then the decoder."""
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -12,10 +13,12 @@ from diffusers.schedulers.scheduling_unipc_multistep import UniPCMultistepSchedu
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dreamdrive.prior.magicdrive.condition import Conditions
-from dreamdrive.prior.magicdrive.memory import DECODE_PICTURES
+from dreamdrive.prior.magicdrive.condition import Conditions, see
+from dreamdrive.prior.magicdrive.folder import DECODE_PICTURES, Parts
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised
-from dreamdrive.prior.running import check_finite
+from dreamdrive.prior.running import check_finite, counted
+from dreamdrive.progress import Progress
+from dreamdrive.scene.layout import Layout
 
 GUIDANCE = 2.0
 _SCHEDULE = (
@@ -26,6 +29,77 @@ _SCHEDULE = (
     "trained_betas",
     "prediction_type",
 )
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one run samples: time steps at ``rate_hz``, from start noise of the seed."""
+
+    layout: Layout
+    parts: Parts
+    prompt: str
+    steps: int
+    seed: int
+    rate_hz: float
+
+    def about(self) -> dict[str, Any]:
+        """The settings, for the clip's provenance."""
+        return {
+            "seed": self.seed,
+            "steps": self.steps,
+            "guidance": GUIDANCE,
+            "prompt": self.prompt,
+            "rate_hz": self.rate_hz,
+            "weights": self.parts.digests,
+        }
+
+
+def generate(
+    run: Run, wanted: np.ndarray, progress: Progress
+) -> tuple[UInt8[np.ndarray, "f h w 3"], Float[np.ndarray, "f _ _ _"]]:
+    """Frames and latents of time steps, by time, then camera.
+
+    The temporal variant samples all time steps of its length, others each wanted one by itself.
+    """
+    together = run.parts.settings.frames
+    sampled = wanted if together == 1 else np.arange(together)
+    tell = counted(progress, len(sampled) // together * run.steps + len(wanted))
+    parts = run.parts
+    clips = [_sampled(run, steps / run.rate_hz, tell) for steps in sampled.reshape(-1, together)]
+    by_time = torch.cat(clips).unflatten(0, (-1, parts.settings.views))
+    check_finite(by_time, "latents")
+    kept = by_time[np.searchsorted(sampled, wanted).tolist()]
+    pictures: list[np.ndarray] = []
+    for latents in kept:
+        pictures.append(decode(parts.vae, latents))
+        tell()
+    return np.concatenate(pictures), kept.flatten(0, 1).permute(0, 2, 3, 1).cpu().numpy()
+
+
+def _sampled(
+    run: Run, times_s: Float[np.ndarray, " t"], tell: Callable[[], None]
+) -> Float[Tensor, "bn c h w"]:
+    """Latents of time steps that are sampled together."""
+    parts = run.parts
+    conditions = see(run.layout, times_s, parts.settings.map_shape[1], parts.words(run.prompt))
+    no_words = parts.words("").expand_as(conditions.text)
+    branches = conditions, conditions.without(parts.controlnet.null_camera, no_words)
+    scheduler = unipc(parts.scheduler, run.steps, parts.device)
+    noise = start_noise(run).to(parts.device)
+    return sample(parts.unet, parts.controlnet, branches, noise, scheduler, done=tell)
+
+
+def start_noise(run: Run) -> Float[Tensor, "bn c h w"]:
+    """Noise of the pictures that are sampled together.
+
+    One for all cameras, and, since it depends on the seed alone, for all time steps that are sampled by
+    themselves; the temporal variant learned from noise of its own for each picture.
+    """
+    random = torch.Generator().manual_seed(run.seed)
+    settings, shape = run.parts.settings, run.parts.latent_shape
+    count = settings.frames * settings.views
+    noise = torch.randn((1 if settings.temporal is None else count, *shape), generator=random)
+    return noise.expand(count, -1, -1, -1)
 
 
 def unipc(table: dict[str, Any], steps: int, device: torch.device | str = "cpu") -> UniPCMultistepScheduler:
@@ -58,10 +132,7 @@ def sample(
     """
     dtype = unet.dtype
     rasters = [branch.raster.to(dtype) for branch in branches]
-    tokens = [
-        controlnet.tokens(each.text.to(dtype), each.cameras, each.corners_m, each.classes, each.present)
-        for each in branches
-    ]
+    tokens = [controlnet.tokens(branch) for branch in branches]
     latents = noise
     for time in scheduler.timesteps:
         seen = latents.to(dtype)
@@ -77,11 +148,7 @@ def sample(
 
 @torch.inference_mode()
 def decode(vae: AutoencoderKL, latents: Float[Tensor, "bn c h w"]) -> UInt8[np.ndarray, "bn _ _ 3"]:
-    """Pictures of latents, a few at a time.
-
-    Raises:
-        InputError: They are not finite.
-    """
+    """Pictures of latents, a few at a time."""
     scaled = (latents / vae.config["scaling_factor"]).to(vae.dtype)
     pictures: list[np.ndarray] = []
     for chunk in scaled.split(DECODE_PICTURES):

@@ -15,9 +15,6 @@ def config_of(part: Part, shapes: Shapes, head: int = _HEAD) -> dict[str, Any]:
     """The configuration of a part from its tensors by the names of diffusers and transformers.
 
     ``head`` is the width of an attention head in the UNet.
-
-    Raises:
-        KeyError: Tensors that tell the size are missing.
     """
     if part == "unet":
         return _unet(shapes, head)

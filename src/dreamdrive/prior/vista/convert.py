@@ -13,16 +13,14 @@ from torch import Tensor
 from dreamdrive.choices import DtypeName
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
+from dreamdrive.prior.running import counted
 from dreamdrive.prior.vista.configs import Shapes
 from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
 from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
 from dreamdrive.progress import Progress, silent
 
-_DTYPES: dict[str, tuple[torch.dtype, str, int]] = {
-    "float16": (torch.float16, "F16", 2),
-    "float32": (torch.float32, "F32", 4),
-}
+_DTYPES = {"float16": (torch.float16, "F16"), "float32": (torch.float32, "F32")}
 _CLASSES: dict[Part, dict[str, str]] = {
     "unet": {"_class_name": "UNetSpatioTemporalConditionModel"},
     "vae": {"_class_name": "AutoencoderKLTemporalDecoder"},
@@ -63,32 +61,21 @@ def convert(
         raise InputError(f"{file} has diffusers' layout already; --weights takes it as it is")
     stored = open_weights(file)
     notes = notes_of(stored)
-    total, done = sum(len(stored.parts[part].shapes) for part in PARTS), 0
+    tell = counted(progress, sum(len(stored.parts[part].shapes) for part in PARTS))
     with new_folder(folder, replace=replace, mark=NOTE) as partial:
         for part in PARTS:
             own = stored.parts[part]
             (partial / part).mkdir()
             config = json.dumps(_CLASSES[part] | own.config, indent=1)
             (partial / part / "config.json").write_text(config + "\n")
-            start = done
-
-            def tell(count: int, start: int = start) -> None:
-                progress(start + count, total)
-
-            write_tensors(
-                partial / part / FILES[part][0],
-                own.shapes,
-                own.read,
-                "float32" if part == "vae" else dtype,
-                tell,
-            )
-            done += len(own.shapes)
+            stored_as = "float32" if part == "vae" else dtype
+            write_tensors(partial / part / FILES[part][0], own.shapes, own.read, stored_as, tell)
         note = {"kind": stored.kind.name, "dtype": dtype, "from": stored.path.name, "notes": notes}
         (partial / NOTE).write_text(json.dumps(note, indent=1) + "\n")
-    counted = {
+    ignored = {
         what: sum(bool(pattern.match(key)) for key in stored.ignored) for what, pattern in IGNORED.items()
     }
-    return Converted(stored, {what: count for what, count in counted.items() if count}, notes)
+    return Converted(stored, {what: count for what, count in ignored.items() if count}, notes)
 
 
 def write_tensors(
@@ -96,28 +83,25 @@ def write_tensors(
     shapes: Shapes,
     read: Callable[[str], Tensor],
     dtype: DtypeName,
-    tell: Callable[[int], None] = lambda count: None,
+    tell: Callable[[], None] = lambda: None,
 ) -> None:
     """Write a ``.safetensors``: length and text of the header, then the numbers, as each tensor is read.
 
-    The library's own writer wants all tensors at once. ``tell`` is told how many are written.
-
-    Raises:
-        InputError: A number is too large for the type, or not finite.
+    The library's own writer wants all tensors at once. ``tell`` is called after each.
     """
-    kind, code, width = _DTYPES[dtype]
+    kind, code = _DTYPES[dtype]
     header: dict[str, Any] = {"__metadata__": {"format": "pt"}}
     end = 0
     for name, shape in shapes.items():
-        begin, end = end, end + width * torch.Size(shape).numel()
+        begin, end = end, end + kind.itemsize * torch.Size(shape).numel()
         header[name] = {"dtype": code, "shape": list(shape), "data_offsets": [begin, end]}
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 8)
     with path.open("wb") as file:
         file.write(struct.pack("<Q", len(text)) + text)
-        for count, name in enumerate(shapes, start=1):
+        for name in shapes:
             value = read(name).to(kind).contiguous()
             if not bool(torch.isfinite(value).all()):
                 raise InputError(f"{name} holds numbers that are not finite in {dtype}; try --dtype float32")
             file.write(value.numpy().tobytes())
-            tell(count)
+            tell()

@@ -23,11 +23,7 @@ _SAME = 1e-3  # of a tensor's largest number: the rounding of half precision
 
 
 def notes_of(stored: Stored) -> list[str]:
-    """What has to be said of a model's encoders, a sentence each: nothing where one does the work of both.
-
-    Raises:
-        InputError: The file's encoders do not have one form.
-    """
+    """What has to be said of a model's encoders, a sentence each: nothing where one does the work of both."""
     if stored.path.is_dir():
         note = stored.path / NOTE
         said = read_json(note, "--weights").get("notes") if note.is_file() else None
@@ -46,9 +42,6 @@ def encoder_difference(path: Path) -> float | None:
     """How far the encoders of a single file are apart: the largest difference over a tensor's largest number.
 
     None where there is no second encoder.
-
-    Raises:
-        InputError: They have different tensors.
     """
     shapes, read = open_tensors(path)
     names = {

@@ -16,18 +16,19 @@ import torch
 from jaxtyping import Float, Float16, UInt8
 from torch import Tensor
 
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import SVD
-from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
+from dreamdrive.prior.vista.networks import watch
 from dreamdrive.prior.vista.picture import NATIVE, check_size, nearest_side, to_images
 from dreamdrive.prior.vista.rollout import SCALE
 from dreamdrive.prior.vista.sampler import time_of
-from dreamdrive.prior.vista.unet import watch
+from dreamdrive.prior.vista.stored import open_weights
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.action import Action, check_action
 
@@ -73,7 +74,7 @@ class Window:
 
     Attributes:
         span: Which.
-        action: Columns of the action (A,); None for SVD, which knows of none.
+        action: Columns of the action; None for SVD, which knows of none.
         fixed: How many of the first frames count as known.
     """
 
@@ -110,25 +111,24 @@ def video_features(
     height, width = frames.shape[1:3]
     seen_size = size or _nearest((width, height))
     check_size(seen_size)
-    networks = open_networks(weights, None)
-    kind = networks.stored.kind
-    _check_block(networks.stored.parts["unet"].shapes, chosen.block)
+    engine = Engine(open_weights(weights), chosen_device())
+    kind = engine.stored.kind
+    _check_block(engine.stored.parts["unet"].shapes, chosen.block)
     if action is not None:
         if kind is SVD:
             raise InputError(f"--action: {kind.title} knows of none; leave it out, or give weights of Vista")
         check_action(action)
-    check_fit(networks, Job(seen_size, len(frames), networks.per_round, LOOKING))
-    spans = spans_of(len(frames), networks.per_round)
+    engine.check_fit(Job(seen_size, len(frames), engine.per_round, LOOKING))
+    spans = spans_of(len(frames), engine.per_round)
     told = [None] * len(spans) if kind is SVD else columns_by_round(action, len(spans))
     windows = [Window(span, columns, int(kind is not SVD)) for span, columns in zip(spans, told, strict=True)]
     resized = np.stack([_resize(each, seen_size) for each in frames])
     smaller = "x".join(map(str, smaller_size(seen_size)))
     with torch.inference_mode(), enough_memory(f"choose a smaller --size, such as {smaller}"):
-        engine = Engine(networks)
         coded = [engine.encode(to_images(resized[i : i + 1])).cpu() for i in range(len(resized))]
         tell = counted(progress, len(windows))
         values = extract(engine, SCALE * torch.cat(coded), resized, windows, chosen, seed=seed, tell=tell)
-    networks.free()
+    engine.free()
     values, said = _onto_clip(values, (width, height))
     if seen_size != (width, height):
         shown = f"{seen_size[0]}x{seen_size[1]} instead of {width}x{height}"
@@ -150,9 +150,6 @@ def extract(
 
     ``latents`` of all frames are scaled and clean; of the frames, the first of each window is described. Of
     frames in two windows, which are in order, the first one counts. ``tell`` is called after every window.
-
-    Raises:
-        InputError: The features are not finite.
     """
     chosen = options or FeatureOptions()
     described = [engine.describe(to_images(frames[w.span.start : w.span.start + 1])) for w in windows]
@@ -186,9 +183,9 @@ def _activations(
     mask[:fixed] = 1
     noisy = latents + options.sigma * noise * (1 - mask)[:, None, None, None]
     caught: list[Tensor] = []
-    handle = watch(engine.networks.unet(), options.block, caught.append)
+    handle = watch(engine.network("unet"), options.block, caught.append)
     try:
-        scaled = (noisy / (options.sigma**2 + 1) ** 0.5).to(engine.networks.device)
+        scaled = (noisy / (options.sigma**2 + 1) ** 0.5).to(engine.device)
         engine.look(seen, scaled, time_of(options.sigma), mask.to(scaled))
     finally:
         handle.remove()

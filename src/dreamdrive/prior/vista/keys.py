@@ -36,7 +36,7 @@ class Recipe:
         columns: Key of another one that is put beside it, along dimension 1.
         third: Which third of the rows it is.
         transposed: Whether rows and columns change places.
-        flat: Whether it is a 1x1 convolution that is applied as a matrix.
+        flat: Whether a 1x1 convolution, of which it may be the weight, is applied as a matrix.
         low_rank: Keys of U and D whose product is added (LoRA of rank r, scale 1).
     """
 
@@ -48,11 +48,7 @@ class Recipe:
     low_rank: tuple[str, str] | None = None
 
     def make(self, get: Callable[[str], Tensor]) -> Tensor:
-        """The tensor.
-
-        Args:
-            get: Reads a tensor of the file by its key.
-        """
+        """The tensor; ``get`` reads one of the file by its key."""
         value = get(self.source)
         if self.low_rank is not None:
             up, down = (get(key).float() for key in self.low_rank)
@@ -158,7 +154,8 @@ def _translate(key: str, per_level: int, top: int) -> tuple[Part, dict[str, Reci
     if key.startswith(_VISUAL):
         return "image_encoder", _visual(key)
     if key.startswith((_CONDITION, _DECODER)):
-        return "vae", _autoencoder(key, top)
+        name = _autoencoder(key, top)
+        return "vae", {} if name is None else {name: Recipe(key, flat=".mid.attn_1." in key)}
     name = _unet(key.removeprefix(UNET), per_level) if key.startswith(UNET) else None
     return "unet", {} if name is None else {name: Recipe(key)}
 
@@ -182,51 +179,44 @@ def _unet(name: str, per_level: int) -> str | None:
     if attends:
         inner = _swap(rest, _TIME) or re.sub(r"^time_stack\.", "temporal_transformer_blocks.", rest)
         return f"{place}.attentions.{block}.{inner}"
-    inner = _residual(rest, _RESIDUAL)
-    return None if inner is None else f"{place}.resnets.{block}.{inner}"
+    return _residual(f"{place}.resnets.{block}.", rest, _RESIDUAL)
 
 
-def _residual(rest: str, names: dict[str, str]) -> str | None:
+def _residual(place: str, rest: str, names: dict[str, str]) -> str | None:
     """Inside a residual block that has a part over time."""
     if rest.removeprefix("time_mixer.") == "mix_factor":
-        return "time_mixer.mix_factor"
+        return f"{place}time_mixer.mix_factor"
     if rest.startswith("time_stack."):
-        inner = _swap(rest.removeprefix("time_stack."), _RESIDUAL)
-        return None if inner is None else f"temporal_res_block.{inner}"
-    inner = _swap(rest, names)
-    return None if inner is None else f"spatial_res_block.{inner}"
+        return _swap(rest.removeprefix("time_stack."), _RESIDUAL, f"{place}temporal_res_block.")
+    return _swap(rest, names, f"{place}spatial_res_block.")
 
 
-def _swap(name: str, names: dict[str, str]) -> str | None:
-    """The name with its stem replaced; None where the stem is not among them."""
+def _swap(name: str, names: dict[str, str], place: str = "") -> str | None:
+    """The name at its place with its stem replaced; None where the stem is not among them."""
     stem, _, kind = name.rpartition(".")
-    return f"{names[stem]}.{kind}" if stem in names else None
+    return f"{place}{names[stem]}.{kind}" if stem in names else None
 
 
-def _autoencoder(key: str, top: int) -> dict[str, Recipe]:
+def _autoencoder(key: str, top: int) -> str | None:
     if key.startswith(_DECODER):
         half, name = "decoder", key.removeprefix(_DECODER)
     else:
         half, _, name = key.removeprefix(_CONDITION).partition(".")
     if half == "quant_conv":
-        return {f"quant_conv.{name}": Recipe(key)}
-    if match := re.match(r"mid\.attn_1\.(\w+)\.(weight|bias)", name):
-        if match[1] not in _ATTENTION:
-            return {}
-        flat = match[1] != "norm"
-        return {f"{half}.mid_block.attentions.0.{_ATTENTION[match[1]]}.{match[2]}": Recipe(key, flat=flat)}
+        return f"quant_conv.{name}"
+    if name.startswith("mid.attn_1."):
+        return _swap(name.removeprefix("mid.attn_1."), _ATTENTION, f"{half}.mid_block.attentions.0.")
     name = name.replace("conv_out.time_mix_conv.", "time_conv_out.")
     if match := re.match(r"(down|up|mid)\.(?:(\d+)\.block\.|block_)(\d+)\.(.*)", name):
         side, level, block, rest = match.groups()
         place = "mid_block" if level is None else f"{side}_blocks.{_level(side, level, top)}"
-        number = int(block) - (level is None)
+        place = f"{half}.{place}.resnets.{int(block) - (level is None)}."
         # Only the decoder's blocks have a part over time.
-        inner = _swap(rest, _PLAIN) if half == "encoder" else _residual(rest, _PLAIN)
-        return {} if inner is None else {f"{half}.{place}.resnets.{number}.{inner}": Recipe(key)}
+        return _swap(rest, _PLAIN, place) if half == "encoder" else _residual(place, rest, _PLAIN)
     if match := re.match(r"(down|up)\.(\d+)\.(down|up)sample\.(conv\..*)", name):
         side, level, _, rest = match.groups()
-        return {f"{half}.{side}_blocks.{_level(side, level, top)}.{side}samplers.0.{rest}": Recipe(key)}
-    return {f"{half}.{re.sub('^norm_out', 'conv_norm_out', name)}": Recipe(key)}
+        return f"{half}.{side}_blocks.{_level(side, level, top)}.{side}samplers.0.{rest}"
+    return f"{half}.{re.sub('^norm_out', 'conv_norm_out', name)}"
 
 
 def _level(side: str, level: str, top: int) -> int:
@@ -249,8 +239,8 @@ def _visual(key: str) -> dict[str, Recipe]:
         return {
             f"{place}.self_attn.{which}_proj.{kind}": Recipe(key, third=i) for i, which in enumerate("qkv")
         }
-    inner = _swap(rest, _VISUAL_LAYER)
-    return {} if inner is None else {f"{place}.{inner}": Recipe(key)}
+    name = _swap(rest, _VISUAL_LAYER, f"{place}.")
+    return {} if name is None else {name: Recipe(key)}
 
 
 def _join(found: Recipes, key: str, per_level: int, keys: set[str]) -> None:

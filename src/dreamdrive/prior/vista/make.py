@@ -6,26 +6,25 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.path_to_action import STEERING_RATIO
+from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
-from dreamdrive.prior.vista.decode import decode_in_chunks
 from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.engine import Engine
 from dreamdrive.prior.vista.features import BLOCK, Window, extract
 from dreamdrive.prior.vista.kinds import SVD, Kind
-from dreamdrive.prior.vista.load import check_fit, open_networks
 from dreamdrive.prior.vista.memory import Job, smaller_size
-from dreamdrive.prior.vista.path import asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
-from dreamdrive.prior.vista.rollout import SCALE, roll_out, rounds_for
+from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out, rounds_for
+from dreamdrive.prior.vista.stored import open_weights
 from dreamdrive.progress import Progress
 from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip, Known
@@ -38,16 +37,9 @@ _MOST_FRAMES = 1000
 def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     """Generate the clip; Z_ref is ``features["appearance"]`` and the video model's own.
 
-    ``latents`` are the sampled ones, 0.18215 times those of the autoencoder.
-
-    Args:
-        kind: Which model.
-        control: ``path`` is a photo, or a video or folder whose first frames are kept (up to three by Vista,
-            one by SVD). ``frames`` counts the frames made: its STOP says how many rounds are needed.
-        progress: Told of every step of the sampler, of decoding and of every window of features.
-
-    Raises:
-        InputError: The input, an option or the weights cannot be used, or memory does not suffice.
+    The input is a photo, or a video or folder whose first frames are kept (up to three by Vista, one by SVD).
+    ``control.frames`` counts the frames made: its STOP says how many rounds are needed. ``latents`` are the
+    sampled ones, 0.18215 times those of the autoencoder.
     """
     if control.path is None or control.weights is None:
         raise InputError(f"the prior {kind.name} needs an input, a photo, and --weights")
@@ -56,15 +48,16 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     leading = read_leading(
         control.path, max(kind.overlap, 1), kind.rate_hz, size, control.intrinsics, control.hfov_deg
     )
-    networks = open_networks(control.weights, kind)
-    wanted = _wanted(control.frames, kind, networks.per_round)
+    engine = Engine(open_weights(control.weights, kind), chosen_device())
+    count = engine.per_round
+    wanted = _wanted(control.frames, kind, count)
     held_out = held_out_mask(len(wanted), control.hold_out)
-    step = networks.per_round - kind.overlap
-    starts = range(0, step * rounds_for(int(wanted[-1]) + 1, kind, networks.per_round), step)
-    spans = [range(start, start + networks.per_round) for start in starts]
-    check_fit(networks, Job(size, spans[-1].stop, networks.per_round))
+    step = count - kind.overlap
+    starts = range(0, step * rounds_for(int(wanted[-1]) + 1, kind, count), step)
+    spans = [range(start, start + count) for start in starts]
+    engine.check_fit(Job(size, spans[-1].stop, count))
     told, asked = _told(control, kind, spans, wanted / kind.rate_hz)
-    noticed = notes_of(networks.stored)
+    noticed = notes_of(engine.stored)
     windows = [
         Window(span, columns, kind.overlap if number else min(len(leading.frames), kind.overlap))
         for number, (span, columns) in enumerate(zip(spans, told, strict=True))
@@ -72,12 +65,13 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     tell = counted(progress, len(spans) * steps + 1 + len(spans))
     smaller = "x".join(map(str, smaller_size(size)))
     with torch.inference_mode(), enough_memory(f"choose a smaller --size, such as {smaller}"):
-        engine = Engine(networks)
         latents = _sample(engine, kind, leading, windows, steps, control.seed, tell).cpu()
-        frames = _decoded(engine, latents)
+        images = decode_in_chunks(engine.decode, latents / SCALE)
+        check_finite(images, "frames")
+        frames = to_frames(images)
         tell()
         features = extract(engine, latents, frames, windows, seed=control.seed, tell=tell)
-    networks.free()
+    engine.free()
     frames, latents, features = frames[wanted], latents[torch.from_numpy(wanted)], features[wanted]
     valid = np.ones(frames.shape[:3], dtype=bool)
     return Clip(
@@ -147,24 +141,16 @@ def _sample(
     draw = torch.Generator().manual_seed(seed)
     images = to_images(leading.frames)
     height, width = images.shape[2] // 8, images.shape[3] // 8
-    channels = engine.networks.stored.parts["unet"].config.get("out_channels", 4)
+    channels = engine.stored.parts["unet"].config.get("out_channels", 4)
     shape = len(windows), len(windows[0].span), channels, height, width
     noise = torch.randn(shape, generator=draw)
     first = None
     if kind.noise > 0:
         first = images[:1] + kind.noise * torch.randn(images[:1].shape, generator=draw)
     actions = [window.action for window in windows]
-    made = roll_out(
-        engine, kind, images, noise.to(engine.networks.device), actions, steps, first=first, tell=tell
-    )
+    made = roll_out(engine, kind, images, noise.to(engine.device), actions, steps, first=first, tell=tell)
     check_finite(made, "latents")
     return made
-
-
-def _decoded(engine: Engine, latents: Float[Tensor, "f c h w"]) -> UInt8[np.ndarray, "f h2 w2 3"]:
-    images = decode_in_chunks(engine.decode, latents / SCALE)
-    check_finite(images, "frames")
-    return to_frames(images)
 
 
 def _provenance(

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.vista.decode import CHUNK
 from dreamdrive.prior.vista.picture import SIDE, nearest_side
 from dreamdrive.prior.vista.stored import Stored
 
+CHUNK = 14
+"""Frames that Vista decodes at once."""
 Step = Literal["image encoder", "encoder", "UNet", "decoder"]
 MAKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet", "decoder")
 LOOKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet")
@@ -103,11 +104,7 @@ def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
 
 
 def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
-    """Refuse a run that does not fit; ``half`` is whether the UNet computes in float16.
-
-    Raises:
-        InputError: It does not fit; the message names a size that does.
-    """
+    """Refuse a run that does not fit, naming a size that does; with ``half`` the UNet computes in float16."""
     plan = plan_memory(stored, job, half=half)
     if plan.fits(free):
         return

@@ -1,21 +1,88 @@
-"""The networks of a video model, one at a time in memory. Importing this loads diffusers and transformers."""
+"""The networks of SVD and Vista: diffusers' own, with what Vista adds. Importing this loads diffusers."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import torch
 from accelerate import init_empty_weights
 from diffusers.models.autoencoders.autoencoder_kl_temporal_decoder import AutoencoderKLTemporalDecoder
+from diffusers.models.embeddings import TimestepEmbedding
+from diffusers.models.resnet import ResnetBlock2D, TemporalResnetBlock
+from diffusers.models.unets.unet_spatio_temporal_condition import UNetSpatioTemporalConditionModel
+from jaxtyping import Float
 from torch import Tensor, nn
 from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
 
-from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.keys import Part
 from dreamdrive.prior.vista.kinds import VISTA, Kind
-from dreamdrive.prior.vista.unet import VideoUNet, make_unet
 
-if TYPE_CHECKING:
-    from dreamdrive.prior.vista.stored import Stored
+_EPS = 1e-5
+"""Of the residual blocks' normalisations in Stability's code; diffusers has 1e-6 in 72 of them."""
+
+
+class _Change:
+    """What a look at a clip adds to the embedding of each frame (B T, D), None where no frame is known.
+
+    The hooks of the blocks must not hold the network: it would hold itself by them, and stay in memory after
+    its last use.
+    """
+
+    value: Tensor | None = None
+
+    def __call__(
+        self, block: nn.Module, args: tuple[Any, ...], kwargs: dict[str, Any]
+    ) -> tuple[tuple[Any, ...], dict[str, Any]] | None:
+        """Before a block: the embedding that frames of a clip share becomes one for each frame."""
+        return None if self.value is None else (args, {**kwargs, "temb": kwargs["temb"] + self.value})
+
+
+class VideoUNet(UNetSpatioTemporalConditionModel):
+    """The UNet with a second time embedding, for frames that are known; SVD has none."""
+
+    cond_time_embedding: TimestepEmbedding | None
+    _change: _Change
+
+    def forward(  # type: ignore[override]
+        self,
+        sample: Float[Tensor, "b t c h w"],
+        time: float,
+        context: Float[Tensor, "b n d"],
+        time_ids: Float[Tensor, "b 3"],
+        fixed: Float[Tensor, " t"] | None = None,
+    ) -> Float[Tensor, "b t c2 h w"]:
+        """One look at scaled noisy latents with the condition latents behind them.
+
+        ``time`` is 0.25 ln sigma, ``context`` the first frame and the action, ``time_ids`` are frame rate
+        - 1, motion bucket and noise on the first frame, and ``fixed`` is one for frames that are known.
+        """
+        times = torch.full((len(sample),), time, device=sample.device)
+        try:
+            if fixed is not None and self.cond_time_embedding is not None and bool(fixed.any()):
+                self._change.value = self._of_fixed(times[:1], fixed.to(sample)).repeat(len(sample), 1)
+            made = super().forward(sample, times, context, time_ids, return_dict=False)
+        finally:
+            self._change.value = None
+        return made[0]
+
+    def prepare(self, *, fixed_frames: bool) -> "VideoUNet":
+        """Set the normalisations and, for frames that may be fixed (Vista), add the second embedding."""
+        for module in self.modules():
+            if isinstance(module, ResnetBlock2D | TemporalResnetBlock):
+                module.norm1.eps = module.norm2.eps = _EPS
+        self.cond_time_embedding, self._change = None, _Change()
+        if fixed_frames:
+            first = self.time_embedding.linear_1
+            self.cond_time_embedding = TimestepEmbedding(first.in_features, first.out_features)
+            for block in (*self.down_blocks, self.mid_block, *self.up_blocks):
+                block.register_forward_pre_hook(self._change, with_kwargs=True)
+        return self
+
+    def _of_fixed(self, time: Float[Tensor, "1"], fixed: Float[Tensor, " t"]) -> Float[Tensor, "t d"]:
+        """What to add to the embedding of each frame."""
+        assert self.cond_time_embedding is not None
+        encoded = self.time_proj(time).to(fixed.dtype)
+        change = self.cond_time_embedding(encoded) - self.time_embedding(encoded)
+        return fixed[:, None] * change
 
 
 def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
@@ -23,73 +90,19 @@ def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
     known = {key: value for key, value in config.items() if not key.startswith("_")}
     with init_empty_weights():
         if part == "unet":
-            return make_unet(known, fixed_frames=kind is VISTA)
+            return VideoUNet(**known).prepare(fixed_frames=kind is VISTA)
         if part == "vae":
             return AutoencoderKLTemporalDecoder(**known)
         return CLIPVisionModelWithProjection(CLIPVisionConfig(**known))
 
 
-class Networks:
-    """A stored model whose networks are loaded when they are asked for; each leaves when the next one comes.
+def watch(unet: VideoUNet, name: str, keep: Callable[[Tensor], None]) -> Any:
+    """Hand over what a block such as ``down_blocks.1.attentions.1`` makes each time it runs (B T, C, h, w).
 
-    ``half`` is whether the UNet computes in float16; the others never do.
+    What comes back is to be removed afterwards by its ``remove()``.
     """
 
-    def __init__(self, stored: "Stored", device: torch.device, *, half: bool) -> None:
-        self.stored = stored
-        self.device = device
-        self.half = half
-        self._held: tuple[Part, nn.Module] | None = None
+    def hand_over(module: nn.Module, args: object, output: Any) -> None:
+        keep(output if isinstance(output, Tensor) else output[0])
 
-    @property
-    def dtype(self) -> torch.dtype:
-        """Of the UNet."""
-        return torch.float16 if self.half else torch.float32
-
-    @property
-    def per_round(self) -> int:
-        """Frames that the UNet sees at once; an official single file does not tell, and has 25."""
-        return int(self.stored.parts["unet"].config.get("num_frames", 25))
-
-    def unet(self) -> VideoUNet:
-        """The UNet."""
-        return cast(VideoUNet, self._use("unet"))
-
-    def vae(self) -> AutoencoderKLTemporalDecoder:
-        """Encoder and decoder of frames."""
-        return cast(AutoencoderKLTemporalDecoder, self._use("vae"))
-
-    def image_encoder(self) -> CLIPVisionModelWithProjection:
-        """What describes the first frame."""
-        return cast(CLIPVisionModelWithProjection, self._use("image_encoder"))
-
-    def free(self) -> None:
-        """Let go of what is held."""
-        self._held = None
-        if self.device.type == "cuda":
-            torch.cuda.empty_cache()
-
-    def _use(self, part: Part) -> nn.Module:
-        if self._held is None or self._held[0] != part:
-            self.free()
-            self._held = part, self._load(part)
-        return self._held[1]
-
-    def _load(self, part: Part) -> nn.Module:
-        own = self.stored.parts[part]
-        network = make_empty(part, own.config, self.stored.kind)
-        dtype = self.dtype if part == "unet" else torch.float32
-        network.load_state_dict(
-            {name: self._finite(name, own.read(name).to(self.device, dtype)) for name in own.shapes},
-            assign=True,
-        )
-        # Buffers that no file holds, such as counting numbers, were made where the program runs.
-        return network.to(self.device).eval().requires_grad_(False)
-
-    def _finite(self, name: str, value: Tensor) -> Tensor:
-        if not bool(torch.isfinite(value).all()):
-            raise InputError(
-                f"{self.stored.path}: {name} holds numbers that are not finite in {str(value.dtype)[6:]}; "
-                "copy the file again"
-            )
-        return value
+    return unet.get_submodule(name).register_forward_hook(hand_over)

@@ -79,11 +79,7 @@ def nearest_side(length_px: float) -> int:
 
 
 def check_size(size: tuple[int, int]) -> None:
-    """Whether the network can make frames of this width and height.
-
-    Raises:
-        InputError: A side is no multiple of 64.
-    """
+    """Whether the network can make frames of this width and height."""
     if min(size) < SIDE or size[0] % SIDE or size[1] % SIDE:
         near = [nearest_side(side) for side in size]
         raise InputError(
@@ -93,11 +89,7 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def frame(source: tuple[int, int], target: tuple[int, int], name: str) -> Framing:
-    """The largest part of a photo, in its middle, that has the target's shape; both by width and height.
-
-    Raises:
-        InputError: It would have to be enlarged more than twice.
-    """
+    """The largest part of a photo, in its middle, that has the target's shape; both by width and height."""
     (width, height), wanted = source, target[0] / target[1]
     part = (int(wanted * height), height) if width / height > wanted else (width, int(width / wanted))
     larger = max(target[0] / max(part[0], 1), target[1] / max(part[1], 1))
@@ -123,9 +115,6 @@ def read_leading(
 
     Of a video, the frames nearest to the times of the model's rate are taken, ``count`` at most; ``size`` is
     width and height of the result. A lens in the calibration file is taken out of the frames.
-
-    Raises:
-        InputError: The input cannot be read, is too small, or changes its size.
     """
     check_size(size)
     raw, said = leading_frames(path, count, rate_hz)

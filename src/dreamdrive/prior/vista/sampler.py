@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 import torch
@@ -16,23 +15,6 @@ Branches = tuple[Float[Tensor, "t c h w"], Float[Tensor, "t c h w"]]
 Velocity = Callable[[Float[Tensor, "t c h w"], float, Float[Tensor, " t"]], Branches]
 """From the scaled latents, the time 0.25 ln sigma and the mask of fixed frames to the network's answers."""
 Schedule = Literal["constant", "triangle", "linear"]
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """Frames that are known.
-
-    Attributes:
-        mask: One for those, zero for the others (T,).
-        latents: Clean latents (T, C, h, w); those of the other frames do not count.
-    """
-
-    mask: Float[Tensor, " t"]
-    latents: Float[Tensor, "t c h w"]
-
-    def put(self, latents: Float[Tensor, "t c h w"]) -> Float[Tensor, "t c h w"]:
-        """The latents with the known frames in their places."""
-        return torch.where(self.mask[:, None, None, None] > 0, self.latents, latents)
 
 
 def sigmas(steps: int) -> list[float]:
@@ -82,20 +64,22 @@ def sample(
     velocity: Velocity,
     noise: Float[Tensor, "t c h w"],
     scale: Float[Tensor, " t"],
-    fixed: Fixed,
+    mask: Float[Tensor, " t"],
+    known: Float[Tensor, "t c h w"],
     steps: int,
     tell: Callable[[], None] = lambda: None,
 ) -> Float[Tensor, "t c h w"]:
     """Latents of one round from noise of standard deviation 1, by Euler's rule; ``scale`` guides each frame.
 
-    Known frames are put in their places before each step and after the last: without noise, as in Vista's
-    training. ``tell`` is called after each step.
+    Of frames whose ``mask`` is one the clean latents are ``known``. They are put in their places before each
+    step and after the last: without noise, as in Vista's training. ``tell`` is called after each step.
     """
     levels = sigmas(steps)
+    fixed = mask[:, None, None, None] > 0
     latents = noise * (levels[0] ** 2 + 1) ** 0.5
     for sigma, following in itertools.pairwise(levels):
-        latents = fixed.put(latents)
-        clean = denoise(velocity, latents, sigma, scale, fixed.mask)
+        latents = torch.where(fixed, known, latents)
+        clean = denoise(velocity, latents, sigma, scale, mask)
         latents = latents + (following - sigma) * (latents - clean) / sigma
         tell()
-    return fixed.put(latents)
+    return torch.where(fixed, known, latents)

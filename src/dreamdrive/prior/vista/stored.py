@@ -113,11 +113,7 @@ def _single(path: Path) -> Path:
 
 
 def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
-    """Shapes by key of a ``.safetensors``, and a reader of one tensor.
-
-    Raises:
-        InputError: There is no such file, or it is cut short.
-    """
+    """Shapes by key of a ``.safetensors``, and a reader of one tensor."""
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {EXPECTED}")
     try:

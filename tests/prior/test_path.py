@@ -1,4 +1,4 @@
-"""Paths become actions, and actions the paths they ask for."""
+"""Paths become waypoints, and actions the paths they ask for."""
 
 import numpy as np
 import pytest
@@ -8,27 +8,28 @@ from scipy.spatial.transform import Rotation
 from tests.prior.paths import circle
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.action_to_path import path_of
-from dreamdrive.prior.path_to_action import (
+from dreamdrive.prior.path import (
     STEERING_RATIO,
     WHEEL_BASE_M,
-    command,
+    asked_path,
     from_first,
-    goal,
-    steering,
-    waypoints,
+    path_of,
+    waypoints_by_round,
 )
 from dreamdrive.scene.action import AT_S, Goal, Steering, Waypoints, check_action
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.trajectory import Trajectory
 
-CAMERA = Camera(500.0, 500.0, 320.0, 180.0, 640, 360)
 TIMES_S = np.arange(25) / 10
 quick = settings(max_examples=40, deadline=None, derandomize=True)
 
 
 def four(least: float, most: float) -> st.SearchStrategy[tuple[float, ...]]:
     return st.tuples(*[st.floats(least, most)] * 4)
+
+
+def waypoints(path: Trajectory) -> Waypoints:
+    """Of a single round."""
+    return waypoints_by_round(path, np.zeros(1), 0.0)[0]
 
 
 @quick
@@ -42,29 +43,41 @@ def test_waypoints_survive_the_way_there_and_back(right, ahead):
 
 @quick
 @given(st.floats(3, 30), four(-1, 1), four(-2, 2))
-def test_steering_survives_the_way_there_and_back(speed, change, wheel):
-    """As well as a spline through poses at 50 Hz follows a jerk: brakes of up to 4 m/s2."""
+def test_the_path_of_steering_has_its_speeds_and_its_turns(speed, change, wheel):
+    """As well as differences of poses at 100 Hz tell them."""
     speed = tuple(speed + each for each in change)
-    action = Steering(speed_m_s=speed, wheel_rad=wheel)
-    back = steering(path_of(action, np.arange(121) / 50))
-    np.testing.assert_allclose(back.speed_m_s, speed, atol=0.03)
-    np.testing.assert_allclose(back.wheel_rad, wheel, atol=0.05)
+    path = path_of(Steering(speed_m_s=speed, wheel_rad=wheel), np.arange(241) / 100)
+    at = [round(100 * t) for t in AT_S]
+    found = np.linalg.norm(np.gradient(path.positions_m, path.times_s, axis=0), axis=1)
+    np.testing.assert_allclose(found[at], speed, atol=0.03)
+    ahead = path.world_from_camera[:, :3, 2]
+    left_rad = np.unwrap(np.arctan2(-ahead[:, 0], ahead[:, 2]))
+    left_per_m = np.tan(np.array(wheel) / STEERING_RATIO) / WHEEL_BASE_M
+    np.testing.assert_allclose(
+        np.gradient(left_rad, path.times_s)[at], left_per_m * np.array(speed), atol=0.03
+    )
+
+
+@quick
+@given(st.floats(1, 40), st.floats(-0.1, 0.1))
+def test_a_steady_wheel_drives_a_circle(speed, left_per_m):
+    wheel = STEERING_RATIO * np.arctan(WHEEL_BASE_M * left_per_m)
+    found = path_of(Steering((speed,) * 4, (float(wheel),) * 4), TIMES_S)
+    expected = circle(speed, left_per_m).world_from_camera
+    np.testing.assert_allclose(found.world_from_camera, expected, atol=1e-3)
 
 
 @quick
 @given(st.floats(1, 40), st.floats(-0.1, 0.1), st.floats(-3, 3), st.floats(-50, 50), st.floats(0, 99))
-def test_a_circle_has_its_speed_and_its_wheel_wherever_it_starts(speed, left_per_m, turn, shift, since):
+def test_a_circle_has_its_waypoints_wherever_it_starts(speed, left_per_m, turn, shift, since):
     left_per_m /= max(1.0, (speed / 9) ** 2)  # sideways at most 8.1 m/s2
     path = circle(speed, left_per_m, rate_hz=50)
     world = np.eye(4)
     world[:3, :3] = Rotation.from_rotvec([0.1, turn, 0.2]).as_matrix()
     world[:3, 3] = shift, 2.0, -shift
-    moved = Trajectory(world @ path.world_from_camera, path.times_s + since)
-    found = steering(moved)
-    np.testing.assert_allclose(found.speed_m_s, speed, rtol=1e-5)
-    wheel = STEERING_RATIO * np.arctan(WHEEL_BASE_M * left_per_m)
-    np.testing.assert_allclose(found.wheel_rad, wheel, atol=1e-5)
-    at, there = waypoints(path), waypoints(moved)
+    at, there = (
+        waypoints(each) for each in (path, Trajectory(world @ path.world_from_camera, path.times_s + since))
+    )
     np.testing.assert_allclose([*at.right_m, *at.ahead_m], [*there.right_m, *there.ahead_m], atol=1e-9)
 
 
@@ -72,59 +85,20 @@ def test_a_straight_drive():
     path = circle(8.0)
     assert waypoints(path).ahead_m == pytest.approx([8 * t for t in AT_S])
     assert waypoints(path).right_m == pytest.approx([0] * 4)
-    assert steering(path).wheel_rad == pytest.approx([0] * 4)
 
 
 def test_a_turn_to_the_left_is_to_the_left():
-    path = circle(8.0, 0.05)
-    assert waypoints(path).right_m[-1] < 0 < steering(path).wheel_rad[-1]
+    assert waypoints(circle(8.0, 0.05)).right_m[-1] < 0
+    turned = path_of(Steering((8.0,) * 4, (1.0,) * 4), TIMES_S)
+    assert turned.positions_m[-1, 0] < 0
+    assert turned.world_from_camera[-1, 0, 2] < 0
 
 
-@pytest.mark.parametrize(
-    ("speed", "left_per_m", "word"),
-    [(0.2, 0, "stop"), (10, 0, "forward"), (10, 0.003, "forward"), (10, 0.02, "left"), (10, -0.02, "right")],
-)
-def test_a_path_in_a_word(speed, left_per_m, word):
-    assert command(circle(speed, left_per_m)).direction == word
-
-
-def test_a_car_that_stands_has_its_wheel_straight():
-    jitter = circle(0.0)
-    jitter.world_from_camera[:, 2, 3] += 1e-3 * np.sin(np.arange(len(jitter)))
-    found = steering(jitter)
-    assert min(found.speed_m_s) >= 0
-    assert found.wheel_rad == (0, 0, 0, 0)
-
-
-def test_the_goal_is_the_road_under_the_end():
-    found = goal(circle(10.0, seconds=2.0), CAMERA)
-    assert found.column == pytest.approx(0.5)
-    assert found.row == pytest.approx((180 + 500 * 1.5 / 20) / 360)
-    left = goal(circle(10.0, 0.01), CAMERA)
-    assert left.column < 0.5
-
-
-def test_an_end_that_the_first_frame_does_not_show_is_no_goal():
-    with pytest.raises(InputError, match="outside it; choose a path"):
-        goal(circle(1.0), CAMERA)
-    path = circle(5.0)
-    back = path.world_from_camera.copy()
-    back[:, 2, 3] *= -1
-    with pytest.raises(InputError, match="12 m behind the first frame"):
-        goal(Trajectory(back, path.times_s), CAMERA)
-
-
-def test_paths_that_cannot_be_steered_by_are_refused():
-    with pytest.raises(InputError, match="lasts 1 s; expected at least the 2 s"):
+def test_paths_that_cannot_be_driven_are_refused():
+    with pytest.raises(InputError, match="lasts 1 s; expected at least 2 s for these frames"):
         waypoints(circle(5.0, seconds=1.0))
     with pytest.raises(InputError, match="no car drives it, an action outside its range: ahead_m is 120"):
         waypoints(circle(60.0))
-    reverse = circle(5.0)
-    reverse.world_from_camera[:, 2, 3] *= -1
-    with pytest.raises(InputError, match=r"no car drives it, .* speed_m_s is -5"):
-        steering(reverse)
-    with pytest.raises(InputError, match="2 poses do not tell speeds"):
-        steering(circle(5.0, seconds=4.0, rate_hz=0.25))
 
 
 def test_the_camera_looks_along_waypoints_and_goes_on_behind_the_last():
@@ -144,6 +118,34 @@ def test_a_path_from_its_first_pose():
     later = Trajectory(path.world_from_camera[5:], path.times_s[5:])
     np.testing.assert_allclose(from_first(later).world_from_camera, path.world_from_camera[:-5], atol=1e-12)
     assert from_first(later).times_s[0] == 0
+
+
+def test_each_round_is_told_the_path_from_where_it_starts():
+    """On a circle that looks the same from everywhere."""
+    path = circle(8.0, 0.03, seconds=5.0, rate_hz=20)
+    first, second = waypoints_by_round(path, np.array([0.0, 2.2]), 4.6)
+    expected = waypoints(path)
+    for made in (first, second):
+        np.testing.assert_allclose(made.ahead_m, expected.ahead_m, atol=5e-3)
+        np.testing.assert_allclose(made.right_m, expected.right_m, atol=5e-3)
+    assert first == expected
+
+
+def test_the_path_has_to_lead_to_the_last_frame():
+    path = circle(8.0, seconds=2.2)
+    assert len(waypoints_by_round(path, np.array([0.0]), 1.0)) == 1
+    with pytest.raises(InputError, match=r"lasts 2.2 s; expected at least 2.4 s for these frames"):
+        waypoints_by_round(path, np.array([0.0]), 2.4)
+    with pytest.raises(InputError, match=r"expected at least 4.2 s"):
+        waypoints_by_round(path, np.array([0.0, 2.2]), 2.9)
+
+
+def test_the_path_of_the_frames_starts_at_the_first_of_them():
+    asked = asked_path(circle(8.0, 0.03), np.array([0.5, 1.0]))
+    np.testing.assert_allclose(
+        asked.world_from_camera, circle(8.0, 0.03).world_from_camera[[0, 5]], atol=1e-9
+    )
+    np.testing.assert_allclose(asked.times_s, [0, 0.5])
 
 
 def test_numbers_outside_their_ranges_are_named():
