@@ -24,12 +24,7 @@ _BEFORE, _AFTER = 3, 4  # frames that are asked whether the scene comes back
 
 @dataclass(frozen=True)
 class Cut:
-    """A change to another scene.
-
-    Attributes:
-        last: Index of the last frame of the scene before.
-        first: Index of the first frame of the scene after; frames between the two belong to neither.
-    """
+    """A change to another scene: the last frame before it, and the first after it."""
 
     last: int
     first: int
@@ -55,12 +50,8 @@ class Found:
 def find_cuts(frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"]) -> Found:
     """Find changes to another scene: hard cuts, cuts by way of black, and fades of up to three frames.
 
-    A cut is where frames have nothing in common although those before it have much in common, and those
-    after it. What comes back within a few frames was hidden and not cut away.
-
-    Args:
-        frames: Frames of one camera in the order of time.
-        valid: Where they hold a picture.
+    A cut is where frames of one camera, in the order of time, have nothing in common although those before it
+    have much in common, and those after it. What comes back within a few frames was hidden and not cut away.
     """
     looks = Likeness(frames, valid)
     blank = tuple(i for i in range(len(frames)) if looks.shows_nothing(i))

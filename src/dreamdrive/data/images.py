@@ -17,23 +17,14 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 
 @dataclass(frozen=True)
 class ImageFolder:
-    """The images of one folder in natural order (2 before 10).
-
-    Attributes:
-        path: The folder.
-        files: Its images.
-    """
+    """The images of one folder in natural order (2 before 10)."""
 
     path: Path
     files: tuple[Path, ...]
 
     @staticmethod
     def open(path: Path) -> "ImageFolder":
-        """List the images of a folder; hidden files and other kinds are left alone.
-
-        Raises:
-            InputError: There are none.
-        """
+        """List the images of a folder; hidden files and other kinds are left alone."""
         files = tuple(sorted(_images_in(path), key=lambda f: natural_key(f.name)))
         if not files:
             raise InputError(f"{path} holds no images ({', '.join(SUFFIXES)}){_hint(path)}")
@@ -44,11 +35,7 @@ class ImageFolder:
         return len(self.files)
 
     def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames, one at a time.
-
-        Raises:
-            InputError: An image is unreadable or cut short.
-        """
+        """The wanted frames, one at a time."""
         for index in wanted:
             yield read_image(self.files[index], index)
 
@@ -63,9 +50,6 @@ def read_image(path: Path, index: int = 0) -> RawFrame:
     """One image as 8-bit RGB, upright by its EXIF orientation.
 
     16-bit images are scaled by 255/65535, grey ones become RGB, and pixels less than half opaque are marked.
-
-    Raises:
-        InputError: The file is missing, empty, too large, cut short, or no image.
     """
     image = read_picture(path)
     if image.dtype.name not in ("uint8", "uint16"):

@@ -38,26 +38,14 @@ class Calibration:
 
 
 def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
-    """The camera of an input, as far as it is told.
-
-    Raises:
-        InputError: It is told twice, or cannot be read.
-    """
+    """The camera of an input, as far as it is told."""
     if intrinsics is not None and hfov_deg is not None:
         raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
     return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
 
 
 def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibration:
-    """A pinhole for a source without calibration: principal point in the centre, square pixels.
-
-    Args:
-        size: Width and height of the source in pixels.
-        hfov_deg: Horizontal field of view; without it the focal length is 0.85 times the longer side.
-
-    Raises:
-        InputError: The field of view is not between 1 and 179 degrees.
-    """
+    """A pinhole for a source without calibration: principal point in the centre, square pixels."""
     width, height = size
     if hfov_deg is None:
         focal = DEFAULT_FOCAL * max(size)
@@ -76,13 +64,7 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
 
     The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy. A
     COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``model_cameras``.
-
-    Args:
-        path: The file, such as a clip's ``meta.json``, or a folder with a COLMAP model.
-        size: Width and height of the source; another size of the same aspect scales the calibration.
-
-    Raises:
-        InputError: The file is missing, malformed, or for images of another shape.
+    One for another size of the source's aspect is scaled.
     """
     cameras = model_cameras(path, "--intrinsics")
     if cameras is not None and len(cameras) != 1:
@@ -132,15 +114,7 @@ def _of_json(path: Path) -> tuple[LensCamera, list[str]]:
 
 
 def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
-    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither.
-
-    Args:
-        path: A file or a folder.
-        option: How messages call it, such as ``--intrinsics``.
-
-    Raises:
-        InputError: It is one of them and cannot be used.
-    """
+    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither."""
     transforms = path / "transforms.json" if path.is_dir() else path
     if transforms.suffix.lower() == ".json" and transforms.is_file():
         values = read_json(transforms, option)

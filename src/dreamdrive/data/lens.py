@@ -25,10 +25,7 @@ _MARGIN_PX = 2
 class Lens:
     """The source's lens at the clip's size.
 
-    Attributes:
-        distortion: The model and its coefficients.
-        camera: The source's intrinsics at the clip's size: those of the clip's pinhole and of the
-            distorted image.
+    ``camera`` has the source's intrinsics there: those of the clip's pinhole and of the distorted image.
     """
 
     distortion: Distortion
@@ -54,16 +51,10 @@ class Lens:
     def apply(
         self, image: Float[np.ndarray, "h w 3"], rendered: Camera | None = None
     ) -> Float[np.ndarray, "h2 w2 3"]:
-        """A render as the source's camera would have shown it, at the clip's size.
+        """A render in [0, 1] as the source's camera would have shown it, at the clip's size.
 
         One bicubic lookup, limited to the range of the image; black where the render does not reach.
-
-        Args:
-            image: RGB in [0, 1] by the pinhole ``rendered``.
-            rendered: Pinhole of the image; by default the clip's own. Its pose does not matter.
-
-        Raises:
-            ValueError: The image is not of the pinhole's size.
+        ``rendered`` is the pinhole of the image, by default the clip's own; its pose does not matter.
         """
         camera = self.camera if rendered is None else rendered
         if image.shape[:2] != (camera.height_px, camera.width_px):

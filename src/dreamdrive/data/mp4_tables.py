@@ -14,16 +14,7 @@ _MAX_BOXES = 1_000_000
 
 
 def check_tables(file: BinaryIO, size: int, where: str) -> None:
-    """Refuse tables that claim more samples than the file has bytes; other kinds of files pass.
-
-    Args:
-        file: The file.
-        size: Its size in bytes.
-        where: How messages call it.
-
-    Raises:
-        InputError: Tables claim too much, or there are far too many of them.
-    """
+    """Refuse tables that claim more samples than the file has bytes; other kinds of files pass."""
     file.seek(0)
     if file.read(8)[4:] not in (b"ftyp", b"moov", b"mdat", b"free", b"wide", b"skip", b"styp"):
         return

@@ -37,17 +37,10 @@ def rate_hz(clip: Clip) -> float:
 
 
 def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace: bool = False) -> None:
-    """Write a clip; the folder appears whole or not at all.
+    """Write a clip of at least two frames; the folder appears whole or not at all.
 
-    Args:
-        clip: The clip, of at least two frames.
-        folder: Where to.
-        about: JSON values for ``provenance.json``, beside the clip's own provenance.
-        replace: Whether an older folder of this kind may be replaced.
-
-    Raises:
-        InputError: Something is in the way, or the place cannot be written.
-        ValueError: Features have too many channels.
+    ``about`` goes into ``provenance.json`` beside the clip's own provenance. With ``replace`` it takes the
+    place of an older folder of this kind. Features of too many channels raise ``ValueError``.
     """
     first = clip.only(int(clip.camera[0]))
     values = {

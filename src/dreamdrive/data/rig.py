@@ -26,13 +26,7 @@ _EXPECTED = (
 
 @dataclass(frozen=True)
 class Mounted:
-    """A camera of a rig.
-
-    Attributes:
-        frames: Its folder of images or its video.
-        intrinsics: Its calibration file; None where there is none.
-        car_from_camera: Where it is mounted (4, 4), x right, y down, z ahead, in metres.
-    """
+    """A camera of a rig: its frames, its calibration, and its pose in metres, x right, y down, z ahead."""
 
     frames: Path
     intrinsics: Path | None
@@ -45,11 +39,7 @@ def is_rig(path: Path) -> bool:
 
 
 def read_rig(path: Path) -> tuple[Mounted, ...]:
-    """The cameras of a rig; paths in its file count from its folder.
-
-    Raises:
-        InputError: The description is missing or malformed.
-    """
+    """The cameras of a rig; paths in its file count from its folder."""
     values = read_json(path / RIG, "input")
     listed = values.get("cameras")
     if not isinstance(listed, list) or not listed:
@@ -62,13 +52,7 @@ def read_rig(path: Path) -> tuple[Mounted, ...]:
 
 
 def write_rig(cameras: Mapping[str, Float[np.ndarray, "4 4"]], path: Path, calibration: str | None) -> None:
-    """Describe cameras whose frames lie in ``NAME/frames``.
-
-    Args:
-        cameras: ``car_from_camera`` of each, by its name.
-        path: The folder that holds them.
-        calibration: Name of the calibration file in the folder of each; None where there is none.
-    """
+    """Describe cameras by name and pose, with ``NAME/frames`` and perhaps a calibration file in ``NAME``."""
     listed = [
         {
             "frames": f"{name}/frames",
@@ -90,20 +74,10 @@ def read_rig_clip(
     trajectory: Path | None = None,
     hold_out: int | None = None,
 ) -> Clip:
-    """Read the frames of all cameras of a rig, as ``read_clip`` reads those of one.
+    """Read the frames of all cameras of a rig, with arguments as of ``read_clip`` for each of them.
 
-    Args:
-        path: Folder with ``rig.json``.
-        frames: ``START:STOP:STEP`` over the frames of each camera.
-        fps: Rate of each camera.
-        size: Exact width and height of all frames.
-        poses: Pose file of the first camera; the mountings give those of the others.
-        trajectory: File with the path that the first camera was asked to follow.
-        hold_out: Withhold the selected times i with i mod N = N // 2.
-
-    Raises:
-        InputError: See ``read_rig`` and ``read_clip``; or the cameras differ in their numbers of frames, in
-            their times or in size.
+    Poses and trajectory are those of the first camera; the mountings give the others. The cameras have to
+    agree in their numbers of frames and in size.
     """
     cameras = read_rig(path)
     parts = [

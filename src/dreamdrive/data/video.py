@@ -36,23 +36,14 @@ _OPTIONS = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"
 
 @dataclass(frozen=True)
 class Video:
-    """The first video track of a file, decoded as a stream.
-
-    Attributes:
-        path: The file.
-        rate_hz: Mean frame rate by the file's own account, or ``None``.
-    """
+    """The first video track of a file, decoded as a stream, and its mean rate by the file's own account."""
 
     path: Path
     rate_hz: float | None
 
     @staticmethod
     def open(path: Path) -> "Video":
-        """Look at a file.
-
-        Raises:
-            InputError: It is empty, cut short before its index, or no video.
-        """
+        """Look at a file."""
         _check_file(path)
         try:
             with _opened(path) as container:
@@ -77,19 +68,11 @@ class Video:
         return Video(path, float(rate) if rate and RATES_HZ[0] <= rate <= RATES_HZ[1] else None)
 
     def count(self) -> int:
-        """Number of frames, by decoding them all: what the file itself claims is often wrong.
-
-        Raises:
-            InputError: Decoding breaks off.
-        """
+        """Number of frames, by decoding them all: what the file itself claims is often wrong."""
         return sum(1 for _ in self._decode())
 
     def claimed_count(self) -> int | None:
-        """Number of frames by the file's own account, which may be wrong; None where it says nothing.
-
-        Raises:
-            InputError: The file cannot be opened any more.
-        """
+        """Number of frames by the file's own account, which may be wrong; None where it says nothing."""
         try:
             with _opened(self.path) as container:
                 stream = _pictures(container, self.path)
@@ -102,11 +85,7 @@ class Video:
         return None if seconds is None or self.rate_hz is None else round(seconds * self.rate_hz)
 
     def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames in decode order, one at a time; decoding stops behind the last.
-
-        Raises:
-            InputError: The file ends or breaks off before the last wanted frame.
-        """
+        """The wanted frames in decode order, one at a time; decoding stops behind the last."""
         index, first_s, damaged = -1, None, False
         for index, frame in enumerate(self._decode(wanted)):
             first_s = _time_s(frame) if index == 0 else first_s

@@ -1,4 +1,7 @@
-"""JSON from files: bounded, finite, and of the types that are expected before anything uses it."""
+"""JSON from files: bounded, finite, and of the types that are expected before anything uses it.
+
+What is not raises ``InputError``, which calls the file ``where``, or by ``option`` and path.
+"""
 
 import re
 from pathlib import Path
@@ -19,16 +22,7 @@ T = TypeVar("T")
 
 
 def read_json(path: Path, option: str = "", *, at_most: int = TEXT_BYTES) -> dict[str, Any]:
-    """The JSON object in a file.
-
-    Args:
-        path: The file.
-        option: How messages call it, such as ``--poses``.
-        at_most: Largest size in bytes.
-
-    Raises:
-        InputError: The file is missing, too large, or holds something else.
-    """
+    """The JSON object in a file of ``at_most`` bytes."""
     where = f"{option} {path}".strip()
     values = parse_json(read_bytes(path, where, at_most=at_most), where)
     if not isinstance(values, dict):
@@ -37,11 +31,7 @@ def read_json(path: Path, option: str = "", *, at_most: int = TEXT_BYTES) -> dic
 
 
 def parse_json(data: bytes | str, where: str) -> Any:
-    """JSON values without NaN, infinities, and numbers that no computer holds, nested ``MAX_DEPTH`` at most.
-
-    Raises:
-        InputError: The data is anything else.
-    """
+    """JSON values without NaN, infinities and far too large numbers, nested ``MAX_DEPTH`` at most."""
     try:
         values = msgspec.json.decode(data)
     except RecursionError:
@@ -55,11 +45,7 @@ def parse_json(data: bytes | str, where: str) -> Any:
 
 
 def of_type(values: object, kind: type[T], where: str) -> T:
-    """JSON values as a ``msgspec.Struct`` or any type that msgspec knows; wrong ones are named by their path.
-
-    Raises:
-        InputError: They are of other types, or out of their bounds.
-    """
+    """JSON values as any type that msgspec knows, such as a struct; errors give the path of a wrong one."""
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:

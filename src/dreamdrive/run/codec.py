@@ -68,9 +68,6 @@ def write(folder: Path, value: object, header: dict[str, Any]) -> None:
 
     The arrays are written first and the JSON, which holds their digest, last, each under a temporary name:
     after a kill at any moment the folder holds a whole result or one that ``read`` refuses.
-
-    Raises:
-        InputError: The disk is full or the place is not writable.
     """
     arrays: dict[str, np.ndarray] = {}
     document = {"header": header, "value": _encode(value, "value", arrays)}
@@ -92,15 +89,9 @@ def read_header(folder: Path) -> dict[str, Any] | None:
 
 
 def read(folder: Path, kind: type[T] = object) -> T:
-    """What ``write`` stored; every noun of the types and shapes that it has.
+    """What ``write`` stored; every noun of the types and shapes that it has, and the whole of ``kind``.
 
-    Args:
-        folder: Where it lies.
-        kind: What it has to be.
-
-    Raises:
-        DamagedError: The files are missing, cut short or changed, do not belong together, or are too large
-            for the memory that is free.
+    ``DamagedError`` says what is wrong, or that it is too large for the memory that is free.
     """
     try:
         document = _document(folder)

@@ -16,12 +16,7 @@ from dreamdrive.splat import render_scene, ssim_map
 
 @dataclass(frozen=True)
 class Likeness:
-    """How like its reference an image is.
-
-    Attributes:
-        psnr: Peak signal to noise ratio in decibels, of values in [0, 1].
-        ssim: Structural similarity, window of 11 pixels with a deviation of 1.5.
-    """
+    """PSNR in decibels, of values in [0, 1], and SSIM, with a window of 11 pixels and a deviation of 1.5."""
 
     psnr: float
     ssim: float

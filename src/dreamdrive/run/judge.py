@@ -64,15 +64,7 @@ def facts_of(
     held_out: dict[int, Likeness],
     blended: dict[int, Likeness],
 ) -> Facts:
-    """What there is to say of a result.
-
-    Args:
-        clip: The frames; of several cameras the first one counts.
-        geometry: Their geometry.
-        quality: Which steps were taken.
-        held_out: Likeness of the withheld frames, by index in the clip.
-        blended: The same of blending their neighbours.
-    """
+    """What there is to say of a result, of its first camera; ``blended`` is of blending the neighbours."""
     lead = clip.of_camera(int(clip.camera[0]))
     source, times_s = clip.source_index[lead], clip.times_s[lead]
     kind = geometry.fallback_kind or (None if geometry.fallback is None else "refused")

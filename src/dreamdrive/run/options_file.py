@@ -23,9 +23,6 @@ def read_options(path: Path, base: Options) -> Options:
 
     The file holds tables such as ``[fit]`` with ``steps = 600``; every field of ``Options`` can be set but
     the seed and the weights, which have flags.
-
-    Raises:
-        InputError: The file is no TOML, names no option, or holds a value of another type or range.
     """
     try:
         values = tomllib.loads(read_text(path))

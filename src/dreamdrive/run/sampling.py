@@ -34,16 +34,8 @@ def sample(
 ) -> Clip:
     """Run a prior and write what it gives in the format of ``data.recording``, for ``replay`` to take up.
 
-    Args:
-        control: The input and how to read it.
-        out: Folder to write.
-        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
-        weights: The prior's network: a file or folder, or a name, see ``hub.find_weights``.
-        force: Replace an older folder of this kind.
-        progress: Told of every step.
-
-    Raises:
-        InputError: The input, an option, the weights or ``out`` cannot be used.
+    Without a name the input decides on the prior, see ``prior.prior_of``; weights as of ``hub.find_weights``.
+    ``force`` replaces an older folder of this kind.
     """
     name = prior or prior_of(control.path, weights is not None)
     control = control if weights is None else replace(control, weights=find_weights(weights))
@@ -100,19 +92,8 @@ def clip_features(
 ) -> FeatureFile:
     """Features of a recorded clip by the network of Vista or Stable Video Diffusion, written to a file.
 
-    Args:
-        path: A video or a folder of images.
-        out: File to write.
-        weights: The network: a file or folder, or a name, see ``hub.find_weights``.
-        options: Fields of ``prior.vista.features.FeatureOptions``.
-        frames: ``START:STOP:STEP`` over the frames of the clip; all without it.
-        size: Width and height at which the network sees the frames.
-        action: What the car does, for Vista.
-        seed: Of the noise.
-        progress: Told of every window of frames.
-
-    Raises:
-        InputError: The clip, the weights or an option cannot be used, or the file cannot be written.
+    Options are fields of ``prior.vista.features.FeatureOptions``, weights as of ``hub.find_weights``;
+    ``size`` is the one at which the network sees the frames, ``action`` what the car does, for Vista.
     """
     from dreamdrive.prior.vista.features import FeatureOptions, video_features
 

@@ -37,13 +37,7 @@ _log = logging.getLogger("dreamdrive")
 
 @dataclass(frozen=True)
 class StageRecord:
-    """What a stage cost when it was computed.
-
-    Attributes:
-        seconds: Wall time.
-        peak_rss_mb: Largest memory of the process up to the end of the stage.
-        cached: Whether the result was read rather than computed this time.
-    """
+    """What a stage cost when it was computed; memory is the process's largest until then."""
 
     seconds: float
     peak_rss_mb: float
@@ -52,12 +46,7 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class Storage(Generic[T]):
-    """How results of one kind lie in a folder.
-
-    Attributes:
-        write: Stores a value in a folder, or replaces the one there; whole or not at all.
-        read: Reads it back, or raises ``InputError``.
-    """
+    """How results of one kind lie in a folder: whole or not at all; ``InputError`` tells of unusable ones."""
 
     write: Callable[[Path, T], None]
     read: Callable[[Path], T]
@@ -267,12 +256,7 @@ def program_digest() -> str:
 def file_digest(path: Path, *, deep: bool = False) -> str:
     """SHA-256 of a file's content, or of names and contents of the files in a folder.
 
-    Args:
-        path: A file or a folder; hidden files in it do not count. Links are followed.
-        deep: Whether the folders in a folder count.
-
-    Raises:
-        InputError: It is neither a regular file nor a folder, or may not be read.
+    Hidden files in it do not count, the folders in it if ``deep``. Links are followed.
     """
     if not path.is_dir():
         with open_file(path) as file:

@@ -48,11 +48,7 @@ class Control:
     seed: int = 0
 
     def check_taken(self, takes: frozenset[str], by: str) -> None:
-        """Whether all that is given is honoured; ``seed`` and ``weights`` go without saying.
-
-        Raises:
-            InputError: It is not.
-        """
+        """Refuse what is given and not taken; ``seed`` and ``weights`` go without saying."""
         given = [field.name for field in fields(self) if getattr(self, field.name) is not None]
         if refused := [name for name in given if name not in takes | {"seed", "weights"}]:
             raise InputError(f"{by} takes no {' and no '.join(refused)}; it takes {', '.join(sorted(takes))}")

@@ -51,11 +51,7 @@ class Look:
 
 
 def check_size(look: Look) -> None:
-    """Refuse sizes that cannot be rendered or kept, before anything is loaded.
-
-    Raises:
-        InputError: The size is too small, too large, or odd for a video.
-    """
+    """Refuse sizes that cannot be rendered or kept, before anything is loaded."""
     if look.size is None:
         return
     width, height = look.size
@@ -83,9 +79,6 @@ def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Ca
     1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing; ``alpha``
     float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has calibration,
     poses and times. One frame is held at a time. ``progress`` is called with the number of frames done.
-
-    Raises:
-        InputError: It cannot be written, or the rate is none of a video.
     """
     camera = view_camera(scene.cameras[0], look.size)
     part = look.show if look.show in ("dynamic", "static") else "all"
@@ -106,11 +99,7 @@ def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Ca
 
 
 def video_rate(drive: Drive, look: Look) -> float:
-    """Frames a second of a video of a drive.
-
-    Raises:
-        InputError: No video has that rate.
-    """
+    """Frames a second of a video of a drive, within ``RATES_HZ``."""
     rate = frame_rate(drive.path) if look.fps is None else look.fps
     if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
         raise InputError(

@@ -92,11 +92,7 @@ def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
 
 
 def write_png(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
-    """Write an RGB picture; the file appears when it is whole.
-
-    Raises:
-        InputError: It cannot be written.
-    """
+    """Write an RGB picture; the file appears when it is whole."""
     encoded = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))[1]
     with new_file(path) as partial:
         partial.write_bytes(encoded.tobytes())

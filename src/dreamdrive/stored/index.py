@@ -78,11 +78,7 @@ class StoredIndex(msgspec.Struct, frozen=True):
 
 
 def increasing(values: list[float], name: str) -> Float[np.ndarray, " t"]:
-    """Times as an array.
-
-    Raises:
-        ValueError: They do not increase.
-    """
+    """Times as an array; ``ValueError`` where they do not increase."""
     times_s = np.array(values, dtype=np.float64)
     if (np.diff(times_s) <= 0).any():
         raise ValueError(f"{name} do not increase")

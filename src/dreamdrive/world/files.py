@@ -66,7 +66,7 @@ MARK = "layout.json"
 def write_world(
     drives: Mapping[Mount, Drive], path: Path, *, corruption: Corruption | None = None, replace: bool = False
 ) -> None:
-    """Write a world folder; it appears whole or not at all.
+    """Write a world folder, with a drive for each camera; it appears whole or not at all.
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
     itself. Of every camera there are: ``frames/NNNN.png``; ``cameras.json`` (calibration and poses, principal
@@ -74,13 +74,8 @@ def write_world(
     ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``); ``flow.npz`` (``flow_px``, to
     the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
     ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
-    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``.
-
-    Args:
-        drives: One for each camera, by its mount.
-        path: The folder.
-        corruption: What was done to the frames, noted in ``cameras.json``.
-        replace: Whether an existing world folder may be replaced.
+    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``. What was done
+    to the frames is noted in ``cameras.json``.
 
     Raises:
         InputError: Something else is at ``path``, or it cannot be written; what was there stays.

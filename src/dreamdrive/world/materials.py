@@ -28,14 +28,7 @@ class Semantic(IntEnum):
 
 @dataclass
 class Materials:
-    """All materials of a world, by index.
-
-    Attributes:
-        textures: Their images.
-        texture: Image of each.
-        semantic: Class of each.
-        gloss: Share of the light that each mirrors when seen from straight above.
-    """
+    """All materials of a world, by index; gloss is the light mirrored when seen from straight above."""
 
     textures: Textures = field(default_factory=Textures)
     texture: list[int] = field(default_factory=list)

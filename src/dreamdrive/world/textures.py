@@ -14,11 +14,7 @@ _ROW = 4096  # OpenCV limits a row of its sampling maps to 32767 entries
 
 @dataclass
 class Textures:
-    """Images with their halved copies, packed into one atlas.
-
-    Attributes:
-        images: RGB images, each with whether it repeats; the others continue their last texel.
-    """
+    """Images with their halved copies in one atlas; those that do not repeat continue their last texel."""
 
     images: list[tuple[UInt8[np.ndarray, "h w 3"], bool]] = field(default_factory=list)
     _atlas: np.ndarray | None = None

@@ -18,9 +18,6 @@ def corrupt(
     Frame k depends on the seed, on k and on the picture alone: a longer clip begins with the same frames.
     What is off leaves no trace; with all off the frames come back bit for bit. Only ``far`` looks at the
     depth along z, 0 in the sky.
-
-    Raises:
-        InputError: ``far`` is asked for and there is no depth.
     """
     if corruption.far > 0 and depth_m is None:
         raise InputError(
