@@ -21,10 +21,10 @@ _NO_NUMBER = re.compile(rb"[\s:,\[]-?(?:NaN|Infinity)\b")
 T = TypeVar("T")
 
 
-def read_json(path: Path, option: str = "", *, at_most: int = TEXT_BYTES) -> dict[str, Any]:
-    """The JSON object in a file of ``at_most`` bytes."""
+def read_json(path: Path, option: str = "", *, follow: bool = True) -> dict[str, Any]:
+    """The JSON object in a file, or in what a link there leads to unless ``follow`` is off."""
     where = f"{option} {path}".strip()
-    values = parse_json(read_bytes(path, where, at_most=at_most), where)
+    values = parse_json(read_bytes(path, where, at_most=TEXT_BYTES, follow=follow), where)
     if not isinstance(values, dict):
         raise InputError(f"{where}: expected a JSON object, got a {type(values).__name__}")
     return cast("dict[str, Any]", values)

@@ -16,8 +16,6 @@ from dreamdrive.run.stages import digest, file_digest
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-_FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
-
 
 @dataclass(frozen=True)
 class Request:
@@ -44,12 +42,7 @@ class Request:
         """All that the frames depend on."""
         files = {name: value for name, value in self.digests.items() if name != "weights"}
         packages = PRIORS.package(self.prior) | DATASETS.package(self.control.dataset)
-        return [self.prior, packages, self._settings, files, self.control.seed]
-
-    @property
-    def _settings(self) -> dict[str, Any]:
-        """The options of reading that are no files."""
-        return {k: v for k, v in asdict(self.control).items() if k not in (*_FILES, "seed")}
+        return [self.prior, packages, self.control.settings, files, self.control.seed]
 
     def read(self, work: Work) -> Clip:
         """The frames, with what the geometry files say of them."""
@@ -69,7 +62,7 @@ class Request:
             "geometry": geometry.pop("method"),
             "quality": self.quality,
             **geometry,
-            **self._settings,
+            **self.control.settings,
             **options,
         }
         return {"digests": self.digests, "options": chosen, "seed": self.control.seed}

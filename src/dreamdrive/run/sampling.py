@@ -17,10 +17,9 @@ from dreamdrive.progress import Progress, silent
 from dreamdrive.run.stages import file_digest
 from dreamdrive.scene.action import Action
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import FILES, Control
 
 _SEEN_PX = 1024
-_FILES = ("path", "intrinsics", "poses", "trajectory", "features", "weights")
 
 
 def sample(
@@ -41,7 +40,7 @@ def sample(
     control = control if weights is None else replace(control, weights=find_weights(weights))
     chosen = choose_prior(name)
     chosen.check(control)
-    for file in _FILES:
+    for file in FILES:
         path: Path | None = getattr(control, file)
         if path is not None and not path.exists():
             raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
@@ -57,18 +56,18 @@ def sample(
 
 def _about(prior: str, control: Control) -> dict[str, Any]:
     """What it takes to make the same again: files by name and content, all else by value."""
-    options = {k: v for k, v in asdict(control).items() if k not in (*_FILES, "seed") and v is not None}
-    given = {name: path for name in _FILES if isinstance(path := getattr(control, name), Path)}
-    files = {
-        name: {"name": path.name, "sha256": file_digest(path, deep=True)} for name, path in given.items()
-    }
+    given = {name: path for name in FILES if isinstance(path := getattr(control, name), Path)}
     return {
         "dreamdrive": __version__,
         "prior": prior,
         "seed": control.seed,
-        "options": options,
-        "files": files,
+        "options": {name: value for name, value in control.settings.items() if value is not None},
+        "files": {name: _named(path) for name, path in given.items()},
     }
+
+
+def _named(path: Path) -> dict[str, str]:
+    return {"name": path.name, "sha256": file_digest(path, deep=True)}
 
 
 def detailed_size(path: Path) -> tuple[int, int]:
@@ -113,7 +112,7 @@ def clip_features(
         "dreamdrive": __version__,
         "features": asdict(chosen),
         "clip": {"name": path.name, "sha256": file_digest(path)},
-        "weights": {"name": folder.name, "sha256": file_digest(folder, deep=True)},
+        "weights": _named(folder),
         INDEX: clip.source_index.tolist(),
         "action": None if action is None else asdict(action),
         "seed": seed,

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar, cast, get_args, runtime_checkable
+from typing import Any, Generic, TypeVar, cast, get_args
 
 import numpy as np
 import torch
@@ -60,9 +60,8 @@ def trusted(value: object) -> None:
     """No check."""
 
 
-@runtime_checkable
-class Run(Protocol):
-    """What gives the result of a stage: ``call`` computes it, ``Stages`` keeps it on disk."""
+class Run:
+    """What gives the result of a stage: this computes it and keeps nothing, ``Stages`` keeps it on disk."""
 
     def __call__(
         self,
@@ -73,33 +72,20 @@ class Run(Protocol):
         check: Callable[[T], None] = trusted,
         given: T | None = None,
     ) -> T:
-        """The result.
+        """The result of one of ``STAGES``, unless it is given.
 
-        Args:
-            name: One of ``STAGES``.
-            options: All that the result depends on beside the results before it.
-            compute: Makes the result.
-            check: Raises ``ValueError`` where a stored result does not belong to those before it.
-            given: The result, where it is known already.
+        It depends on the options and the results before it, nothing else; ``check`` raises ``ValueError``
+        where a stored result does not belong to these.
         """
-        ...
+        return compute(Work()) if given is None else given
 
 
-def call(
-    name: str,
-    options: object,
-    compute: Callable[[Work], T],
-    *,
-    check: Callable[[T], None] = trusted,
-    given: T | None = None,
-) -> T:
-    """A ``Run`` that keeps nothing."""
-    return compute(Work()) if given is None else given
+call = Run()
 
 
 @dataclass
-class Stages:
-    """A ``Run`` that reads what an earlier run of the same stages left, and leaves what it computes.
+class Stages(Run):
+    """Reads what an earlier run of the same stages left, and leaves what it computes.
 
     The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
     result is found again only by the program that made it.
@@ -203,9 +189,8 @@ class _Header:
 
 def _header(folder: Path) -> _Header | None:
     """What is noted beside the result in a folder; None where there is none, or no such note."""
-    found = codec.read_header(folder)
     try:
-        return None if found is None else of_type(found, _Header, str(folder))
+        return of_type(codec.read_header(folder), _Header, str(folder))
     except InputError:
         return None
 

@@ -12,8 +12,8 @@ from typing import Any, cast
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file, remove
-from dreamdrive.files.json_file import parse_json
-from dreamdrive.files.paths import TEXT_BYTES, inside, is_inside, read_bytes
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import inside, is_inside
 from dreamdrive.run.stages import digest
 
 OURS = ("held_out", "report.json", "report.png", "scene", "stages", "video")
@@ -179,10 +179,9 @@ def _remove_file(out: Path, name: Path) -> None:
 def _read(path: Path) -> dict[str, Any]:
     """The JSON object in one of our own files; nothing where it is damaged or something else."""
     try:
-        document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
+        return read_json(path, follow=False)
     except InputError:
         return {}
-    return cast("dict[str, Any]", document) if isinstance(document, dict) else {}
 
 
 def _identity(path: Path) -> str | None:
