@@ -1,17 +1,18 @@
 """Calibration files, and the guess where there is none."""
 
-import json
 from dataclasses import dataclass
-from math import isfinite, radians, tan
+from math import radians, tan
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal
+
+import msgspec
 
 from dreamdrive.data.distortion import Distortion, check_bend
-from dreamdrive.data.formats.cameras import LensCamera, different
+from dreamdrive.data.formats.cameras import Intrinsics, LensCamera, different
 from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
 from dreamdrive.data.formats.nerfstudio import frame_camera, transforms_frames
 from dreamdrive.errors import InputError
-from dreamdrive.files.json_file import read_json
+from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.scene.camera import Camera
 
 DEFAULT_FOCAL = 0.85
@@ -89,27 +90,39 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         raise InputError(f"--intrinsics {path}: {error}") from None
 
 
+class _Bend(msgspec.Struct):
+    model: str
+    coefficients: list[float]
+
+
+class _Told(msgspec.Struct):
+    """What a calibration file holds; some programs write whole sizes as 1280.0."""
+
+    width: float
+    height: float
+    intrinsics: Intrinsics
+    distortion: _Bend | str | None = None
+
+
 def _of_json(path: Path) -> tuple[LensCamera, list[str]]:
     """The camera at the size that the file is for, and what to say about its lens."""
     values = read_json(path, "--intrinsics")
-    pinhole = values.get("intrinsics")
-    if not isinstance(pinhole, dict):
+    if not isinstance(values.get("intrinsics"), dict):
         raise InputError(
             f"--intrinsics {path} holds no calibration; expected JSON with width, height and "
             'intrinsics {"fx", "fy", "cx", "cy"} in pixels, a COLMAP model or a transforms.json'
         )
-    pinhole = cast("dict[str, Any]", pinhole)
-    width, height = (_number(path, values, name) for name in ("width", "height"))
-    fx, fy, cx, cy = (_number(path, pinhole, name) for name in ("fx", "fy", "cx", "cy"))
+    told = of_type(values, _Told, f"--intrinsics {path}")
+    k, width, height = told.intrinsics, told.width, told.height
     whole = width % 1 == height % 1 == 0
-    if not whole or min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
+    if not whole or min(width, height, k.fx, k.fy) <= 0 or not (0 <= k.cx < width and 0 <= k.cy < height):
         raise InputError(
             f"--intrinsics {path}: expected whole positive sizes, positive focal lengths and a principal "
-            f"point inside the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, "
-            f"cx {cx:g}, cy {cy:g}"
+            f"point inside the image, got width {width:g}, height {height:g}, fx {k.fx:g}, fy {k.fy:g}, "
+            f"cx {k.cx:g}, cy {k.cy:g}"
         )
-    camera = Camera(fx, fy, cx + 0.5, cy + 0.5, int(width), int(height))
-    distortion, notes = _distortion(path, values.get("distortion"))
+    camera = Camera(k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, int(width), int(height))
+    distortion, notes = _distortion(path, told.distortion)
     return LensCamera(camera, distortion), notes
 
 
@@ -129,25 +142,11 @@ def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
     return different([colmap_camera(camera, str(folder)) for camera in model.cameras.values()])[0]
 
 
-def _number(path: Path, values: dict[str, Any], name: str) -> float:
-    value = values.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise InputError(f"--intrinsics {path}: expected a number for {name}, got {json.dumps(value)}")
-    return float(value)
-
-
-def _distortion(path: Path, value: object) -> tuple[Distortion | None, list[str]]:
-    if value is None or isinstance(value, str):
+def _distortion(path: Path, value: _Bend | str | None) -> tuple[Distortion | None, list[str]]:
+    if not isinstance(value, _Bend):
         said = f' (the calibration says "{value}")' if value else ""
         return None, [f"No distortion coefficients are given: the lens distortion is taken as zero{said}."]
-    values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
-    name, numbers = values.get("model"), values.get("coefficients")
-    if not isinstance(name, str) or not isinstance(numbers, list):
-        raise InputError(f'--intrinsics {path}: expected distortion {{"model", "coefficients"}} or a text')
-    coefficients = tuple(
-        _number(path, {"distortion coefficients": n}, "distortion coefficients")
-        for n in cast("list[object]", numbers)
-    )
+    name, coefficients = value.model, tuple(value.coefficients)
     check_bend(coefficients, f"--intrinsics {path}")
     model, order = _model(path, name)
     allowed = (4,) if model == "fisheye" else (4, 5, 8, 12, 14)

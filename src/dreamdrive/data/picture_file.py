@@ -49,6 +49,11 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     return _upright(np.asarray(picture), header.orientation)
 
 
+def write_picture(path: Path, picture: Shaped[np.ndarray, "h w *c"]) -> None:
+    """Write a PNG of what ``read_picture`` gives."""
+    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+
+
 def _check(header: Header, data: bytes, where: str) -> None:
     """Refuse what would take more memory or time than a picture should."""
     width, height = header.width_px, header.height_px

@@ -16,6 +16,7 @@ from dreamdrive.data.formats.pose_lists import (
 )
 from dreamdrive.data.formats.rigid import PoseRows
 from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_file
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import read_text
 from dreamdrive.scene.trajectory import Trajectory
@@ -50,14 +51,9 @@ def read_trajectory(path: Path) -> Trajectory:
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write TUM, or JSON where the name ends in ``.json``; an older file is replaced in one step."""
-    draft = path.with_name(path.name + ".part")
-    try:
-        draft.write_text(
-            json_of(trajectory) if path.suffix.lower() == ".json" else text_of(trajectory), "utf-8"
-        )
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}") from error
+    text = json_of(trajectory) if path.suffix.lower() == ".json" else text_of(trajectory)
+    with new_file(path) as partial:
+        partial.write_text(text, "utf-8")
 
 
 def of_frames(

@@ -3,11 +3,13 @@
 What is not raises ``InputError``, which calls the file ``where``, or by ``option`` and path.
 """
 
+import json
 import re
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import msgspec
+import numpy as np
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import TEXT_BYTES, read_bytes
@@ -28,6 +30,12 @@ def read_json(path: Path, option: str = "", *, follow: bool = True) -> dict[str,
     if not isinstance(values, dict):
         raise InputError(f"{where}: expected a JSON object, got a {type(values).__name__}")
     return cast("dict[str, Any]", values)
+
+
+def write_json(path: Path, values: dict[str, Any]) -> None:
+    """Write values and arrays as readable JSON without NaN."""
+    text = json.dumps(values, indent=1, allow_nan=False, default=np.ndarray.tolist)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 def parse_json(data: bytes | str, where: str) -> Any:

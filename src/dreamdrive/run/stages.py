@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast, get_args
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 import torch
@@ -24,7 +24,6 @@ from dreamdrive.files.json_file import of_type
 from dreamdrive.files.paths import inside, open_file
 from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run import codec
-from dreamdrive.scene.scene import Scene
 from dreamdrive.stored import load_scene, save_scene
 
 STAGES: tuple[str, ...] = get_args(Stage)
@@ -44,16 +43,8 @@ class StageRecord:
     cached: bool
 
 
-@dataclass(frozen=True)
-class Storage(Generic[T]):
-    """How results of one kind lie in a folder: whole or not at all; ``InputError`` tells of unusable ones."""
-
-    write: Callable[[Path, T], None]
-    read: Callable[[Path], T]
-
-
-_STORAGE = {"fit": Storage[Scene](lambda path, scene: save_scene(scene, path, replace=True), load_scene)}
-"""Results that ``codec`` does not know."""
+_SCENE = "fit"
+"""The stage whose result is a scene, which ``codec`` does not know."""
 
 
 def trusted(value: object) -> None:
@@ -128,7 +119,7 @@ class Stages(Run):
         found = None if fresh else _header(folder)
         if found is not None and found.key == self._last:
             try:
-                value = cast(T, _load(folder, _STORAGE.get(name)))
+                value = cast(T, _load(folder))
                 check(value)
             except ValueError as error:
                 _log.warning("%s is computed again: %s", name, error)
@@ -172,10 +163,10 @@ class Stages(Run):
         value = self.measure(name, lambda tell: compute(Work(tell, keep)))
         record = self.records[name]
         self.claim()
-        folder, storage = inside(self.folder, name), _STORAGE.get(name)
-        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)), storage)
+        folder = inside(self.folder, name)
+        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)))
         remove(parts)
-        return cast(T, _load(folder, storage))
+        return cast(T, _load(folder))
 
 
 @dataclass(frozen=True)
@@ -195,18 +186,18 @@ def _header(folder: Path) -> _Header | None:
         return None
 
 
-def _store(folder: Path, value: object, header: dict[str, Any], storage: Storage[Any] | None) -> None:
-    if storage is None:
+def _store(folder: Path, value: Any, header: dict[str, Any]) -> None:
+    if folder.name != _SCENE:
         codec.write(folder, value, header)
         return
     # A folder without a header holds nothing, so that a kill on the way leaves no mixture behind.
     (folder / codec.JSON_NAME).unlink(missing_ok=True)
-    storage.write(folder / "value", value)
+    save_scene(value, folder / "value", replace=True)
     codec.write(folder, None, header)
 
 
-def _load(folder: Path, storage: Storage[Any] | None) -> object:
-    return codec.read(folder) if storage is None else storage.read(inside(folder, "value"))
+def _load(folder: Path) -> object:
+    return load_scene(inside(folder, "value")) if folder.name == _SCENE else codec.read(folder)
 
 
 def digest(value: object) -> str:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
 from dreamdrive.choices import Format, Show
+from dreamdrive.data.formats.cameras import indexed_pinhole
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import RATES_HZ, Drive, frame_rate
@@ -145,21 +146,18 @@ def _write_frame(path: Path, view: SceneView, show: Show) -> None:
         else:
             np.savez(path, colour=colour, depth_m=depth_m, alpha=alpha)
     elif show == "depth":
-        path.write_bytes(cv2.imencode(".png", depth_png(view))[1].tobytes())
+        write_picture(path, depth_png(view))
     else:
         write_png(path, _picture(view, show))
 
 
 def _note(camera: Camera, drive: Trajectory, look: Look) -> dict[str, Any]:
     """Calibration as ``--intrinsics`` reads it (pixels by integer index), path as ``--trajectory`` does."""
-    intrinsics = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
     unit = {"depth_unit": f"1/{PER_METRE} m"} if (look.show, look.format) == ("depth", "png") else {}
     return {
         "show": look.show,
         **unit,
-        "width": camera.width_px,
-        "height": camera.height_px,
-        "intrinsics": intrinsics,
+        **indexed_pinhole(camera),
         "world_from_camera": drive.world_from_camera.tolist(),
         "times_s": drive.times_s.tolist(),
     }

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -63,6 +64,12 @@ class Intrinsics(msgspec.Struct):
     fy: float
     cx: float
     cy: float
+
+
+def indexed_pinhole(camera: Camera) -> dict[str, Any]:
+    """What ``IndexedPinhole`` reads, and ``--intrinsics``."""
+    numbers = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
+    return {"width": camera.width_px, "height": camera.height_px, "intrinsics": numbers}
 
 
 class IndexedPinhole(msgspec.Struct):

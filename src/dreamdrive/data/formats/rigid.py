@@ -13,6 +13,11 @@ RIGID_TOLERANCE = 1e-3
 """How far R R^T may be from the identity, and a quaternion's length from 1: files print few digits."""
 
 
+_Row = tuple[float, float, float, float]
+JsonPose = tuple[_Row, _Row, _Row, _Row]
+"""A 4x4 matrix in JSON."""
+
+
 @dataclass(frozen=True)
 class PoseRows:
     """The poses (N, 4, 4) of a file as they stand there, in its own world; ``where`` is how messages call it.
