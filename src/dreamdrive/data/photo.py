@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.data.frame import RawFrame
-from dreamdrive.data.images import SUFFIXES, read_image
+from dreamdrive.data.images import SUFFIXES, RawFrame, read_image
 from dreamdrive.data.intrinsics import calibration
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.remarks import of_damage

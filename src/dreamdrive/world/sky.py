@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.scene.layout import Light
+from dreamdrive.world.materials import sampled
 from dreamdrive.world.paint import noise
-from dreamdrive.world.textures import sampled
 
 _SHAPE = (128, 512)
 _SUN = np.array([1.0, 0.94, 0.84], np.float32)
