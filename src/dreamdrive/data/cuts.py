@@ -32,13 +32,11 @@ class Cut:
 
 @dataclass(frozen=True)
 class Found:
-    """What was found in the frames of one camera.
+    """What was found in the frames of one camera, in the order of time.
 
-    Attributes:
-        cuts: Changes to another scene, in the order of time.
-        blank: Frames without any texture, such as black ones.
-        strange: Single frames that have nothing in common with those around them, which show one scene.
-        apart: Whether most frames have nothing in common with the next one, so that no cut can be told.
+    Blank frames are without any texture, such as black ones; strange ones are single and have nothing in
+    common with those around them, which show one scene. If most frames have nothing in common with the next
+    one they are ``apart``, so that no cut can be told.
     """
 
     cuts: tuple[Cut, ...] = ()

@@ -17,16 +17,12 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 
 @dataclass(frozen=True)
 class RawFrame:
-    """One picture at its own size, turned upright.
+    """One picture at its own size, turned upright, with sentences for the report.
 
-    Attributes:
-        index: Index in the source, in file or decode order.
-        name: What to call it in messages.
-        rgb: The picture (H, W, 3).
-        opaque: False where the file marks the pixel as transparent (H, W); ``None`` where nothing is.
-        time_s: Seconds since frame 0 of the source, or ``None`` where the file has no clock.
-        notes: What the report should say about the file, a sentence each.
-        damaged: Whether the decoder patched it up, or built it upon a frame that it patched up.
+    ``index`` is that in the source, in file or decode order, ``name`` what messages call it. ``opaque`` is
+    False where the file marks a pixel as transparent, None where nothing is. The time is since frame 0 of the
+    source, None where the file has no clock. A damaged frame was patched up by the decoder, or built upon one
+    that was.
     """
 
     index: int

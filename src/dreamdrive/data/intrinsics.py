@@ -23,13 +23,10 @@ _OPENCV_ORDER = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3
 
 @dataclass(frozen=True)
 class Calibration:
-    """The camera that took the source.
+    """The camera that took the source, with sentences for the report.
 
-    Attributes:
-        camera: Pinhole at the source's size; pixel centres at +0.5.
-        distortion: ``None`` where there is none or where it is unknown.
-        known: Whether it comes from a calibration file.
-        notes: What the report should say, a sentence each.
+    The pinhole is at the source's size; there is no distortion or it is unknown where it is None. ``known``
+    tells a calibration file from a guess.
     """
 
     camera: Camera

@@ -109,12 +109,8 @@ class Undistorter:
 
     Every clip pixel is the mean of n x n bicubic lookups in the source, n being at least the number of source
     pixels per clip pixel: the area average of the undistorted image, without making that image first.
-
-    Attributes:
-        maps: Where the lookups lie in the (shrunk) source, x and y, in OpenCV's pixel indices.
-        shrunk: Size to which the source is area-averaged first; the source's own up to a ratio of 4.
-        target: Size of the clip.
-        valid: Clip pixels whose lookups all lie inside the source.
+    ``maps`` say where the lookups lie, x and y, in OpenCV's pixel indices; the source is first area-averaged
+    to ``shrunk``, its own size up to a ratio of 4. A pixel is valid whose lookups all lie inside the source.
     """
 
     maps: tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]

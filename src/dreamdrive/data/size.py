@@ -21,11 +21,7 @@ MAX_CROP = 0.02
 class Sizing:
     """Scale to cover the target, then cut the centre; every pair is width, height in pixels.
 
-    Attributes:
-        source: Size of the source.
-        scaled: Size after scaling, at least the target.
-        offset: Columns and rows cut away at the left and the top.
-        target: Size of the clip.
+    ``offset`` are the columns and rows cut away at the left and the top.
     """
 
     source: tuple[int, int]

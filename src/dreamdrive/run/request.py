@@ -21,13 +21,9 @@ from dreamdrive.scene.control import Control
 class Request:
     """What a result is made from.
 
-    Attributes:
-        control: The input and how to read it, with the network of the prior.
-        prior: Name of the prior.
-        geometry_files: Cameras, poses and depth that are given, see ``geometry.backends.files``.
-        options: How the scene is built; its seed is the control's.
-        quality: Name of those options in ``options.QUALITIES``, or ``"custom"``.
-        digests: What given files hold: they count by their content, not by their place.
+    The control has the network of the prior, the options its seed; ``quality`` is their name in
+    ``QUALITIES``, or ``"custom"``. Given files count by their content, of which there are digests, not by
+    their place. Those for the geometry see ``geometry.backends.files``.
     """
 
     control: Control
@@ -77,11 +73,7 @@ def request_of(
     geometry_weights: str | Path | None = None,
     options: Options | QualityName = "standard",
 ) -> Request:
-    """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``.
-
-    Raises:
-        InputError: The input or an option cannot be used.
-    """
+    """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``."""
     prior = prior or ("replay" if control.dataset else prior_of(control.path, weights is not None))
     whole = QUALITIES[options] if isinstance(options, str) else options
     control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)

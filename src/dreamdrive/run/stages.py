@@ -76,18 +76,12 @@ call = Run()
 
 @dataclass
 class Stages(Run):
-    """Reads what an earlier run of the same stages left, and leaves what it computes.
+    """Reads what an earlier run of the same stages left, and leaves what it computes, a folder for each.
 
     The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
-    result is found again only by the program that made it.
-
-    Attributes:
-        folder: One folder a stage is kept in here.
-        recompute_from: Results of this stage and all later ones are not read.
-        progress: Told of every step.
-        claim: Called before something is written.
-        records: Cost of each stage that ran.
-        results: Result of each stage that ran, or was given.
+    result is found again only by the program that made it. Those of ``recompute_from`` and later stages are
+    not read. ``claim`` is called before something is written. Records and results are those of each stage
+    that ran.
     """
 
     folder: Path

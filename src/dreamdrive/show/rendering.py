@@ -36,13 +36,9 @@ _BYTES_PER_PX = 200
 
 @dataclass(frozen=True)
 class Look:
-    """What is shown of a drive, and how it is kept.
+    """What is shown of a drive, and how it is kept: a video, or a folder with a file a frame.
 
-    Attributes:
-        show: Everything, its depth, or the dynamic or the static part alone.
-        format: A video, or a folder with a picture or with arrays a frame.
-        size: Width and height in pixels; None is those of the recording.
-        fps: Rate of a video; None is that of the drive.
+    Without a size it is that of the recording, without a rate that of the drive.
     """
 
     show: Show = "colour"

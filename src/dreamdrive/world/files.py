@@ -67,15 +67,12 @@ def write_world(
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
     itself. Of every camera there are: ``frames/NNNN.png``; ``cameras.json`` (calibration and poses, principal
-    point by integer pixel index) and ``depth/NNNN.npz`` (``depth_m``, 0 in the sky), which together are what
-    ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``); ``flow.npz`` (``flow_px``, to
-    the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
-    ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
-    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``. What was done
-    to the frames is noted in ``cameras.json``.
-
-    Raises:
-        InputError: Something else is at ``path``, or it cannot be written; what was there stays.
+    point by integer pixel index, what was done to the frames) and ``depth/NNNN.npz`` (``depth_m``, 0 in the
+    sky), which together are what ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``);
+    ``flow.npz`` (``flow_px``, to the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``,
+    ``moving/NNNN.png``, ``sky/NNNN.png``; ``boxes.json`` (hulls with a pose a frame, in the camera's world).
+    One camera lies in the folder itself, several in folders of their names, with their mountings in
+    ``rig.json``, see ``data.rig``.
     """
     first = next(iter(drives.values()))
     if len(first.boxes) > MOST_BOXES:
@@ -94,11 +91,7 @@ def write_world(
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:
-    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone.
-
-    Raises:
-        InputError: It is no world folder, or a part of it is missing, damaged or of another size.
-    """
+    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone."""
     if not (path / "layout.json").is_file():
         raise InputError(
             f"{path} is no world: layout.json is missing; expected a folder of dreamdrive world make"
