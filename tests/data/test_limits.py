@@ -79,14 +79,15 @@ def rig(path: Path) -> object:
         ),
         (
             rig,
-            {"cameras": [{}] * 33},
+            {"cameras": [{"frames": "a", "car_from_camera": np.eye(4).tolist()}] * 33},
             "PLACE/rig.json lists 33 cameras; expected at most 32 on one car",
         ),
         (
             rig,
-            {"cameras": [{"frames": "a" * 300}]},
-            'PLACE/rig.json: camera 0 names no frames; expected {"cameras": [{"frames": folder, '
-            '"intrinsics": file, "car_from_camera": 4x4 in metres}, ...]}',
+            {"cameras": [{"frames": "a" * 300, "car_from_camera": np.eye(4).tolist()}]},
+            f"PLACE/rig.json: camera 0 names '{'a' * 300}', which is no file name; "
+            'expected {"cameras": [{"frames": folder, "intrinsics": file, "car_from_camera": 4x4 in metres}, '
+            "...]}",
         ),
     ],
 )

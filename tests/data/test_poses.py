@@ -55,7 +55,7 @@ def test_a_trajectory_survives_the_disk(tmp_path, count, seed, name):
 
 def test_an_unwritable_place_is_refused(tmp_path):
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="cannot write"):
         write_trajectory(Trajectory(drive(2), np.arange(2.0)), tmp_path / "file" / "a.json")
 
 

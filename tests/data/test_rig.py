@@ -82,14 +82,15 @@ GOOD: dict[str, Any] = {"frames": "a", "intrinsics": "a.json", "car_from_camera"
 @pytest.mark.parametrize(
     ("cameras", "message"),
     [
-        ([], "lists no cameras"),
-        (3, "lists no cameras"),
-        ([GOOD, 4], "camera 1 names no frames"),
-        ([{**GOOD, "frames": 3}], "camera 0 names no frames"),
-        ([{**GOOD, "intrinsics": 3}], "camera 0 has intrinsics that are no file name"),
-        ([{**GOOD, "car_from_camera": [[1, 0], [0, 1]]}], r"it has shape \(2, 2\)"),
-        ([{**GOOD, "car_from_camera": (2 * np.eye(4)).tolist()}], "no car_from_camera that is a rigid"),
-        ([{"frames": "a"}], "no car_from_camera"),
+        ([], r"length >= 1 - at `\$.cameras`; expected {"),
+        (3, r"`array`, got `int` - at `\$.cameras`; expected {"),
+        ([GOOD, 4], "`object`, got `int`"),
+        ([{**GOOD, "frames": 3}], r"got `int` - at `\$.cameras\[0\].frames`; expected {"),
+        ([GOOD, {**GOOD, "frames": ""}], "camera 1 names '', which is no file name; expected {"),
+        ([{**GOOD, "intrinsics": "a" * 300}], "camera 0 names 'aaaa.*', which is no file name"),
+        ([{**GOOD, "car_from_camera": [[1, 0], [0, 1]]}], r"`\$.cameras\[0\].car_from_camera`"),
+        ([{**GOOD, "car_from_camera": (2 * np.eye(4)).tolist()}], "camera 0 has no rigid pose: car_from"),
+        ([{"frames": "a"}], "missing required field `car_from_camera`"),
     ],
 )
 def test_a_malformed_rig_is_refused_by_what_is_wrong(tmp_path: Path, cameras: Any, message: str) -> None:

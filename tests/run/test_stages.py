@@ -12,7 +12,7 @@ from tests.streets import small_street, street_clip, true_geometry
 from dreamdrive import progress
 from dreamdrive.errors import InputError
 from dreamdrive.run import codec, stages
-from dreamdrive.run.stages import STAGES, Stages, Storage, digest, file_digest, stage_seed
+from dreamdrive.run.stages import STAGES, Stages, digest, file_digest, stage_seed
 from dreamdrive.scene.geometry import Geometry
 
 
@@ -162,8 +162,8 @@ def test_a_stage_of_other_storage_is_kept_as_well(tmp_path: Path, monkeypatch: p
             raise InputError("gone")
         return path.read_text()
 
-    storage = Storage(write=lambda path, value: _write_text(path, value), read=read)
-    monkeypatch.setitem(stages._STORAGE, "fit", storage)  # type: ignore[arg-type]
+    monkeypatch.setattr(stages, "save_scene", lambda value, path, replace: _write_text(path, value))
+    monkeypatch.setattr(stages, "load_scene", read)
     for expected in (["made"], []):
         calls: list[str] = []
         value = Work(tmp_path).stages("fit", None, lambda _, calls=calls: calls.append("made") or "text")

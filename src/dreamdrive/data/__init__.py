@@ -1,4 +1,7 @@
-"""Readers: recordings, calibration, poses and trajectories on disk, converted at the door."""
+"""Readers: recordings, calibration, poses and trajectories on disk, converted at the door.
+
+All of them raise ``InputError`` where a file or an option cannot be used.
+"""
 
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.data.dataset import DataSet, dataset_of, read_dataset

@@ -39,16 +39,7 @@ _DAMAGE = (
 
 
 def read_npz(path: Path, names: Sequence[str], *, at_most: int = ARRAY_BYTES) -> dict[str, np.ndarray]:
-    """Those of the named arrays that are in an NPZ.
-
-    Args:
-        path: The file.
-        names: Which arrays are wanted; others are not read.
-        at_most: Bytes that they may take together, see ``ARRAY_BYTES``.
-
-    Raises:
-        InputError: The file is missing, damaged or no NPZ, or an array is too large or does not hold numbers.
-    """
+    """Those of the named arrays that are in an NPZ, which may take ``at_most`` bytes together."""
     with open_file(path) as file:
         try:
             if directory_bytes(file) > _DIRECTORY_BYTES:
@@ -62,15 +53,7 @@ def read_npz(path: Path, names: Sequence[str], *, at_most: int = ARRAY_BYTES) ->
 
 
 def read_npy(path: Path, *, at_most: int = ARRAY_BYTES) -> Shaped[np.ndarray, "*d"]:
-    """The array in an NPY.
-
-    Args:
-        path: The file.
-        at_most: Bytes that it may take, see ``ARRAY_BYTES``.
-
-    Raises:
-        InputError: The file is missing, damaged or no NPY, or the array is too large or not of numbers.
-    """
+    """The array in an NPY, which may take ``at_most`` bytes."""
     with open_file(path) as file:
         try:
             return _array(file, at_most)

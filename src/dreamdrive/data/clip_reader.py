@@ -12,8 +12,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from dreamdrive.data.cuts import find_cuts
 from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
-from dreamdrive.data.frame import RawFrame
-from dreamdrive.data.images import ImageFolder
+from dreamdrive.data.images import ImageFolder, RawFrame
 from dreamdrive.data.intrinsics import Calibration, calibration
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.poses import of_frames, read_pose_file

@@ -24,12 +24,7 @@ _BEFORE, _AFTER = 3, 4  # frames that are asked whether the scene comes back
 
 @dataclass(frozen=True)
 class Cut:
-    """A change to another scene.
-
-    Attributes:
-        last: Index of the last frame of the scene before.
-        first: Index of the first frame of the scene after; frames between the two belong to neither.
-    """
+    """A change to another scene: the last frame before it, and the first after it."""
 
     last: int
     first: int
@@ -37,13 +32,11 @@ class Cut:
 
 @dataclass(frozen=True)
 class Found:
-    """What was found in the frames of one camera.
+    """What was found in the frames of one camera, in the order of time.
 
-    Attributes:
-        cuts: Changes to another scene, in the order of time.
-        blank: Frames without any texture, such as black ones.
-        strange: Single frames that have nothing in common with those around them, which show one scene.
-        apart: Whether most frames have nothing in common with the next one, so that no cut can be told.
+    Blank frames are without any texture, such as black ones; strange ones are single and have nothing in
+    common with those around them, which show one scene. If most frames have nothing in common with the next
+    one they are ``apart``, so that no cut can be told.
     """
 
     cuts: tuple[Cut, ...] = ()
@@ -55,12 +48,8 @@ class Found:
 def find_cuts(frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"]) -> Found:
     """Find changes to another scene: hard cuts, cuts by way of black, and fades of up to three frames.
 
-    A cut is where frames have nothing in common although those before it have much in common, and those
-    after it. What comes back within a few frames was hidden and not cut away.
-
-    Args:
-        frames: Frames of one camera in the order of time.
-        valid: Where they hold a picture.
+    A cut is where frames of one camera, in the order of time, have nothing in common although those before it
+    have much in common, and those after it. What comes back within a few frames was hidden and not cut away.
     """
     looks = Likeness(frames, valid)
     blank = tuple(i for i in range(len(frames)) if looks.shows_nothing(i))

@@ -41,9 +41,6 @@ def dataset_of(name: str | None, path: Path) -> DataSet:
     """The data set of that name, or the first of dreamdrive's own that recognises the path.
 
     Outside packages are asked by name only: what is installed beside it never changes what a command does.
-
-    Raises:
-        InputError: There is no data set of that name, or it does not recognise the path.
     """
     if name is None:
         return next(each for each in map(DATASETS.choose, DATASETS.own) if each.recognises(path))
@@ -54,11 +51,7 @@ def dataset_of(name: str | None, path: Path) -> DataSet:
 
 
 def read_dataset(control: Control) -> Clip:
-    """The clip of ``control.path``.
-
-    Raises:
-        InputError: See ``dataset_of``; it does not take a field that is given, or cannot be read.
-    """
+    """The clip of ``control.path``, whose data set takes every field that is given."""
     assert control.path is not None
     chosen = dataset_of(control.dataset, control.path)
     control.check_taken(chosen.takes | {"dataset"}, f"{control.path} ({chosen.about})")

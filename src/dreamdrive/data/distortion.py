@@ -21,11 +21,7 @@ MOST_BEND = 1e4
 
 
 def check_bend(coefficients: Sequence[float], where: str) -> None:
-    """Whether the coefficients can be those of a lens.
-
-    Raises:
-        InputError: One is too large.
-    """
+    """Refuse coefficients that are those of no lens."""
     for each in coefficients:
         if abs(each) > MOST_BEND:
             raise InputError(

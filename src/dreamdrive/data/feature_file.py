@@ -36,27 +36,16 @@ _EXPECTED = "a .safetensors file with arrays (frames, rows, columns, channels), 
 
 @dataclass(frozen=True)
 class FeatureFile:
-    """The content of a file of features.
-
-    Attributes:
-        arrays: Named features (F, h, w, C), all of F frames.
-        provenance: Where they come from, as JSON values.
-    """
+    """Named features (F, h, w, C), all of F frames, and as JSON values where they come from."""
 
     arrays: dict[str, Float[np.ndarray, "f _ _ _"]]
     provenance: dict[str, Any]
 
     def of_frames(self, index: Int[np.ndarray, " f"], count: Callable[[], int], path: Path) -> "FeatureFile":
-        """Those of the selected frames.
+        """Those of the selected frames, by their index in the source.
 
-        Args:
-            index: Index of each selected frame in the source.
-            count: Number of frames in the source; called only where it decides.
-            path: The file, for messages.
-
-        Raises:
-            InputError: There is neither one row a frame of the source nor one a selected frame; or the file
-                says that it is of other frames.
+        There has to be one row a frame of the source, one a selected frame, or the file says which frames it
+        is of. ``count`` gives the number of frames of the source; it is called only where it decides.
         """
         rows = len(next(iter(self.arrays.values())))
         if INDEX in self.provenance:
@@ -90,11 +79,7 @@ class FeatureFile:
     def cropped(
         self, sizing: Sizing, lens: Lens | None, path: Path | None
     ) -> dict[str, Float[np.ndarray, "f _ _ _"]]:
-        """The features of what is left of the pictures in the clip; bilinear where something was cut away.
-
-        Raises:
-            InputError: A distortion was taken out of the frames, which the features still have.
-        """
+        """The features of what is left of the pictures in the clip; bilinear where something was cut away."""
         if lens is not None:
             raise InputError(
                 f"--features {path} is of the distorted pictures, but --intrinsics takes the distortion out "
@@ -111,11 +96,7 @@ class FeatureFile:
 
 
 def read_features(path: Path) -> FeatureFile:
-    """Read a file of features.
-
-    Raises:
-        InputError: The file is missing, or malformed in a way that the message names.
-    """
+    """Read a file of features; an error names what is malformed."""
     where = f"--features {path}"
     try:
         if problem := header_problem(path):
@@ -146,12 +127,7 @@ def read_features(path: Path) -> FeatureFile:
 
 
 def write_features(path: Path, features: FeatureFile) -> None:
-    """Write a file that ``read_features`` reads; it appears whole or not at all.
-
-    Raises:
-        InputError: The file cannot be written.
-        ValueError: An array cannot be read back.
-    """
+    """Write a file that ``read_features`` reads, whole or not at all; ``ValueError`` where it is none."""
     for name, array in features.arrays.items():
         if problem := _problem(array):
             raise ValueError(f"features {briefly(repr(name))} {problem}")

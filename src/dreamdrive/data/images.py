@@ -1,4 +1,4 @@
-"""A folder of images as a source of frames."""
+"""Frames as they come out of files, before sizing and undistortion, and folders of images."""
 
 import re
 from collections.abc import Iterator
@@ -7,8 +7,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from jaxtyping import Bool, UInt8
 
-from dreamdrive.data.frame import RawFrame
 from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 
@@ -16,24 +16,39 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 
 
 @dataclass(frozen=True)
-class ImageFolder:
-    """The images of one folder in natural order (2 before 10).
+class RawFrame:
+    """One picture at its own size, turned upright, with sentences for the report.
 
-    Attributes:
-        path: The folder.
-        files: Its images.
+    ``index`` is that in the source, in file or decode order, ``name`` what messages call it. ``opaque`` is
+    False where the file marks a pixel as transparent, None where nothing is. The time is since frame 0 of the
+    source, None where the file has no clock. A damaged frame was patched up by the decoder, or built upon one
+    that was.
     """
+
+    index: int
+    name: str
+    rgb: UInt8[np.ndarray, "h w 3"]
+    opaque: Bool[np.ndarray, "h w"] | None = None
+    time_s: float | None = None
+    notes: tuple[str, ...] = ()
+    damaged: bool = False
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.rgb.shape[1], self.rgb.shape[0]
+
+
+@dataclass(frozen=True)
+class ImageFolder:
+    """The images of one folder in natural order (2 before 10)."""
 
     path: Path
     files: tuple[Path, ...]
 
     @staticmethod
     def open(path: Path) -> "ImageFolder":
-        """List the images of a folder; hidden files and other kinds are left alone.
-
-        Raises:
-            InputError: There are none.
-        """
+        """List the images of a folder; hidden files and other kinds are left alone."""
         files = tuple(sorted(_images_in(path), key=lambda f: natural_key(f.name)))
         if not files:
             raise InputError(f"{path} holds no images ({', '.join(SUFFIXES)}){_hint(path)}")
@@ -44,11 +59,7 @@ class ImageFolder:
         return len(self.files)
 
     def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames, one at a time.
-
-        Raises:
-            InputError: An image is unreadable or cut short.
-        """
+        """The wanted frames, one at a time."""
         for index in wanted:
             yield read_image(self.files[index], index)
 
@@ -63,9 +74,6 @@ def read_image(path: Path, index: int = 0) -> RawFrame:
     """One image as 8-bit RGB, upright by its EXIF orientation.
 
     16-bit images are scaled by 255/65535, grey ones become RGB, and pixels less than half opaque are marked.
-
-    Raises:
-        InputError: The file is missing, empty, too large, cut short, or no image.
     """
     image = read_picture(path)
     if image.dtype.name not in ("uint8", "uint16"):

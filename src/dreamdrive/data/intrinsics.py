@@ -1,17 +1,18 @@
 """Calibration files, and the guess where there is none."""
 
-import json
 from dataclasses import dataclass
-from math import isfinite, radians, tan
+from math import radians, tan
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal
+
+import msgspec
 
 from dreamdrive.data.distortion import Distortion, check_bend
-from dreamdrive.data.formats.cameras import LensCamera, different
+from dreamdrive.data.formats.cameras import Intrinsics, LensCamera, different
 from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
 from dreamdrive.data.formats.nerfstudio import frame_camera, transforms_frames
 from dreamdrive.errors import InputError
-from dreamdrive.files.json_file import read_json
+from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.scene.camera import Camera
 
 DEFAULT_FOCAL = 0.85
@@ -22,13 +23,10 @@ _OPENCV_ORDER = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3
 
 @dataclass(frozen=True)
 class Calibration:
-    """The camera that took the source.
+    """The camera that took the source, with sentences for the report.
 
-    Attributes:
-        camera: Pinhole at the source's size; pixel centres at +0.5.
-        distortion: ``None`` where there is none or where it is unknown.
-        known: Whether it comes from a calibration file.
-        notes: What the report should say, a sentence each.
+    The pinhole is at the source's size; there is no distortion or it is unknown where it is None. ``known``
+    tells a calibration file from a guess.
     """
 
     camera: Camera
@@ -38,26 +36,14 @@ class Calibration:
 
 
 def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
-    """The camera of an input, as far as it is told.
-
-    Raises:
-        InputError: It is told twice, or cannot be read.
-    """
+    """The camera of an input, as far as it is told."""
     if intrinsics is not None and hfov_deg is not None:
         raise InputError("--intrinsics and --hfov both tell the focal length; give one of them")
     return guess_camera(size, hfov_deg) if intrinsics is None else read_intrinsics(intrinsics, size)
 
 
 def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibration:
-    """A pinhole for a source without calibration: principal point in the centre, square pixels.
-
-    Args:
-        size: Width and height of the source in pixels.
-        hfov_deg: Horizontal field of view; without it the focal length is 0.85 times the longer side.
-
-    Raises:
-        InputError: The field of view is not between 1 and 179 degrees.
-    """
+    """A pinhole for a source without calibration: principal point in the centre, square pixels."""
     width, height = size
     if hfov_deg is None:
         focal = DEFAULT_FOCAL * max(size)
@@ -76,13 +62,7 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
 
     The file counts pixels by integer index (the centre of the first pixel is 0), so 0.5 is added to cx, cy. A
     COLMAP model or a ``transforms.json`` of one camera counts as a calibration, too, see ``model_cameras``.
-
-    Args:
-        path: The file, such as a clip's ``meta.json``, or a folder with a COLMAP model.
-        size: Width and height of the source; another size of the same aspect scales the calibration.
-
-    Raises:
-        InputError: The file is missing, malformed, or for images of another shape.
+    One for another size of the source's aspect is scaled.
     """
     cameras = model_cameras(path, "--intrinsics")
     if cameras is not None and len(cameras) != 1:
@@ -107,40 +87,44 @@ def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:
         raise InputError(f"--intrinsics {path}: {error}") from None
 
 
+class _Bend(msgspec.Struct):
+    model: str
+    coefficients: list[float]
+
+
+class _Told(msgspec.Struct):
+    """What a calibration file holds; some programs write whole sizes as 1280.0."""
+
+    width: float
+    height: float
+    intrinsics: Intrinsics
+    distortion: _Bend | str | None = None
+
+
 def _of_json(path: Path) -> tuple[LensCamera, list[str]]:
     """The camera at the size that the file is for, and what to say about its lens."""
     values = read_json(path, "--intrinsics")
-    pinhole = values.get("intrinsics")
-    if not isinstance(pinhole, dict):
+    if not isinstance(values.get("intrinsics"), dict):
         raise InputError(
             f"--intrinsics {path} holds no calibration; expected JSON with width, height and "
             'intrinsics {"fx", "fy", "cx", "cy"} in pixels, a COLMAP model or a transforms.json'
         )
-    pinhole = cast("dict[str, Any]", pinhole)
-    width, height = (_number(path, values, name) for name in ("width", "height"))
-    fx, fy, cx, cy = (_number(path, pinhole, name) for name in ("fx", "fy", "cx", "cy"))
+    told = of_type(values, _Told, f"--intrinsics {path}")
+    k, width, height = told.intrinsics, told.width, told.height
     whole = width % 1 == height % 1 == 0
-    if not whole or min(width, height, fx, fy) <= 0 or not (0 <= cx < width and 0 <= cy < height):
+    if not whole or min(width, height, k.fx, k.fy) <= 0 or not (0 <= k.cx < width and 0 <= k.cy < height):
         raise InputError(
             f"--intrinsics {path}: expected whole positive sizes, positive focal lengths and a principal "
-            f"point inside the image, got width {width:g}, height {height:g}, fx {fx:g}, fy {fy:g}, "
-            f"cx {cx:g}, cy {cy:g}"
+            f"point inside the image, got width {width:g}, height {height:g}, fx {k.fx:g}, fy {k.fy:g}, "
+            f"cx {k.cx:g}, cy {k.cy:g}"
         )
-    camera = Camera(fx, fy, cx + 0.5, cy + 0.5, int(width), int(height))
-    distortion, notes = _distortion(path, values.get("distortion"))
+    camera = Camera(k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, int(width), int(height))
+    distortion, notes = _distortion(path, told.distortion)
     return LensCamera(camera, distortion), notes
 
 
 def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
-    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither.
-
-    Args:
-        path: A file or a folder.
-        option: How messages call it, such as ``--intrinsics``.
-
-    Raises:
-        InputError: It is one of them and cannot be used.
-    """
+    """The different cameras of a COLMAP model or a ``transforms.json``; ``None`` if the path is neither."""
     transforms = path / "transforms.json" if path.is_dir() else path
     if transforms.suffix.lower() == ".json" and transforms.is_file():
         values = read_json(transforms, option)
@@ -155,25 +139,11 @@ def model_cameras(path: Path, option: str) -> list[LensCamera] | None:
     return different([colmap_camera(camera, str(folder)) for camera in model.cameras.values()])[0]
 
 
-def _number(path: Path, values: dict[str, Any], name: str) -> float:
-    value = values.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise InputError(f"--intrinsics {path}: expected a number for {name}, got {json.dumps(value)}")
-    return float(value)
-
-
-def _distortion(path: Path, value: object) -> tuple[Distortion | None, list[str]]:
-    if value is None or isinstance(value, str):
+def _distortion(path: Path, value: _Bend | str | None) -> tuple[Distortion | None, list[str]]:
+    if not isinstance(value, _Bend):
         said = f' (the calibration says "{value}")' if value else ""
         return None, [f"No distortion coefficients are given: the lens distortion is taken as zero{said}."]
-    values = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
-    name, numbers = values.get("model"), values.get("coefficients")
-    if not isinstance(name, str) or not isinstance(numbers, list):
-        raise InputError(f'--intrinsics {path}: expected distortion {{"model", "coefficients"}} or a text')
-    coefficients = tuple(
-        _number(path, {"distortion coefficients": n}, "distortion coefficients")
-        for n in cast("list[object]", numbers)
-    )
+    name, coefficients = value.model, tuple(value.coefficients)
     check_bend(coefficients, f"--intrinsics {path}")
     model, order = _model(path, name)
     allowed = (4,) if model == "fisheye" else (4, 5, 8, 12, 14)

@@ -16,12 +16,7 @@ MOST_BOXES = 255
 
 
 def read_layout(path: Path) -> Layout:
-    """The layout in a JSON file.
-
-    Raises:
-        InputError: It cannot be read, or a field is missing, unknown, of the wrong type or out of range; the
-            message names the field, as in ``$.boxes[2].size_m[0]``.
-    """
+    """The layout in a JSON file; an error names the wrong field, as in ``$.boxes[2].size_m[0]``."""
     try:
         layout = of_type(read_json(path), Layout, str(path))
     except InputError as error:

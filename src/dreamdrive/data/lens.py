@@ -25,10 +25,7 @@ _MARGIN_PX = 2
 class Lens:
     """The source's lens at the clip's size.
 
-    Attributes:
-        distortion: The model and its coefficients.
-        camera: The source's intrinsics at the clip's size: those of the clip's pinhole and of the
-            distorted image.
+    ``camera`` has the source's intrinsics there: those of the clip's pinhole and of the distorted image.
     """
 
     distortion: Distortion
@@ -54,16 +51,10 @@ class Lens:
     def apply(
         self, image: Float[np.ndarray, "h w 3"], rendered: Camera | None = None
     ) -> Float[np.ndarray, "h2 w2 3"]:
-        """A render as the source's camera would have shown it, at the clip's size.
+        """A render in [0, 1] as the source's camera would have shown it, at the clip's size.
 
         One bicubic lookup, limited to the range of the image; black where the render does not reach.
-
-        Args:
-            image: RGB in [0, 1] by the pinhole ``rendered``.
-            rendered: Pinhole of the image; by default the clip's own. Its pose does not matter.
-
-        Raises:
-            ValueError: The image is not of the pinhole's size.
+        ``rendered`` is the pinhole of the image, by default the clip's own; its pose does not matter.
         """
         camera = self.camera if rendered is None else rendered
         if image.shape[:2] != (camera.height_px, camera.width_px):
@@ -118,12 +109,8 @@ class Undistorter:
 
     Every clip pixel is the mean of n x n bicubic lookups in the source, n being at least the number of source
     pixels per clip pixel: the area average of the undistorted image, without making that image first.
-
-    Attributes:
-        maps: Where the lookups lie in the (shrunk) source, x and y, in OpenCV's pixel indices.
-        shrunk: Size to which the source is area-averaged first; the source's own up to a ratio of 4.
-        target: Size of the clip.
-        valid: Clip pixels whose lookups all lie inside the source.
+    ``maps`` say where the lookups lie, x and y, in OpenCV's pixel indices; the source is first area-averaged
+    to ``shrunk``, its own size up to a ratio of 4. A pixel is valid whose lookups all lie inside the source.
     """
 
     maps: tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]

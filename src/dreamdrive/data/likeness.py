@@ -29,12 +29,7 @@ class Likeness:
     """
 
     def __init__(self, frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"]) -> None:
-        """Make small copies.
-
-        Args:
-            frames: The frames.
-            valid: Where they hold a picture.
-        """
+        """Make small copies of frames that hold a picture where ``valid`` is set."""
         self._frames = frames
         grey = [_shrunk(frame, _FLOW_WIDTH_PX) for frame in frames]
         self._blank = [bool((_spread(g) > _PICTURE).mean() < _PICTURE_SHARE) for g in grey]

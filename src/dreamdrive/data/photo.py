@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.data.frame import RawFrame
-from dreamdrive.data.images import SUFFIXES, read_image
+from dreamdrive.data.images import SUFFIXES, RawFrame, read_image
 from dreamdrive.data.intrinsics import calibration
 from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.remarks import of_damage
@@ -25,13 +24,9 @@ _HALF_STEP = 0.5 + _ROUNDING
 
 @dataclass(frozen=True)
 class Photo:
-    """A picture of a street as a pinhole sees it.
+    """A picture of a street as a pinhole at the identity sees it, with sentences for the report.
 
-    Attributes:
-        rgb: The picture (H, W, 3).
-        camera: Its pinhole, at the identity.
-        calibrated: Whether the pinhole comes from a calibration rather than a guess.
-        notes: What the report should say, a sentence each.
+    ``calibrated`` tells a calibrated pinhole from a guess.
     """
 
     rgb: UInt8[np.ndarray, "h w 3"]
@@ -43,18 +38,10 @@ class Photo:
 def read_photo(
     path: Path, size: tuple[int, int], intrinsics: Path | None = None, hfov_deg: float | None = None
 ) -> Photo:
-    """Read a photo, or the first frame of a recording, at the size that a model wants.
+    """Read a photo, or the first frame of a recording, at the size (width, height) that a model wants.
 
     It is scaled to cover the size and cut around its centre; a known distortion is taken out of it.
-
-    Args:
-        path: An image, a video or a folder of images.
-        size: Width and height in pixels.
-        intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
-        hfov_deg: Horizontal field of view of the picture, where there is no calibration.
-
-    Raises:
-        InputError: The picture or the calibration cannot be used.
+    Calibration as of ``intrinsics.calibration``.
     """
     (raw,), notes = leading_frames(path, 1)
     if not is_photo(path):
@@ -80,18 +67,9 @@ def is_photo(path: Path) -> bool:
 
 
 def leading_frames(path: Path, count: int, rate_hz: float = 1.0) -> tuple[list[RawFrame], list[str]]:
-    """A photo; or the first frames of a recording, of a video those nearest to a model's times.
+    """A photo; or at most ``count`` first frames of a recording, of a video those nearest to a model's times.
 
-    Args:
-        path: A photo, a video, or a folder of images, whose rate counts as that of the model.
-        count: Frames to take at most.
-        rate_hz: The model's rate.
-
-    Returns:
-        The frames, at least one, and what the report should say, a sentence each.
-
-    Raises:
-        InputError: There is no such input, or it cannot be read.
+    A folder's rate counts as that of the model. With them come sentences for the report.
     """
     if not path.exists():
         raise InputError(f"{path} does not exist; expected a photo, or a video or folder of leading frames")

@@ -20,17 +20,9 @@ _MAX_SCANS = 50
 
 
 def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
-    """A picture with its own depth and channels, upright.
+    """A picture with its own depth and channels, upright: grey, or blue, green, red and perhaps alpha.
 
-    Args:
-        path: The file.
-        where: How messages call it; its path without it.
-
-    Returns:
-        Grey (H, W), or colours (H, W, 3 or 4) in the order blue, green, red, alpha.
-
-    Raises:
-        InputError: The file is missing, too large, cut short or no picture, or the picture is too large.
+    Messages call it ``where``, or by its path.
     """
     where = where or str(path)
     data = read_bytes(path, where, at_most=PICTURE_BYTES)
@@ -55,6 +47,11 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     if picture is None:  # pyright: ignore[reportUnnecessaryComparison]
         raise InputError(f"{where} cannot be read as an image; expected {KINDS}")
     return _upright(np.asarray(picture), header.orientation)
+
+
+def write_picture(path: Path, picture: Shaped[np.ndarray, "h w *c"]) -> None:
+    """Write a PNG of what ``read_picture`` gives."""
+    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 
 def _check(header: Header, data: bytes, where: str) -> None:

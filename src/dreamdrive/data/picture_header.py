@@ -15,13 +15,9 @@ _WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274
 
 @dataclass(frozen=True)
 class Header:
-    """The header of a picture.
+    """The header of a PNG, JPEG, BMP, TIFF or WebP, with its size as stored, before turning.
 
-    Attributes:
-        kind: PNG, JPEG, BMP, TIFF or WebP.
-        width_px: Columns as stored, before turning.
-        height_px: Rows as stored.
-        orientation: How to turn it, as EXIF counts, 1 to 8; 1 of a TIFF, which its decoder turns.
+    ``orientation`` is how to turn it, as EXIF counts, 1 to 8; 1 of a TIFF, which its decoder turns.
     """
 
     kind: str
@@ -31,14 +27,7 @@ class Header:
 
 
 def parse_header(data: bytes) -> Header | None:
-    """The header of a PNG, JPEG, BMP, TIFF or WebP; where a file has several sizes the largest.
-
-    Args:
-        data: The file.
-
-    Returns:
-        None where it is none of these, or ends within the header.
-    """
+    """The header of a picture, the largest size where it has several; None if it has none or is cut short."""
     try:
         if data[:8] == b"\x89PNG\r\n\x1a\n":
             return _png(data)

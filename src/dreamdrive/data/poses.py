@@ -16,6 +16,7 @@ from dreamdrive.data.formats.pose_lists import (
 )
 from dreamdrive.data.formats.rigid import PoseRows
 from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_file
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import read_text
 from dreamdrive.scene.trajectory import Trajectory
@@ -26,13 +27,7 @@ _CLOCK_NOTE = "The times of the pose file count from its first row, taken as fra
 def read_pose_file(path: Path, option: str, camera: str | None = None) -> PoseRows:
     """Read a pose file of any of the formats; the content decides which it is.
 
-    Args:
-        path: The file.
-        option: How messages call it, such as ``--poses``.
-        camera: Name of the camera to look for in PandaSet's ``cameras.json``.
-
-    Raises:
-        InputError: The file is missing or malformed, or a pose holds NaN or is not rigid.
+    Messages call it ``option``; ``camera`` is the name to look for in PandaSet's ``cameras.json``.
     """
     where = f"{option} {path}"
     text = read_text(path, where)
@@ -47,11 +42,7 @@ def read_pose_file(path: Path, option: str, camera: str | None = None) -> PoseRo
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Read a path of the camera in the world frame: JSON or TUM.
-
-    Raises:
-        InputError: The file is missing or malformed, or has no times.
-    """
+    """Read a path of the camera in the world frame: JSON or TUM, with times."""
     rows = read_pose_file(path, "trajectory")
     if rows.times_s is None:
         raise InputError(f"trajectory {path} has poses but no times; expected Trajectory JSON or TUM")
@@ -59,19 +50,10 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
-    """Write TUM, or JSON where the name ends in ``.json``; an older file is replaced in one step.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    draft = path.with_name(path.name + ".part")
-    try:
-        draft.write_text(
-            json_of(trajectory) if path.suffix.lower() == ".json" else text_of(trajectory), "utf-8"
-        )
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}") from error
+    """Write TUM, or JSON where the name ends in ``.json``; an older file is replaced in one step."""
+    text = json_of(trajectory) if path.suffix.lower() == ".json" else text_of(trajectory)
+    with new_file(path) as partial:
+        partial.write_text(text, "utf-8")
 
 
 def of_frames(
@@ -83,16 +65,8 @@ def of_frames(
     """Those of a file's poses that are of the selected frames, in the frame of the first, and notes.
 
     A file has one pose per frame of the source, or one per selected frame; with any other number, poses with
-    times are matched to the nearest frame within half a frame.
-
-    Args:
-        rows: The poses.
-        index: Index of each selected frame in the source.
-        times_s: Time of each selected frame since frame 0 of the source.
-        count: Number of frames in the source; called only where it decides.
-
-    Raises:
-        InputError: The poses fit the frames in no way.
+    times are matched to the nearest frame within half a frame, both since frame 0 of the source. ``count``
+    gives the number of frames of the source; it is called only where it decides.
     """
     notes: tuple[str, ...] = ()
     if len(rows) == len(index):

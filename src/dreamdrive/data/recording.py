@@ -11,18 +11,19 @@ Of several cameras each has ``frames`` and ``intrinsics.json`` in a folder ``cam
 they are mounted. Path and video are the first one's, features are left out.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from dreamdrive.data.feature_file import FeatureFile, write_features
+from dreamdrive.data.formats.cameras import indexed_pinhole
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.poses import write_trajectory
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.json_file import write_json
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -37,17 +38,10 @@ def rate_hz(clip: Clip) -> float:
 
 
 def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace: bool = False) -> None:
-    """Write a clip; the folder appears whole or not at all.
+    """Write a clip of at least two frames; the folder appears whole or not at all.
 
-    Args:
-        clip: The clip, of at least two frames.
-        folder: Where to.
-        about: JSON values for ``provenance.json``, beside the clip's own provenance.
-        replace: Whether an older folder of this kind may be replaced.
-
-    Raises:
-        InputError: Something is in the way, or the place cannot be written.
-        ValueError: Features have too many channels.
+    ``about`` goes into ``provenance.json`` beside the clip's own provenance. With ``replace`` it takes the
+    place of an older folder of this kind. Features of too many channels raise ``ValueError``.
     """
     first = clip.only(int(clip.camera[0]))
     values = {
@@ -68,7 +62,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
         _write_path(first, made)
         if clip.features and len(clip.rig) == 1:
             write_features(made / "features.safetensors", FeatureFile(clip.features, values))
-        _write_json(made / ABOUT, values)
+        write_json(made / ABOUT, values)
 
 
 def _write_cameras(clip: Clip, folder: Path) -> None:
@@ -85,11 +79,7 @@ def _write_camera(clip: Clip, folder: Path) -> None:
     for index in range(len(clip)):
         _write_frame(clip, index, folder / "frames" / f"{index:04d}.png")
     if clip.known.intrinsics:
-        camera = clip.rig[0]
-        # The file counts pixels by integer index.
-        numbers = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
-        size = {"width": camera.width_px, "height": camera.height_px}
-        _write_json(folder / _INTRINSICS, {**size, "intrinsics": numbers})
+        write_json(folder / _INTRINSICS, indexed_pinhole(clip.rig[0]))
 
 
 def _write_frame(clip: Clip, index: int, path: Path) -> None:
@@ -97,7 +87,7 @@ def _write_frame(clip: Clip, index: int, path: Path) -> None:
     if not clip.valid.all():
         alpha = clip.valid[index][..., None].astype(np.uint8) * 255
         picture = np.concatenate([picture, alpha], axis=2)
-    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+    write_picture(path, picture)
 
 
 def _write_path(clip: Clip, folder: Path) -> None:
@@ -107,7 +97,3 @@ def _write_path(clip: Clip, folder: Path) -> None:
         write_trajectory(Trajectory(poses, clip.times_s), folder / "poses.json")
     if clip.requested is not None:
         write_trajectory(clip.requested, folder / "requested.json")
-
-
-def _write_json(path: Path, values: dict[str, Any]) -> None:
-    path.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")

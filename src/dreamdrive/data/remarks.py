@@ -49,12 +49,7 @@ def of_damage(index: Sequence[int]) -> list[str]:
 
 
 def of_cuts(found: Found, index: Int[np.ndarray, " f"]) -> list[str]:
-    """The sentences about cuts, blank frames and frames of something else.
-
-    Args:
-        found: What was found; its frames count within the selection.
-        index: Index of each selected frame in the source.
-    """
+    """The sentences about cuts, blank frames and frames of something else, by their index in the source."""
     notes: list[str] = []
     if found.cuts:
         notes.append(_of_cuts(found.cuts, index))
@@ -78,11 +73,7 @@ def of_cuts(found: Found, index: Int[np.ndarray, " f"]) -> list[str]:
 
 
 def of_missing_images(files: Sequence[PurePath]) -> list[str]:
-    """The sentence about numbers that the names of images leave out; a regular step leaves out none.
-
-    Args:
-        files: The images in their order.
-    """
+    """The sentence about numbers that the names of images leave out; a regular step leaves out none."""
     found = [re.findall(r"\d+", file.stem) for file in files]
     if len(files) < 3 or not all(found):
         return []
@@ -105,12 +96,7 @@ def of_missing_images(files: Sequence[PurePath]) -> list[str]:
 
 
 def of_time_jumps(index: Int[np.ndarray, " f"], times_s: Float[np.ndarray, " f"]) -> list[str]:
-    """The sentence about steps in time that are far longer than the others.
-
-    Args:
-        index: Index of each frame in the video.
-        times_s: Its time by the video's own clock.
-    """
+    """The sentence about steps in time, by the video's own clock, that are far longer than the others."""
     steps_s = np.diff(times_s)
     if len(steps_s) < 3:
         return []

@@ -1,18 +1,19 @@
 """Recordings of several cameras on one car: a folder with ``rig.json`` and the frames of each camera."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.data.dataset import DataSet
+from dreamdrive.data.formats.rigid import JsonPose
 from dreamdrive.errors import InputError
-from dreamdrive.files.json_file import read_json
+from dreamdrive.files.json_file import of_type, read_json, write_json
 from dreamdrive.files.paths import is_path
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.clip import Clip
@@ -24,15 +25,19 @@ _EXPECTED = (
 )
 
 
+class _Entry(msgspec.Struct):
+    frames: str
+    car_from_camera: JsonPose
+    intrinsics: str | None = None
+
+
+class _Rig(msgspec.Struct):
+    cameras: Annotated[list[_Entry], msgspec.Meta(min_length=1)]
+
+
 @dataclass(frozen=True)
 class Mounted:
-    """A camera of a rig.
-
-    Attributes:
-        frames: Its folder of images or its video.
-        intrinsics: Its calibration file; None where there is none.
-        car_from_camera: Where it is mounted (4, 4), x right, y down, z ahead, in metres.
-    """
+    """A camera of a rig: its frames, its calibration, and its pose in metres, x right, y down, z ahead."""
 
     frames: Path
     intrinsics: Path | None
@@ -45,39 +50,30 @@ def is_rig(path: Path) -> bool:
 
 
 def read_rig(path: Path) -> tuple[Mounted, ...]:
-    """The cameras of a rig; paths in its file count from its folder.
-
-    Raises:
-        InputError: The description is missing or malformed.
-    """
-    values = read_json(path / RIG, "input")
-    listed = values.get("cameras")
-    if not isinstance(listed, list) or not listed:
-        raise InputError(f"{path / RIG} lists no cameras; {_EXPECTED}")
-    if len(listed) > MOST_CAMERAS:
+    """The cameras of a rig; paths in its file count from its folder."""
+    try:
+        listed = of_type(read_json(path / RIG, "input"), _Rig, str(path / RIG)).cameras
+        mounted = tuple(_mounted(path, index, entry) for index, entry in enumerate(listed))
+    except InputError as error:
+        raise InputError(f"{error}; {_EXPECTED}") from None
+    if len(mounted) > MOST_CAMERAS:
         raise InputError(
-            f"{path / RIG} lists {len(listed)} cameras; expected at most {MOST_CAMERAS} on one car"
+            f"{path / RIG} lists {len(mounted)} cameras; expected at most {MOST_CAMERAS} on one car"
         )
-    return tuple(_mounted(path, index, entry) for index, entry in enumerate(listed))
+    return mounted
 
 
 def write_rig(cameras: Mapping[str, Float[np.ndarray, "4 4"]], path: Path, calibration: str | None) -> None:
-    """Describe cameras whose frames lie in ``NAME/frames``.
-
-    Args:
-        cameras: ``car_from_camera`` of each, by its name.
-        path: The folder that holds them.
-        calibration: Name of the calibration file in the folder of each; None where there is none.
-    """
+    """Describe cameras by name and pose, with ``NAME/frames`` and perhaps a calibration file in ``NAME``."""
     listed = [
         {
             "frames": f"{name}/frames",
             "intrinsics": None if calibration is None else f"{name}/{calibration}",
-            "car_from_camera": pose.tolist(),
+            "car_from_camera": pose,
         }
         for name, pose in cameras.items()
     ]
-    (path / RIG).write_text(json.dumps({"cameras": listed}, indent=1) + "\n", encoding="utf-8")
+    write_json(path / RIG, {"cameras": listed})
 
 
 def read_rig_clip(
@@ -90,20 +86,10 @@ def read_rig_clip(
     trajectory: Path | None = None,
     hold_out: int | None = None,
 ) -> Clip:
-    """Read the frames of all cameras of a rig, as ``read_clip`` reads those of one.
+    """Read the frames of all cameras of a rig, with arguments as of ``read_clip`` for each of them.
 
-    Args:
-        path: Folder with ``rig.json``.
-        frames: ``START:STOP:STEP`` over the frames of each camera.
-        fps: Rate of each camera.
-        size: Exact width and height of all frames.
-        poses: Pose file of the first camera; the mountings give those of the others.
-        trajectory: File with the path that the first camera was asked to follow.
-        hold_out: Withhold the selected times i with i mod N = N // 2.
-
-    Raises:
-        InputError: See ``read_rig`` and ``read_clip``; or the cameras differ in their numbers of frames, in
-            their times or in size.
+    Poses and trajectory are those of the first camera; the mountings give the others. The cameras have to
+    agree in their numbers of frames and in size.
     """
     cameras = read_rig(path)
     parts = [
@@ -128,21 +114,17 @@ def read_rig_clip(
     return _woven(path, cameras, parts)
 
 
-def _mounted(path: Path, index: int, entry: Any) -> Mounted:
-    name = f"{path / RIG}: camera {index}"
-    if not isinstance(entry, dict) or not is_path(entry.get("frames")):
-        raise InputError(f"{name} names no frames; {_EXPECTED}")
-    given = entry.get("intrinsics")
-    if given is not None and not is_path(given):
-        raise InputError(f"{name} has intrinsics that are no file name; {_EXPECTED}")
+def _mounted(path: Path, index: int, entry: _Entry) -> Mounted:
+    name, given = f"{path / RIG}: camera {index}", entry.intrinsics
+    for each in (entry.frames, *([] if given is None else [given])):
+        if not is_path(each):
+            raise InputError(f"{name} names {each!r}, which is no file name")
+    pose = np.array(entry.car_from_camera)
     try:
-        pose = np.array(entry.get("car_from_camera"), dtype=np.float64)
-        if pose.shape != (4, 4):
-            raise ValueError(f"it has shape {pose.shape}")
         check_rigid(pose, "car_from_camera")
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} has no car_from_camera that is a rigid 4x4 pose: {error}") from None
-    return Mounted(path / entry["frames"], None if given is None else path / given, pose)
+    except ValueError as error:
+        raise InputError(f"{name} has no rigid pose: {error}") from None
+    return Mounted(path / entry.frames, None if given is None else path / given, pose)
 
 
 def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:

@@ -19,10 +19,7 @@ _PATTERN = re.compile(r"\s*(-?\d+)?\s*:\s*(-?\d+)?\s*(?::\s*(-?\d+)?\s*)?")
 class Selection:
     """``START:STOP:STEP`` over source indices, as a Python slice with a positive step.
 
-    Attributes:
-        start: First index; negative counts from the end.
-        stop: Index behind the last one; negative counts from the end, ``None`` is the end.
-        step: Distance of the selected indices, at least 1.
+    Negative numbers count from the end; without ``stop`` it is the end.
     """
 
     start: int = 0
@@ -31,11 +28,7 @@ class Selection:
 
     @staticmethod
     def parse(text: str | None) -> "Selection":
-        """Read ``START:STOP:STEP``, each part optional; ``None`` selects everything.
-
-        Raises:
-            InputError: The text has another form, or its step is not positive.
-        """
+        """Read ``START:STOP:STEP``, each part optional; ``None`` selects everything."""
         if text is None:
             return Selection()
         match = _PATTERN.fullmatch(text)
@@ -57,15 +50,7 @@ class Selection:
         return self.start < 0 or (self.stop is not None and self.stop < 0)
 
     def resolve(self, count: int | None, name: str) -> range:
-        """The selected indices.
-
-        Args:
-            count: Number of frames in the source; ``None`` while unknown, allowed unless ``needs_count``.
-            name: What to call the source in messages.
-
-        Raises:
-            InputError: Nothing is selected, or a frame beyond the end is asked for by name.
-        """
+        """The selected indices of ``count`` frames, which may be unknown unless ``needs_count``."""
         if count is None:
             if self.needs_count:
                 raise ValueError(f"{self} cannot be resolved without the number of frames")
@@ -94,11 +79,7 @@ def out_of_range(index: int, count: int, name: str) -> InputError:
 
 
 def held_out_mask(count: int, every: int | None) -> Bool[np.ndarray, " f"]:
-    """Which of ``count`` selected frames are withheld: i mod N = N // 2, never the first or the last.
-
-    Raises:
-        InputError: ``every`` is below 2 or so large that nothing would be withheld.
-    """
+    """Which of ``count`` selected frames are withheld: i mod N = N // 2, never the first or the last."""
     index = np.arange(count)
     if every is None:
         return np.zeros(count, dtype=bool)

@@ -21,11 +21,7 @@ MAX_CROP = 0.02
 class Sizing:
     """Scale to cover the target, then cut the centre; every pair is width, height in pixels.
 
-    Attributes:
-        source: Size of the source.
-        scaled: Size after scaling, at least the target.
-        offset: Columns and rows cut away at the left and the top.
-        target: Size of the clip.
+    ``offset`` are the columns and rows cut away at the left and the top.
     """
 
     source: tuple[int, int]
@@ -63,15 +59,7 @@ class Sizing:
 
 
 def check_largest(size: tuple[int, int], text: str) -> None:
-    """Refuse frames that no video could show.
-
-    Args:
-        size: Width and height in pixels.
-        text: How the message calls it.
-
-    Raises:
-        InputError: They are larger than ``MAX_SIDE_PX`` or ``MAX_PIXELS``.
-    """
+    """Refuse frames, called ``text``, of a width and height that no video could show."""
     if _too_large(size):
         raise InputError(
             f"{text}: too large for H.264 video; expected {MAX_SIDE_PX} pixels a side and "
@@ -84,13 +72,10 @@ def _too_large(size: tuple[int, int]) -> bool:
 
 
 def choose_size(source: tuple[int, int], wanted: tuple[int, int] | None) -> Sizing:
-    """How frames of ``source`` become frames of ``wanted``.
+    """How frames of ``source`` become frames of ``wanted``, of which at most 2 % is cut away.
 
     Without ``wanted`` the width is 480, or the source's if that is smaller, and the height the nearest even
     number that keeps the aspect.
-
-    Raises:
-        InputError: The size is odd (H.264 cannot hold it), tiny or huge, or more than 2 % would be cut away.
     """
     if wanted is None:
         return cover(source, _default(source))

@@ -11,11 +11,7 @@ Source = ImageFolder | Video
 
 
 def open_source(path: Path) -> Source:
-    """Open a recording; of a folder with ``frames`` in it, as ``world make`` writes, the images there.
-
-    Raises:
-        InputError: The path is missing, is a single photo or is not a recording.
-    """
+    """Open a recording; of a folder with ``frames`` in it, as ``world make`` writes, the images there."""
     if not path.exists():
         raise InputError(f"{path} does not exist; expected a video or a folder of images")
     if path.is_dir():

@@ -1,9 +1,11 @@
 """A video file as a source of frames."""
 
 import os
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import av
 import numpy as np
@@ -13,8 +15,7 @@ from av.stream import Disposition
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from dreamdrive.data.frame import RawFrame
-from dreamdrive.data.mp4_tables import check_tables
+from dreamdrive.data.images import RawFrame
 from dreamdrive.data.select import UNBOUNDED, out_of_range
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import open_file
@@ -33,26 +34,23 @@ _FORMATS = (
 _CODEC = {"max_pixels": str(MAX_PIXELS)}
 _OPTIONS = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file", **_CODEC}
 
+_BOXES_OF_BOXES = frozenset(
+    (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf", b"mvex", b"udta", b"dinf", b"edts")
+)
+"""Boxes that hold boxes, as FFmpeg reads them."""
+_MAX_BOXES = 1_000_000
+
 
 @dataclass(frozen=True)
 class Video:
-    """The first video track of a file, decoded as a stream.
-
-    Attributes:
-        path: The file.
-        rate_hz: Mean frame rate by the file's own account, or ``None``.
-    """
+    """The first video track of a file, decoded as a stream, and its mean rate by the file's own account."""
 
     path: Path
     rate_hz: float | None
 
     @staticmethod
     def open(path: Path) -> "Video":
-        """Look at a file.
-
-        Raises:
-            InputError: It is empty, cut short before its index, or no video.
-        """
+        """Look at a file."""
         _check_file(path)
         try:
             with _opened(path) as container:
@@ -77,19 +75,11 @@ class Video:
         return Video(path, float(rate) if rate and RATES_HZ[0] <= rate <= RATES_HZ[1] else None)
 
     def count(self) -> int:
-        """Number of frames, by decoding them all: what the file itself claims is often wrong.
-
-        Raises:
-            InputError: Decoding breaks off.
-        """
+        """Number of frames, by decoding them all: what the file itself claims is often wrong."""
         return sum(1 for _ in self._decode())
 
     def claimed_count(self) -> int | None:
-        """Number of frames by the file's own account, which may be wrong; None where it says nothing.
-
-        Raises:
-            InputError: The file cannot be opened any more.
-        """
+        """Number of frames by the file's own account, which may be wrong; None where it says nothing."""
         try:
             with _opened(self.path) as container:
                 stream = _pictures(container, self.path)
@@ -102,11 +92,7 @@ class Video:
         return None if seconds is None or self.rate_hz is None else round(seconds * self.rate_hz)
 
     def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames in decode order, one at a time; decoding stops behind the last.
-
-        Raises:
-            InputError: The file ends or breaks off before the last wanted frame.
-        """
+        """The wanted frames in decode order, one at a time; decoding stops behind the last."""
         index, first_s, damaged = -1, None, False
         for index, frame in enumerate(self._decode(wanted)):
             first_s = _time_s(frame) if index == 0 else first_s
@@ -148,7 +134,50 @@ def _check_file(path: Path) -> None:
         size = os.fstat(file.fileno()).st_size
         if size == 0:
             raise InputError(f"{path} is empty; expected a video")
-        check_tables(file, size, str(path))
+        _check_tables(file, size, str(path))
+
+
+def _check_tables(file: BinaryIO, size: int, where: str) -> None:
+    """Refuse tables that claim more samples than the file has bytes; other kinds of files pass."""
+    file.seek(0)
+    if file.read(8)[4:] not in (b"ftyp", b"moov", b"mdat", b"free", b"wide", b"skip", b"styp"):
+        return
+    for count, (kind, place) in enumerate(_boxes(file, 0, size)):
+        if count > _MAX_BOXES:
+            raise InputError(f"{where} is not a readable video: it consists of more than {_MAX_BOXES} parts")
+        if kind in (b"stsz", b"trun"):
+            file.seek(place)
+            content = file.read(12).ljust(12, b"\0")
+            each, samples = struct.unpack_from(">II", content, 4)
+            if kind == b"trun":
+                each, samples = 1, each
+            if each * samples > size:
+                raise InputError(
+                    f"{where} is not a readable video: it claims {samples} samples, more than its "
+                    f"{size} bytes can hold; copy it again"
+                )
+
+
+def _boxes(file: BinaryIO, start: int, stop: int) -> Iterator[tuple[bytes, int]]:
+    """Kind and place of the content of all boxes, those inside others too."""
+    ends = [stop]
+    while ends:
+        if start + 8 > ends[-1]:
+            start = ends.pop()
+            continue
+        file.seek(start)
+        head = file.read(16)
+        length, kind = int.from_bytes(head[:4], "big"), head[4:8]
+        skip = 8
+        if length == 1:
+            length, skip = int.from_bytes(head[8:16], "big"), 16
+        end = min(start + length, ends[-1]) if length else ends[-1]
+        yield kind, start + skip
+        if kind in _BOXES_OF_BOXES:
+            ends.append(max(end, start + skip))
+            start += skip
+        else:
+            start = max(end, start + skip)
 
 
 def _opened(path: Path) -> InputContainer:

@@ -25,21 +25,11 @@ _OPTIONS = {"crf": _QUALITY, "preset": "medium", "threads": "1", "x264-params": 
 
 
 def write_video(path: Path, frames: Iterable[Frame], fps: float) -> int:
-    """Write frames as H.264 in MP4 (yuv420p, BT.709); equal frames give equal bytes.
+    """Write frames as H.264 in MP4 (yuv420p, BT.709), and count them; equal frames give equal bytes.
 
     The file appears when it is whole; a failure leaves what was there. An odd width or height is padded by
-    one column or row, since yuv420p has none.
-
-    Args:
-        path: The file.
-        frames: RGB (H, W, 3), uint8 or float in [0, 1], all of one size; consumed one at a time.
-        fps: Frames a second.
-
-    Returns:
-        The number of frames.
-
-    Raises:
-        InputError: The file cannot be written.
+    one column or row, since yuv420p has none. Frames of one size, RGB in uint8 or float in [0, 1], are
+    consumed one at a time.
     """
     if not fps > 0:
         raise ValueError(f"{path.name}: fps must be positive, got {fps}")

@@ -42,11 +42,7 @@ class Drive:
 
 
 def check_numbers(shift_m: float, fps: float | None) -> None:
-    """Refuse what no drive can be made with, before anything is loaded.
-
-    Raises:
-        InputError: A number is out of its range.
-    """
+    """Refuse what no drive can be made with, before anything is loaded."""
     if not math.isfinite(shift_m):
         raise InputError(f"--shift-m {shift_m:g}: expected metres to the right, such as 2 or -2")
     if fps is not None and not RATES_HZ[0] <= fps <= RATES_HZ[1]:
@@ -54,12 +50,9 @@ def check_numbers(shift_m: float, fps: float | None) -> None:
 
 
 def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | None) -> list[Drive]:
-    """The drives that ``--trajectory`` names, each of which the scene has seen enough of.
+    """The drives that ``--trajectory`` names; ``InputError`` where a scene has not seen enough of one.
 
     Manoeuvres run at the smooth rate of ``generate``; without a rate a file keeps its own.
-
-    Raises:
-        InputError: There is no such drive, two have one name, or the scene shows next to nothing along it.
     """
     drives = [_drive(scene, each, shift_m, fps) for each in wanted]
     twice = [name for name, count in Counter(drive.name for drive in drives).items() if count > 1]

@@ -96,11 +96,7 @@ MANOEUVRES: dict[str, Callable[[Trajectory, Up], Trajectory]] = {
 
 
 def manoeuvre(name: str, recorded: Trajectory, up: Up, shift_m: float = 2.0) -> Trajectory:
-    """The drive of a name in :data:`MANOEUVRES`; ``up`` points away from the ground, in the world.
-
-    Raises:
-        InputError: There is no such manoeuvre.
-    """
+    """The drive of a name in :data:`MANOEUVRES`; ``up`` points away from the ground, in the world."""
     if name not in MANOEUVRES:
         known = ", ".join(MANOEUVRES)
         raise InputError(f"unknown trajectory {name!r}; expected {known} or a file with a trajectory")

@@ -1,4 +1,19 @@
 """Scenes in other formats."""
 
-from dreamdrive.export.kinds import KINDS, export
-from dreamdrive.export.ply import left_out_of_ply, write_ply
+from collections.abc import Callable
+from pathlib import Path
+
+from dreamdrive.choices import ExportKind
+from dreamdrive.errors import InputError
+from dreamdrive.export.ply import export_ply, left_out_of_ply, write_ply
+from dreamdrive.scene.scene import Scene
+
+KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {"ply": export_ply}
+"""What ``export --to`` takes."""
+
+
+def export(scene: Scene, kind: str, path: Path) -> None:
+    """Write a scene as one of :data:`KINDS`; ``InputError`` where there is none or it cannot be written."""
+    if kind not in KINDS:
+        raise InputError(f"unknown export kind {kind!r}; expected {', '.join(KINDS)}")
+    KINDS[kind](scene, path)

@@ -15,9 +15,6 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
     x y z, nx ny nz (0), f_dc_0..2, f_rest_* (channel-major, as many as the degree has), opacity (logit),
     scale_0..2 (log), rot_0..3 (wxyz, unit). Axes stay: x right, y down, z forward. Life spans, actors,
     features and source frames have no field and are left out; use ``Scene.at`` first for a scene at a time.
-
-    Raises:
-        InputError: The file cannot be written; what was there stays.
     """
     data = _encode(gaussians)
     with new_file(path) as partial:
@@ -31,9 +28,6 @@ def export_ply(scene: Scene, path: Path) -> None:
     (what never moves) and ``frames/NNNN.ply``, everything as it is at each recorded time: a numbered sequence
     that viewers play. PLY has no place for sky and exposure. One Gaussian takes 68 bytes, with spherical
     harmonics of degree 1 104.
-
-    Raises:
-        InputError: Something else is at ``path``, or it cannot be written; what was there stays.
     """
     if path.suffix.lower() == ".ply":
         write_ply(scene.at(float(scene.times_s[0])), path)

@@ -1,4 +1,7 @@
-"""Files and folders that appear whole or not at all."""
+"""Files and folders that appear whole or not at all.
+
+Where they cannot be written, ``InputError`` says why, and what was there stays.
+"""
 
 import os
 import shutil
@@ -11,11 +14,7 @@ from dreamdrive.errors import InputError
 
 @contextmanager
 def new_file(path: Path) -> Generator[Path, None, None]:
-    """A temporary sibling to write to; on success it replaces ``path``, on any failure it vanishes.
-
-    Raises:
-        InputError: The disk is full, or the folder is missing or not writable; what was there stays.
-    """
+    """A temporary sibling to write to; on success it replaces ``path``, on any failure it vanishes."""
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -33,13 +32,8 @@ def new_file(path: Path) -> Generator[Path, None, None]:
 def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None, None]:
     """A temporary sibling folder to fill; on success it becomes ``path``, on any failure it vanishes.
 
-    Args:
-        path: The folder to create.
-        replace: Whether an existing folder may be replaced; it is only if it holds ``mark`` or is empty.
-        mark: Name of the file by which a folder of this kind is known, so that nothing foreign is deleted.
-
-    Raises:
-        InputError: Something is in the way, the disk is full or the place not writable; what was there stays.
+    An existing folder is only replaced if that is asked for and it is empty or holds ``mark``, the file by
+    which a folder of this kind is known, so that nothing foreign is deleted.
     """
     partial, retired = (path.with_name(f".{path.name}.{kind}") for kind in ("partial", "retired"))
     try:
@@ -58,11 +52,7 @@ def new_folder(path: Path, *, replace: bool, mark: str) -> Generator[Path, None,
 
 
 def check_free(path: Path, replace: bool, mark: str) -> None:
-    """Fail before the work where ``new_folder``, of the same arguments, would fail after it.
-
-    Raises:
-        InputError: Something is in the way.
-    """
+    """Fail before the work where ``new_folder``, of the same arguments, would fail after it."""
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         return
     if not path.is_dir():

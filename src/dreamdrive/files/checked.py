@@ -14,17 +14,11 @@ T = TypeVar("T")
 
 
 def build(noun: type[T], values: Mapping[str, object]) -> T:
-    """A frozen dataclass from its fields.
+    """A frozen dataclass from its fields by name; those with a default may be missing.
 
     Shapes are compared across fields: what ``"n 3"`` and ``" n"`` call n is one number. That numbers are
-    finite is for the reader to check, see ``check_finite``.
-
-    Args:
-        noun: The dataclass.
-        values: Its fields by name; those with a default may be missing.
-
-    Raises:
-        ValueError: A field is unknown, missing, or of another type or shape.
+    finite is for the reader to check, see ``check_finite``. A field that is unknown, missing, or of another
+    type or shape raises ``ValueError``.
     """
     name = noun.__name__
     known = {field.name for field in fields(noun)}  # pyright: ignore[reportArgumentType]
@@ -41,11 +35,7 @@ def build(noun: type[T], values: Mapping[str, object]) -> T:
 
 
 def check_finite(name: str, value: object) -> None:
-    """Whether an array or tensor holds finite numbers only.
-
-    Raises:
-        ValueError: It does not.
-    """
+    """Raise ``ValueError`` where an array or tensor holds NaN or infinite numbers."""
     if isinstance(value, Tensor):
         finite = not value.is_floating_point() or bool(torch.isfinite(value).all())
     else:

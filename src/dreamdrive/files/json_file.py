@@ -1,10 +1,15 @@
-"""JSON from files: bounded, finite, and of the types that are expected before anything uses it."""
+"""JSON from files: bounded, finite, and of the types that are expected before anything uses it.
 
+What is not raises ``InputError``, which calls the file ``where``, or by ``option`` and path.
+"""
+
+import json
 import re
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import msgspec
+import numpy as np
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import TEXT_BYTES, read_bytes
@@ -18,30 +23,23 @@ _NO_NUMBER = re.compile(rb"[\s:,\[]-?(?:NaN|Infinity)\b")
 T = TypeVar("T")
 
 
-def read_json(path: Path, option: str = "", *, at_most: int = TEXT_BYTES) -> dict[str, Any]:
-    """The JSON object in a file.
-
-    Args:
-        path: The file.
-        option: How messages call it, such as ``--poses``.
-        at_most: Largest size in bytes.
-
-    Raises:
-        InputError: The file is missing, too large, or holds something else.
-    """
+def read_json(path: Path, option: str = "", *, follow: bool = True) -> dict[str, Any]:
+    """The JSON object in a file, or in what a link there leads to unless ``follow`` is off."""
     where = f"{option} {path}".strip()
-    values = parse_json(read_bytes(path, where, at_most=at_most), where)
+    values = parse_json(read_bytes(path, where, at_most=TEXT_BYTES, follow=follow), where)
     if not isinstance(values, dict):
         raise InputError(f"{where}: expected a JSON object, got a {type(values).__name__}")
     return cast("dict[str, Any]", values)
 
 
-def parse_json(data: bytes | str, where: str) -> Any:
-    """JSON values without NaN, infinities, and numbers that no computer holds, nested ``MAX_DEPTH`` at most.
+def write_json(path: Path, values: dict[str, Any]) -> None:
+    """Write values and arrays as readable JSON without NaN."""
+    text = json.dumps(values, indent=1, allow_nan=False, default=np.ndarray.tolist)
+    path.write_text(text + "\n", encoding="utf-8")
 
-    Raises:
-        InputError: The data is anything else.
-    """
+
+def parse_json(data: bytes | str, where: str) -> Any:
+    """JSON values without NaN, infinities and far too large numbers, nested ``MAX_DEPTH`` at most."""
     try:
         values = msgspec.json.decode(data)
     except RecursionError:
@@ -55,11 +53,7 @@ def parse_json(data: bytes | str, where: str) -> Any:
 
 
 def of_type(values: object, kind: type[T], where: str) -> T:
-    """JSON values as a ``msgspec.Struct`` or any type that msgspec knows; wrong ones are named by their path.
-
-    Raises:
-        InputError: They are of other types, or out of their bounds.
-    """
+    """JSON values as any type that msgspec knows, such as a struct; errors give the path of a wrong one."""
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:

@@ -1,4 +1,8 @@
-"""Files that may not be what they say: opened without waiting, read up to a limit, kept to their folder."""
+"""Files that may not be what they say: opened without waiting, read up to a limit, kept to their folder.
+
+A file that is missing, not a regular one, too large or may not be read raises ``InputError``, which calls it
+``where``, or by its path without it. A link is taken for what it leads to unless ``follow`` is off.
+"""
 
 import errno
 import os
@@ -22,14 +26,6 @@ def open_file(path: Path, where: str = "", *, follow: bool = True) -> Generator[
     """A regular file, open for reading.
 
     A pipe, a device or a folder is refused at once: reading it would wait, or never end.
-
-    Args:
-        path: The file.
-        where: How messages call it; its path without it.
-        follow: Whether a link may stand at its place.
-
-    Raises:
-        InputError: It is missing, not a regular file, or may not be read.
     """
     where = where or str(path)
     try:
@@ -48,27 +44,13 @@ def open_file(path: Path, where: str = "", *, follow: bool = True) -> Generator[
 
 
 def check_file(path: Path, where: str = "") -> int:
-    """The size of a regular file in bytes.
-
-    Raises:
-        InputError: It is missing, not a regular file, or may not be read.
-    """
+    """The size of a regular file in bytes."""
     with open_file(path, where) as file:
         return os.fstat(file.fileno()).st_size
 
 
 def read_bytes(path: Path, where: str = "", *, at_most: int, follow: bool = True) -> bytes:
-    """The content of a regular file.
-
-    Args:
-        path: The file.
-        where: How messages call it; its path without it.
-        at_most: Largest size in bytes.
-        follow: Whether a link may stand at its place.
-
-    Raises:
-        InputError: It is missing, not a regular file, too large, or may not be read.
-    """
+    """The content of a regular file of ``at_most`` bytes."""
     where = where or str(path)
     with open_file(path, where, follow=follow) as file:
         size = os.fstat(file.fileno()).st_size
@@ -82,11 +64,7 @@ def read_bytes(path: Path, where: str = "", *, at_most: int, follow: bool = True
 
 
 def read_text(path: Path, where: str = "", *, at_most: int = TEXT_BYTES) -> str:
-    """The text in a file, in UTF-8.
-
-    Raises:
-        InputError: See ``read_bytes``; or it is not text.
-    """
+    """The text in a file, in UTF-8."""
     data = read_bytes(path, where, at_most=at_most)
     try:
         return data.decode("utf-8")
@@ -113,16 +91,9 @@ def is_inside(name: object) -> bool:
 
 
 def inside(folder: Path, name: object) -> Path:
-    """The place below a folder that a name from a file means; no link on the way leads elsewhere.
+    """The place below a folder, which may be a link, that a name from a file means; no link on the way.
 
     For what dreamdrive itself wrote; names in files that a user gives may lead anywhere.
-
-    Args:
-        folder: Where the file with the name lies; the folder itself may be a link.
-        name: What the file says.
-
-    Raises:
-        InputError: The name is not a plain relative one, or a link lies on the way.
     """
     if not is_inside(name):
         raise InputError(f"{folder} names {str(name)[:80]!r}, which is not a plain name of a file in it")

@@ -39,11 +39,7 @@ def header_problem(path: Path) -> str | None:
 
 
 def read_own(path: Path, where: str = "") -> bytes:
-    """A file of tensors that dreamdrive wrote, no link, if memory holds it twice: as bytes and as tensors.
-
-    Raises:
-        InputError: It is missing, not a regular file, or too large.
-    """
+    """A file of tensors that dreamdrive wrote, no link, if memory holds it twice: as bytes and as tensors."""
     free = free_bytes()
     return read_bytes(path, where, at_most=2**40 if free is None else free // 2, follow=False)
 

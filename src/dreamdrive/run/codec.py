@@ -16,8 +16,7 @@ from dreamdrive.decompose import Grouping
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
 from dreamdrive.files.checked import build, check_finite
-from dreamdrive.files.json_file import parse_json
-from dreamdrive.files.paths import TEXT_BYTES, read_bytes
+from dreamdrive.files.json_file import read_json
 from dreamdrive.files.tensor_file import DAMAGE, read_own
 from dreamdrive.fit import StaticFit
 from dreamdrive.geometry import Measured, Posed
@@ -68,9 +67,6 @@ def write(folder: Path, value: object, header: dict[str, Any]) -> None:
 
     The arrays are written first and the JSON, which holds their digest, last, each under a temporary name:
     after a kill at any moment the folder holds a whole result or one that ``read`` refuses.
-
-    Raises:
-        InputError: The disk is full or the place is not writable.
     """
     arrays: dict[str, np.ndarray] = {}
     document = {"header": header, "value": _encode(value, "value", arrays)}
@@ -82,28 +78,18 @@ def write(folder: Path, value: object, header: dict[str, Any]) -> None:
         path.write_text(json.dumps(document, allow_nan=False))
 
 
-def read_header(folder: Path) -> dict[str, Any] | None:
-    """The header of what ``folder`` holds, or None where there is nothing readable."""
-    try:
-        header = _document(folder)["header"]
-    except (InputError, KeyError):
-        return None
-    return cast("dict[str, Any]", header) if isinstance(header, dict) else None
+def read_header(folder: Path) -> object:
+    """The header of what ``folder`` holds; ``InputError`` where there is nothing readable."""
+    return read_json(folder / JSON_NAME, follow=False).get("header")
 
 
 def read(folder: Path, kind: type[T] = object) -> T:
-    """What ``write`` stored; every noun of the types and shapes that it has.
+    """What ``write`` stored; every noun of the types and shapes that it has, and the whole of ``kind``.
 
-    Args:
-        folder: Where it lies.
-        kind: What it has to be.
-
-    Raises:
-        DamagedError: The files are missing, cut short or changed, do not belong together, or are too large
-            for the memory that is free.
+    ``DamagedError`` says what is wrong, or that it is too large for the memory that is free.
     """
     try:
-        document = _document(folder)
+        document = read_json(folder / JSON_NAME, follow=False)
         blob = read_own(folder / _ARRAYS)
         if hashlib.sha256(blob).hexdigest() != document["sha256"]:
             raise DamagedError(f"{folder / _ARRAYS} is not the file that {JSON_NAME} was written with")
@@ -113,14 +99,6 @@ def read(folder: Path, kind: type[T] = object) -> T:
     if not isinstance(value, kind):
         raise DamagedError(f"{folder} holds a {type(value).__name__}; expected a {kind.__name__}")
     return value
-
-
-def _document(folder: Path) -> dict[str, Any]:
-    path = folder / JSON_NAME
-    document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
-    if not isinstance(document, dict):
-        raise InputError(f"{path} holds no JSON object")
-    return cast("dict[str, Any]", document)
 
 
 def _encode(value: object, name: str, arrays: dict[str, np.ndarray]) -> object:

@@ -52,16 +52,10 @@ _SHORT, _LEAST_HZ = 48, 8.0
 
 @dataclass(frozen=True)
 class Planned:
-    """What a run will work on.
+    """What a run will work on: frames of each camera, from ``start`` in the source on, ``step`` apart.
 
-    Attributes:
-        frames: Number of frames of each camera.
-        cameras: Number of cameras.
-        size: Width and height of the frames.
-        rate_hz: Rate of the source; None where it is not known.
-        start: First frame in the source.
-        step: Distance of the frames in the source.
-        chosen: Whether somebody chose the frames.
+    The rate is that of the source, None where it is not known; ``chosen`` tells that somebody chose the
+    frames.
     """
 
     frames: int
@@ -79,11 +73,7 @@ class Planned:
 
 
 def plan(control: Control, prior: str) -> Planned | None:
-    """What a run will work on, as far as its input tells before it is read; None where that is unknown.
-
-    Raises:
-        InputError: The input or the size cannot be used.
-    """
+    """What a run will work on, as far as its input tells before it is read; None where that is unknown."""
     selection = Selection.parse(control.frames)
     if prior == "street-world":
         stop = selection.stop or max(FRAMES, selection.start + FRAMES)
@@ -117,13 +107,7 @@ def _first_size(source: Source) -> tuple[int, int]:
 
 
 def seconds_of(planned: Planned, options: Options, cores: int) -> float:
-    """About how long a run takes, with geometry found from the frames alone.
-
-    Args:
-        planned: What it works on.
-        options: How the scene is built.
-        cores: Cores of this machine; a third of the work is done by one at a time.
-    """
+    """About how long a run takes, with geometry found from the frames alone."""
     m = MEASURED
     frames, pixels = planned.frames * planned.cameras, planned.megapixels
     more = frames / m.usual_frames
@@ -142,15 +126,7 @@ def bytes_of(planned: Planned) -> float:
 
 
 def check_memory(planned: Planned, free: int | None) -> None:
-    """Refuse what memory cannot hold, before it is read.
-
-    Args:
-        planned: What the run works on.
-        free: Bytes that are free; None where the system does not tell.
-
-    Raises:
-        InputError: More is needed than there is.
-    """
+    """Refuse what ``free`` bytes cannot hold, before it is read; None where the system does not tell."""
     needed = bytes_of(planned)
     if free is None or needed <= free:
         return

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive.decompose import neighbour_flow
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
@@ -16,12 +17,7 @@ from dreamdrive.splat import render_scene, ssim_map
 
 @dataclass(frozen=True)
 class Likeness:
-    """How like its reference an image is.
-
-    Attributes:
-        psnr: Peak signal to noise ratio in decibels, of values in [0, 1].
-        ssim: Structural similarity, window of 11 pixels with a deviation of 1.5.
-    """
+    """PSNR in decibels, of values in [0, 1], and SSIM, with a window of 11 pixels and a deviation of 1.5."""
 
     psnr: float
     ssim: float
@@ -90,7 +86,7 @@ def interpolate_flow(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
     first, second = clip.frames[before], clip.frames[after]
     times = clip.times_s
     t = float((times[frame] - times[before]) / (times[after] - times[before]))
-    there, back = _flow(first, second), _flow(second, first)
+    there, back = neighbour_flow(clip, before, after), neighbour_flow(clip, after, before)
     from_first = _warped(first, -(1 - t) * t * there + t * t * back)
     from_second = _warped(second, (1 - t) * (1 - t) * there - t * (1 - t) * back)
     return (1 - t) * from_first + t * from_second
@@ -107,14 +103,6 @@ BASELINES: dict[str, Predictor] = {
 def _neighbours(clip: Clip, frame: int) -> tuple[int, int]:
     seen = np.array(clip.seen_of(int(clip.camera[frame])))
     return int(seen[seen < frame].max()), int(seen[seen > frame].min())
-
-
-def _flow(
-    first: UInt8[np.ndarray, "h w 3"], second: UInt8[np.ndarray, "h w 3"]
-) -> Float[np.ndarray, "h w 2"]:
-    method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    grey, other = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second))
-    return np.asarray(method.calc(grey, other, np.zeros((*first.shape[:2], 2), np.float32)))
 
 
 def _warped(

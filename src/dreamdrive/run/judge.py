@@ -26,21 +26,12 @@ _HEIGHT, _VIEW = "--camera-height", "--hfov or --intrinsics"
 
 @dataclass(frozen=True)
 class Facts:
-    """What the judgement rests on.
+    """What the judgement rests on, of one camera.
 
-    Attributes:
-        frames: Frames of one camera.
-        placed: Those of them whose place on the path was found.
-        interval_s: Time from one to the next.
-        fallback: Why the geometry is a guess; None where it is not.
-        scenes: First and last index in the source of each piece between two cuts.
-        step: Distance of the frames in the source.
-        psnr: Mean likeness of the withheld frames in decibels; None where none were withheld.
-        blended_psnr: The same of blending their neighbours along the motion in the picture.
-        quality: Which steps were taken.
-        focal_observed: Whether the field of view was given or seen.
-        basis: What metres rest on.
-        spread: How far they may be off, as a fraction.
+    ``placed`` frames found their place on the path; ``scenes`` are first and last index in the source of each
+    piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the withheld frames in
+    decibels, and that of blending their neighbours along the motion in the picture. ``basis`` is what metres
+    rest on, ``spread`` how far they may be off, as a fraction.
     """
 
     frames: int
@@ -64,15 +55,7 @@ def facts_of(
     held_out: dict[int, Likeness],
     blended: dict[int, Likeness],
 ) -> Facts:
-    """What there is to say of a result.
-
-    Args:
-        clip: The frames; of several cameras the first one counts.
-        geometry: Their geometry.
-        quality: Which steps were taken.
-        held_out: Likeness of the withheld frames, by index in the clip.
-        blended: The same of blending their neighbours.
-    """
+    """What there is to say of a result, of its first camera; ``blended`` is of blending the neighbours."""
     lead = clip.of_camera(int(clip.camera[0]))
     source, times_s = clip.source_index[lead], clip.times_s[lead]
     kind = geometry.fallback_kind or (None if geometry.fallback is None else "refused")

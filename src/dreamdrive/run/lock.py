@@ -26,10 +26,8 @@ _log = logging.getLogger("dreamdrive")
 def only_run(out: Path) -> Generator[None, None, None]:
     """Keep other runs out of a folder; the kernel lets go of it however this process ends.
 
-    The folder is made if need be, and removed at the end where nothing came into it.
-
-    Raises:
-        InputError: Another run works there; the message names its process.
+    Where another run works there, ``InputError`` names its process. The folder is made if need be, and
+    removed at the end where nothing came into it.
     """
     made = _make(out)
     path = out / NAME

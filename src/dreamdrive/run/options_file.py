@@ -23,9 +23,6 @@ def read_options(path: Path, base: Options) -> Options:
 
     The file holds tables such as ``[fit]`` with ``steps = 600``; every field of ``Options`` can be set but
     the seed and the weights, which have flags.
-
-    Raises:
-        InputError: The file is no TOML, names no option, or holds a value of another type or range.
     """
     try:
         values = tomllib.loads(read_text(path))
@@ -50,19 +47,15 @@ def _changed(options: T, values: dict[str, Any], before: str, where: str, known:
         if is_dataclass(now) and isinstance(value, dict):
             changes[key] = _changed(now, value, f"{name}.", where, known)
         elif name in known:
-            changes[key] = _of_type(value, hints[key], f"{where}: {name}")
+            try:
+                changes[key] = msgspec.convert(value, hints[key])
+            except msgspec.ValidationError as error:
+                raise InputError(f"{where}: {name}: {error}") from None
             if isinstance(value, float | int) and not 0 <= value < math.inf:
                 raise InputError(f"{where}: {name} = {value}; expected a finite number, not below 0")
         else:
             raise InputError(f"{where}: {_unknown(name, is_dataclass(now), known)}")
     return replace(options, **changes)  # type: ignore[type-var]
-
-
-def _of_type(value: object, kind: Any, where: str) -> object:
-    try:
-        return msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _unknown(name: str, is_table: bool, known: list[str]) -> str:

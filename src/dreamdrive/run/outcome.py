@@ -84,25 +84,12 @@ class Outcome:
 
 
 def read_outcome(report: Path, *, already_finished: bool) -> Outcome:
-    """The outcome that ``report.json`` tells of.
-
-    Raises:
-        InputError: The file is missing or holds something else.
-    """
+    """The outcome that ``report.json`` tells of."""
     return outcome_of(read_json(report), str(report), already_finished=already_finished)
 
 
 def outcome_of(document: dict[str, Any], where: str, *, already_finished: bool) -> Outcome:
-    """The outcome that a report tells of.
-
-    Args:
-        document: The report as JSON values.
-        where: How messages call it.
-        already_finished: Whether nothing was computed.
-
-    Raises:
-        InputError: The values are those of something else.
-    """
+    """The outcome that a report tells of, called ``where`` in messages."""
     told = of_type(document, _Report, where)
     blend = told.baselines.get(_BLEND, _Baseline()).mean
     return Outcome(

@@ -36,13 +36,7 @@ FIRST_PICTURE = "first.png"
 
 @dataclass(kw_only=True)
 class Production(Stages):
-    """Stages that show a first picture, and publish the scene they end with.
-
-    Attributes:
-        workspace: The output folder.
-        request: What is made.
-        say: Told where the first picture lies.
-    """
+    """Stages that show a first picture, and publish the scene they end with."""
 
     workspace: Workspace
     request: Request
@@ -102,11 +96,7 @@ class Production(Stages):
 def start(
     workspace: Workspace, request: Request, recompute_from: str | None, progress: StageProgress, say: Say
 ) -> Production:
-    """Say what the run will cost, where that is known before the frames are read, and begin.
-
-    Raises:
-        InputError: Memory cannot hold it.
-    """
+    """Say what the run will cost, where that is known before the frames are read, and begin."""
     planned = plan(request.control, request.prior)
     if planned is not None:
         check_memory(planned, free_bytes())

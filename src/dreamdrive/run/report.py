@@ -35,15 +35,7 @@ def describe(
 ) -> dict[str, Any]:
     """The report as JSON values; a number that is not finite becomes null.
 
-    Args:
-        clip: The frames.
-        geometry: Their geometry.
-        scene: The result.
-        request: Input and options.
-        records: Cost of each stage.
-        steps: Optimisation steps of those that optimise.
-        held_out: Likeness of the withheld frames, by index in the clip.
-        baselines: The same of predictions that need no scene.
+    Likeness is that of withheld frames, by index in the clip; baselines are predictions that need no scene.
     """
     options = request["options"]
     blended = baselines.get("flow_interpolation", {})

@@ -16,20 +16,14 @@ from dreamdrive.run.stages import digest, file_digest
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
-_FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
-
 
 @dataclass(frozen=True)
 class Request:
     """What a result is made from.
 
-    Attributes:
-        control: The input and how to read it, with the network of the prior.
-        prior: Name of the prior.
-        geometry_files: Cameras, poses and depth that are given, see ``geometry.backends.files``.
-        options: How the scene is built; its seed is the control's.
-        quality: Name of those options in ``options.QUALITIES``, or ``"custom"``.
-        digests: What given files hold: they count by their content, not by their place.
+    The control has the network of the prior, the options its seed; ``quality`` is their name in
+    ``QUALITIES``, or ``"custom"``. Given files count by their content, of which there are digests, not by
+    their place. Those for the geometry see ``geometry.backends.files``.
     """
 
     control: Control
@@ -44,12 +38,7 @@ class Request:
         """All that the frames depend on."""
         files = {name: value for name, value in self.digests.items() if name != "weights"}
         packages = PRIORS.package(self.prior) | DATASETS.package(self.control.dataset)
-        return [self.prior, packages, self._settings, files, self.control.seed]
-
-    @property
-    def _settings(self) -> dict[str, Any]:
-        """The options of reading that are no files."""
-        return {k: v for k, v in asdict(self.control).items() if k not in (*_FILES, "seed")}
+        return [self.prior, packages, self.control.settings, files, self.control.seed]
 
     def read(self, work: Work) -> Clip:
         """The frames, with what the geometry files say of them."""
@@ -69,7 +58,7 @@ class Request:
             "geometry": geometry.pop("method"),
             "quality": self.quality,
             **geometry,
-            **self._settings,
+            **self.control.settings,
             **options,
         }
         return {"digests": self.digests, "options": chosen, "seed": self.control.seed}
@@ -84,11 +73,7 @@ def request_of(
     geometry_weights: str | Path | None = None,
     options: Options | QualityName = "standard",
 ) -> Request:
-    """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``.
-
-    Raises:
-        InputError: The input or an option cannot be used.
-    """
+    """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``."""
     prior = prior or ("replay" if control.dataset else prior_of(control.path, weights is not None))
     whole = QUALITIES[options] if isinstance(options, str) else options
     control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)

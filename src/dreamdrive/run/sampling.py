@@ -17,10 +17,9 @@ from dreamdrive.progress import Progress, silent
 from dreamdrive.run.stages import file_digest
 from dreamdrive.scene.action import Action
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import FILES, Control
 
 _SEEN_PX = 1024
-_FILES = ("path", "intrinsics", "poses", "trajectory", "features", "weights")
 
 
 def sample(
@@ -34,22 +33,14 @@ def sample(
 ) -> Clip:
     """Run a prior and write what it gives in the format of ``data.recording``, for ``replay`` to take up.
 
-    Args:
-        control: The input and how to read it.
-        out: Folder to write.
-        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
-        weights: The prior's network: a file or folder, or a name, see ``hub.find_weights``.
-        force: Replace an older folder of this kind.
-        progress: Told of every step.
-
-    Raises:
-        InputError: The input, an option, the weights or ``out`` cannot be used.
+    Without a name the input decides on the prior, see ``prior.prior_of``; weights as of ``hub.find_weights``.
+    ``force`` replaces an older folder of this kind.
     """
     name = prior or prior_of(control.path, weights is not None)
     control = control if weights is None else replace(control, weights=find_weights(weights))
     chosen = choose_prior(name)
     chosen.check(control)
-    for file in _FILES:
+    for file in FILES:
         path: Path | None = getattr(control, file)
         if path is not None and not path.exists():
             raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
@@ -65,18 +56,18 @@ def sample(
 
 def _about(prior: str, control: Control) -> dict[str, Any]:
     """What it takes to make the same again: files by name and content, all else by value."""
-    options = {k: v for k, v in asdict(control).items() if k not in (*_FILES, "seed") and v is not None}
-    given = {name: path for name in _FILES if isinstance(path := getattr(control, name), Path)}
-    files = {
-        name: {"name": path.name, "sha256": file_digest(path, deep=True)} for name, path in given.items()
-    }
+    given = {name: path for name in FILES if isinstance(path := getattr(control, name), Path)}
     return {
         "dreamdrive": __version__,
         "prior": prior,
         "seed": control.seed,
-        "options": options,
-        "files": files,
+        "options": {name: value for name, value in control.settings.items() if value is not None},
+        "files": {name: _named(path) for name, path in given.items()},
     }
+
+
+def _named(path: Path) -> dict[str, str]:
+    return {"name": path.name, "sha256": file_digest(path, deep=True)}
 
 
 def detailed_size(path: Path) -> tuple[int, int]:
@@ -100,19 +91,8 @@ def clip_features(
 ) -> FeatureFile:
     """Features of a recorded clip by the network of Vista or Stable Video Diffusion, written to a file.
 
-    Args:
-        path: A video or a folder of images.
-        out: File to write.
-        weights: The network: a file or folder, or a name, see ``hub.find_weights``.
-        options: Fields of ``prior.vista.features.FeatureOptions``.
-        frames: ``START:STOP:STEP`` over the frames of the clip; all without it.
-        size: Width and height at which the network sees the frames.
-        action: What the car does, for Vista.
-        seed: Of the noise.
-        progress: Told of every window of frames.
-
-    Raises:
-        InputError: The clip, the weights or an option cannot be used, or the file cannot be written.
+    Options are fields of ``prior.vista.features.FeatureOptions``, weights as of ``hub.find_weights``;
+    ``size`` is the one at which the network sees the frames, ``action`` what the car does, for Vista.
     """
     from dreamdrive.prior.vista.features import FeatureOptions, video_features
 
@@ -132,7 +112,7 @@ def clip_features(
         "dreamdrive": __version__,
         "features": asdict(chosen),
         "clip": {"name": path.name, "sha256": file_digest(path)},
-        "weights": {"name": folder.name, "sha256": file_digest(folder, deep=True)},
+        "weights": _named(folder),
         INDEX: clip.source_index.tolist(),
         "action": None if action is None else asdict(action),
         "seed": seed,

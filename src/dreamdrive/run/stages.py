@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar, cast, get_args, runtime_checkable
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 import torch
@@ -24,7 +24,6 @@ from dreamdrive.files.json_file import of_type
 from dreamdrive.files.paths import inside, open_file
 from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run import codec
-from dreamdrive.scene.scene import Scene
 from dreamdrive.stored import load_scene, save_scene
 
 STAGES: tuple[str, ...] = get_args(Stage)
@@ -37,43 +36,23 @@ _log = logging.getLogger("dreamdrive")
 
 @dataclass(frozen=True)
 class StageRecord:
-    """What a stage cost when it was computed.
-
-    Attributes:
-        seconds: Wall time.
-        peak_rss_mb: Largest memory of the process up to the end of the stage.
-        cached: Whether the result was read rather than computed this time.
-    """
+    """What a stage cost when it was computed; memory is the process's largest until then."""
 
     seconds: float
     peak_rss_mb: float
     cached: bool
 
 
-@dataclass(frozen=True)
-class Storage(Generic[T]):
-    """How results of one kind lie in a folder.
-
-    Attributes:
-        write: Stores a value in a folder, or replaces the one there; whole or not at all.
-        read: Reads it back, or raises ``InputError``.
-    """
-
-    write: Callable[[Path, T], None]
-    read: Callable[[Path], T]
-
-
-_STORAGE = {"fit": Storage[Scene](lambda path, scene: save_scene(scene, path, replace=True), load_scene)}
-"""Results that ``codec`` does not know."""
+_SCENE = "fit"
+"""The stage whose result is a scene, which ``codec`` does not know."""
 
 
 def trusted(value: object) -> None:
     """No check."""
 
 
-@runtime_checkable
-class Run(Protocol):
-    """What gives the result of a stage: ``call`` computes it, ``Stages`` keeps it on disk."""
+class Run:
+    """What gives the result of a stage: this computes it and keeps nothing, ``Stages`` keeps it on disk."""
 
     def __call__(
         self,
@@ -84,44 +63,25 @@ class Run(Protocol):
         check: Callable[[T], None] = trusted,
         given: T | None = None,
     ) -> T:
-        """The result.
+        """The result of one of ``STAGES``, unless it is given.
 
-        Args:
-            name: One of ``STAGES``.
-            options: All that the result depends on beside the results before it.
-            compute: Makes the result.
-            check: Raises ``ValueError`` where a stored result does not belong to those before it.
-            given: The result, where it is known already.
+        It depends on the options and the results before it, nothing else; ``check`` raises ``ValueError``
+        where a stored result does not belong to these.
         """
-        ...
+        return compute(Work()) if given is None else given
 
 
-def call(
-    name: str,
-    options: object,
-    compute: Callable[[Work], T],
-    *,
-    check: Callable[[T], None] = trusted,
-    given: T | None = None,
-) -> T:
-    """A ``Run`` that keeps nothing."""
-    return compute(Work()) if given is None else given
+call = Run()
 
 
 @dataclass
-class Stages:
-    """A ``Run`` that reads what an earlier run of the same stages left, and leaves what it computes.
+class Stages(Run):
+    """Reads what an earlier run of the same stages left, and leaves what it computes, a folder for each.
 
     The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
-    result is found again only by the program that made it.
-
-    Attributes:
-        folder: One folder a stage is kept in here.
-        recompute_from: Results of this stage and all later ones are not read.
-        progress: Told of every step.
-        claim: Called before something is written.
-        records: Cost of each stage that ran.
-        results: Result of each stage that ran, or was given.
+    result is found again only by the program that made it. Those of ``recompute_from`` and later stages are
+    not read. ``claim`` is called before something is written. Records and results are those of each stage
+    that ran.
     """
 
     folder: Path
@@ -153,7 +113,7 @@ class Stages:
         found = None if fresh else _header(folder)
         if found is not None and found.key == self._last:
             try:
-                value = cast(T, _load(folder, _STORAGE.get(name)))
+                value = cast(T, _load(folder))
                 check(value)
             except ValueError as error:
                 _log.warning("%s is computed again: %s", name, error)
@@ -197,10 +157,10 @@ class Stages:
         value = self.measure(name, lambda tell: compute(Work(tell, keep)))
         record = self.records[name]
         self.claim()
-        folder, storage = inside(self.folder, name), _STORAGE.get(name)
-        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)), storage)
+        folder = inside(self.folder, name)
+        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)))
         remove(parts)
-        return cast(T, _load(folder, storage))
+        return cast(T, _load(folder))
 
 
 @dataclass(frozen=True)
@@ -214,25 +174,24 @@ class _Header:
 
 def _header(folder: Path) -> _Header | None:
     """What is noted beside the result in a folder; None where there is none, or no such note."""
-    found = codec.read_header(folder)
     try:
-        return None if found is None else of_type(found, _Header, str(folder))
+        return of_type(codec.read_header(folder), _Header, str(folder))
     except InputError:
         return None
 
 
-def _store(folder: Path, value: object, header: dict[str, Any], storage: Storage[Any] | None) -> None:
-    if storage is None:
+def _store(folder: Path, value: Any, header: dict[str, Any]) -> None:
+    if folder.name != _SCENE:
         codec.write(folder, value, header)
         return
     # A folder without a header holds nothing, so that a kill on the way leaves no mixture behind.
     (folder / codec.JSON_NAME).unlink(missing_ok=True)
-    storage.write(folder / "value", value)
+    save_scene(value, folder / "value", replace=True)
     codec.write(folder, None, header)
 
 
-def _load(folder: Path, storage: Storage[Any] | None) -> object:
-    return codec.read(folder) if storage is None else storage.read(inside(folder, "value"))
+def _load(folder: Path) -> object:
+    return load_scene(inside(folder, "value")) if folder.name == _SCENE else codec.read(folder)
 
 
 def digest(value: object) -> str:
@@ -267,12 +226,7 @@ def program_digest() -> str:
 def file_digest(path: Path, *, deep: bool = False) -> str:
     """SHA-256 of a file's content, or of names and contents of the files in a folder.
 
-    Args:
-        path: A file or a folder; hidden files in it do not count. Links are followed.
-        deep: Whether the folders in a folder count.
-
-    Raises:
-        InputError: It is neither a regular file nor a folder, or may not be read.
+    Hidden files in it do not count, the folders in it if ``deep``. Links are followed.
     """
     if not path.is_dir():
         with open_file(path) as file:

@@ -12,8 +12,8 @@ from typing import Any, cast
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file, remove
-from dreamdrive.files.json_file import parse_json
-from dreamdrive.files.paths import TEXT_BYTES, inside, is_inside, read_bytes
+from dreamdrive.files.json_file import read_json
+from dreamdrive.files.paths import inside, is_inside
 from dreamdrive.run.stages import digest
 
 OURS = ("held_out", "report.json", "report.png", "scene", "stages", "video")
@@ -27,11 +27,9 @@ REPORT = "report.json"
 
 @dataclass(frozen=True)
 class Workspace:
-    """An output folder that may be written to.
+    """An output folder that may be written to; it need not exist yet.
 
-    Attributes:
-        out: The folder; it need not exist yet.
-        request: What the result is made from: digest of the input and the options, as JSON values.
+    ``request`` holds as JSON values what the result is made from.
     """
 
     out: Path
@@ -96,19 +94,10 @@ class Workspace:
 def open_workspace(
     out: Path, request: dict[str, Any], *, force: bool = False, recompute: bool = False
 ) -> Workspace | None:
-    """Check that ``out`` may be written for ``request``.
+    """Check that ``out`` may be written; None if it already holds the finished result of the request.
 
-    Args:
-        out: The output folder.
-        request: What the result is made from.
-        force: Replace the result of another request, and tolerate files that are not ours.
-        recompute: A finished result of the same request is to be made again.
-
-    Returns:
-        None if ``out`` already holds the finished result of the request and neither flag is set.
-
-    Raises:
-        InputError: The folder cannot be written, holds something else, or the result of another request.
+    ``force`` replaces the result of another request, and tolerates files that are not ours; ``recompute``
+    makes a finished result again. ``InputError`` says what is in the way.
     """
     check_writable(out)
     _check_kinds(out)
@@ -141,32 +130,20 @@ def open_workspace(
 
 
 def check_ours(out: Path) -> None:
-    """Fail where a folder is not one that ``generate`` wrote.
-
-    Raises:
-        InputError: It is not.
-    """
+    """Fail where a folder is not one that ``generate`` wrote."""
     if _identity(out / REPORT) is None and _identity(out / "stages" / "request.json") is None:
         raise InputError(f"{out} is no folder that dreamdrive generate wrote; nothing was removed")
 
 
 def check_place(out: Path, source: Path | None) -> None:
-    """Fail before the work where the output folder is the input, or cannot be written.
-
-    Raises:
-        InputError: It is or cannot.
-    """
+    """Fail before the work where the output folder is the input, or cannot be written."""
     if source is not None and out.resolve() == source.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
     check_writable(out)
 
 
 def check_writable(out: Path) -> None:
-    """Fail before the work rather than after it.
-
-    Raises:
-        InputError: Something else is in the way, or the place may not be written to.
-    """
+    """Fail before the work rather than after it."""
     existing = out
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -202,10 +179,9 @@ def _remove_file(out: Path, name: Path) -> None:
 def _read(path: Path) -> dict[str, Any]:
     """The JSON object in one of our own files; nothing where it is damaged or something else."""
     try:
-        document = parse_json(read_bytes(path, at_most=TEXT_BYTES, follow=False), str(path))
+        return read_json(path, follow=False)
     except InputError:
         return {}
-    return cast("dict[str, Any]", document) if isinstance(document, dict) else {}
 
 
 def _identity(path: Path) -> str | None:

@@ -24,12 +24,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Where to be at ``AT_S``.
-
-    Attributes:
-        right_m: Distances to the right; left is negative.
-        ahead_m: Distances ahead.
-    """
+    """Where to be at ``AT_S``: distances to the right, negative to the left, and ahead."""
 
     right_m: Four
     ahead_m: Four
@@ -37,12 +32,7 @@ class Waypoints:
 
 @dataclass(frozen=True)
 class Steering:
-    """Speed and steering wheel at ``AT_S``.
-
-    Attributes:
-        speed_m_s: Speeds, forward.
-        wheel_rad: Angles of the steering wheel (not of the road wheels); to the left is positive.
-    """
+    """Forward speeds, and angles of the steering wheel (not the road wheels; left positive), at ``AT_S``."""
 
     speed_m_s: Four
     wheel_rad: Four
@@ -70,11 +60,7 @@ RANGES: dict[str, tuple[float, float]] = {
 
 
 def check_action(action: Action) -> None:
-    """Whether a car could do it.
-
-    Raises:
-        InputError: A number is outside ``RANGES``.
-    """
+    """Raise ``InputError`` where no car could do it: a number is outside ``RANGES``."""
     if isinstance(action, Command):
         return
     for name, values in vars(action).items():

@@ -8,15 +8,10 @@ from jaxtyping import Float
 
 @dataclass(frozen=True)
 class Actor:
-    """A group of dynamic Gaussians that move as one.
+    """A group of dynamic Gaussians that move as one: those whose ``Gaussians.actor`` is ``id``.
 
-    Attributes:
-        id: Value of ``Gaussians.actor`` for its members.
-        name: Unique name for people, such as ``"actor 3"``.
-        kind: What it is, such as ``"vehicle"`` or ``"unknown"``.
-        count: Number of its Gaussians.
-        times_s: Times (T,) of its track, strictly increasing.
-        positions_m: Its centre (T, 3) at these times, in the world.
+    The name is unique, for people, such as ``"actor 3"``; the kind such as ``"vehicle"`` or ``"unknown"``.
+    The track is of its centre, in the world; its times increase strictly.
     """
 
     id: int

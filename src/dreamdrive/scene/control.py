@@ -1,10 +1,14 @@
 """What a user asks a prior for."""
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.action import Action
+
+FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
+"""Fields of ``Control`` that name files; they count by their content."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +51,13 @@ class Control:
     hold_out: int | None = None
     seed: int = 0
 
-    def check_taken(self, takes: frozenset[str], by: str) -> None:
-        """Whether all that is given is honoured; ``seed`` and ``weights`` go without saying.
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What counts by its value: all but the files and the seed."""
+        return {k: v for k, v in asdict(self).items() if k not in (*FILES, "seed")}
 
-        Raises:
-            InputError: It is not.
-        """
+    def check_taken(self, takes: frozenset[str], by: str) -> None:
+        """Refuse what is given and not taken; ``seed`` and ``weights`` go without saying."""
         given = [field.name for field in fields(self) if getattr(self, field.name) is not None]
         if refused := [name for name in given if name not in takes | {"seed", "weights"}]:
             raise InputError(f"{by} takes no {' and no '.join(refused)}; it takes {', '.join(sorted(takes))}")

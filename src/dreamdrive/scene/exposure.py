@@ -10,12 +10,9 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class Exposure:
-    """Affine colour transforms (F, 3, 4) of the frames they were trained on.
+    """Affine colour transforms [A | b] (F, 3, 4) of the frames they were trained on.
 
-    Attributes:
-        transforms: One [A | b] a frame.
-        times_s: Times of the frames (F,), strictly increasing for each camera.
-        camera: Which camera of the rig each is of (F,); None where there is one only.
+    Times strictly increase for each camera of the rig; ``camera`` is None where there is one only.
     """
 
     transforms: Float[Tensor, "f 3 4"]

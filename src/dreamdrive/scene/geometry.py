@@ -41,12 +41,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Focal:
-    """The focal length and whether the clip itself shows it.
-
-    Attributes:
-        px: Focal length in pixels at the clip's size.
-        observed: True when calibrated or constrained by turning; False when it is a prior.
-    """
+    """The focal length at the clip's size; observed where it is calibrated or constrained by turning."""
 
     px: float
     observed: bool
@@ -54,11 +49,9 @@ class Focal:
 
 @dataclass(frozen=True)
 class Ground:
-    """The road as a plane: points x with ``normal_world . x + offset_m = 0``, the normal pointing up.
+    """The road as a plane: points x with ``normal_world . x + offset_m = 0``, the unit normal pointing up.
 
-    Attributes:
-        normal_world: Unit normal (3,); up is about -y in the world frame.
-        offset_m: Height of the world's origin above the plane in metres.
+    Up is about -y in the world frame; ``offset_m`` is the height of the world's origin above the plane.
     """
 
     normal_world: Float[np.ndarray, "3"]

@@ -10,12 +10,10 @@ from scipy.spatial import KDTree
 def linked_pixels(
     pixels: Float[np.ndarray, "m 3"], reach_px: float, reach_depth: float
 ) -> Int[np.ndarray, " m"]:
-    """Label (M,) of the connected component of each pixel, from 0.
+    """Label of the connected component of each pixel, from 0, by its column, row and positive depth.
 
-    Args:
-        pixels: Column, row and positive depth.
-        reach_px: Neighbours are at most this far apart along columns and along rows,
-        reach_depth: and differ by at most this in the logarithm of depth.
+    Neighbours are at most ``reach_px`` apart along columns and along rows, and differ by at most
+    ``reach_depth`` in the logarithm of depth.
     """
     depth = np.log(pixels[:, 2]) * (reach_px / reach_depth)
     tree = KDTree(np.column_stack([pixels[:, :2], depth]))

@@ -20,9 +20,7 @@ from dreamdrive.scene.trajectory import Trajectory
 class SceneMotion(Protocol):
     """What a scene asks of what moves its Gaussians; ``dreamdrive.motion`` holds all there are.
 
-    Attributes:
-        kind: Its name on disk.
-        config: A dataclass that rebuilds it together with its ``state_dict``.
+    ``kind`` is its name on disk; ``config`` is a dataclass that rebuilds it together with its ``state_dict``.
     """
 
     kind: ClassVar[str]

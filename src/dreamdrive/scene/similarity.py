@@ -13,13 +13,7 @@ _STANDING = 1e-6
 
 @dataclass(frozen=True)
 class Similarity:
-    """From points x of one world to scale * rotation @ x + translation in another.
-
-    Attributes:
-        scale: Lengths there for a unit of length here; positive.
-        rotation: Right-handed (3, 3).
-        translation: In the other world (3,).
-    """
+    """From points x of one world to scale * rotation @ x + translation in another."""
 
     scale: float
     rotation: Float[np.ndarray, "3 3"]
@@ -38,13 +32,6 @@ def fit_similarity(found: Sequence[Camera], true: Sequence[Camera]) -> Similarit
     Umeyama 1991 on the positions, with the attitudes as further directions to be brought together: a straight
     drive leaves the roll about itself free, a standing camera the whole rotation. Positions, over their
     spread, and attitudes weigh alike. A camera that stands still shows no scale: it stays 1.
-
-    Args:
-        found: One camera a frame.
-        true: The same frames in the other world.
-
-    Raises:
-        ValueError: The numbers of frames differ, or there is none.
     """
     if len(found) != len(true) or not found:
         raise ValueError(f"similarity: {len(found)} cameras against {len(true)}; expected one pair a frame")

@@ -12,16 +12,11 @@ from dreamdrive.scene.camera import Camera
 
 @dataclass(frozen=True)
 class Sky:
-    """A background at infinity, stored by azimuth and elevation in the world frame.
+    """A background at infinity, RGB in [0, 1], stored by azimuth and elevation in the world frame.
 
     Azimuth is ``atan2(x, z)`` (0 forward, positive to the right), elevation ``atan2(-y, hypot(x, z))``
     (positive up), both in radians. Row 0 is the highest elevation, column 0 the smallest azimuth; texels are
     areas, so the ranges are those of their outer borders.
-
-    Attributes:
-        texture: RGB (Hs, Ws, 3) in [0, 1].
-        azimuth_rad: Range covered, from left to right.
-        elevation_rad: Range covered, from bottom to top.
     """
 
     texture: Float[Tensor, "hs ws 3"]

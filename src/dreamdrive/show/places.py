@@ -17,9 +17,6 @@ def places(out: Path, output: Path | None, drives: Sequence[Drive], look: Look) 
 
     ``-o`` is the result of a single drive, or the folder for those of several. What is not all colours is
     part of the default name.
-
-    Raises:
-        InputError: ``-o`` does not fit the format or lies among the results of generate, or a link is there.
     """
     if output is not None:
         _check_place(out, output)

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
 from dreamdrive.choices import Format, Show
+from dreamdrive.data.formats.cameras import indexed_pinhole
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import RATES_HZ, Drive, frame_rate
@@ -35,13 +36,9 @@ _BYTES_PER_PX = 200
 
 @dataclass(frozen=True)
 class Look:
-    """What is shown of a drive, and how it is kept.
+    """What is shown of a drive, and how it is kept: a video, or a folder with a file a frame.
 
-    Attributes:
-        show: Everything, its depth, or the dynamic or the static part alone.
-        format: A video, or a folder with a picture or with arrays a frame.
-        size: Width and height in pixels; None is those of the recording.
-        fps: Rate of a video; None is that of the drive.
+    Without a size it is that of the recording, without a rate that of the drive.
     """
 
     show: Show = "colour"
@@ -51,11 +48,7 @@ class Look:
 
 
 def check_size(look: Look) -> None:
-    """Refuse sizes that cannot be rendered or kept, before anything is loaded.
-
-    Raises:
-        InputError: The size is too small, too large, or odd for a video.
-    """
+    """Refuse sizes that cannot be rendered or kept, before anything is loaded."""
     if look.size is None:
         return
     width, height = look.size
@@ -83,9 +76,6 @@ def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Ca
     1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing; ``alpha``
     float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has calibration,
     poses and times. One frame is held at a time. ``progress`` is called with the number of frames done.
-
-    Raises:
-        InputError: It cannot be written, or the rate is none of a video.
     """
     camera = view_camera(scene.cameras[0], look.size)
     part = look.show if look.show in ("dynamic", "static") else "all"
@@ -106,11 +96,7 @@ def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Ca
 
 
 def video_rate(drive: Drive, look: Look) -> float:
-    """Frames a second of a video of a drive.
-
-    Raises:
-        InputError: No video has that rate.
-    """
+    """Frames a second of a video of a drive, within ``RATES_HZ``."""
     rate = frame_rate(drive.path) if look.fps is None else look.fps
     if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
         raise InputError(
@@ -156,21 +142,18 @@ def _write_frame(path: Path, view: SceneView, show: Show) -> None:
         else:
             np.savez(path, colour=colour, depth_m=depth_m, alpha=alpha)
     elif show == "depth":
-        path.write_bytes(cv2.imencode(".png", depth_png(view))[1].tobytes())
+        write_picture(path, depth_png(view))
     else:
         write_png(path, _picture(view, show))
 
 
 def _note(camera: Camera, drive: Trajectory, look: Look) -> dict[str, Any]:
     """Calibration as ``--intrinsics`` reads it (pixels by integer index), path as ``--trajectory`` does."""
-    intrinsics = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
     unit = {"depth_unit": f"1/{PER_METRE} m"} if (look.show, look.format) == ("depth", "png") else {}
     return {
         "show": look.show,
         **unit,
-        "width": camera.width_px,
-        "height": camera.height_px,
-        "intrinsics": intrinsics,
+        **indexed_pinhole(camera),
         "world_from_camera": drive.world_from_camera.tolist(),
         "times_s": drive.times_s.tolist(),
     }

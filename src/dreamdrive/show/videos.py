@@ -11,6 +11,7 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.data import Lens
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import frame_rate, manoeuvre, smooth, up_of
 from dreamdrive.errors import InputError
@@ -92,14 +93,9 @@ def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
 
 
 def write_png(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
-    """Write an RGB picture; the file appears when it is whole.
-
-    Raises:
-        InputError: It cannot be written.
-    """
-    encoded = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))[1]
+    """Write an RGB picture; the file appears when it is whole."""
     with new_file(path) as partial:
-        partial.write_bytes(encoded.tobytes())
+        write_picture(partial, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
 
 
 def drive_frames(

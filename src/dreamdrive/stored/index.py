@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
+from dreamdrive.data.formats.rigid import JsonPose
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import FARTHEST_M, Camera
 from dreamdrive.scene.scene import Provenance
@@ -16,7 +17,6 @@ MAX_PIXELS = 64_000_000
 
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-_Row = tuple[float, float, float, float]
 _Point = tuple[_Metres, _Metres, _Metres]
 
 
@@ -29,7 +29,7 @@ class StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cy_px: float
     width_px: int
     height_px: int
-    world_from_camera: tuple[_Row, _Row, _Row, _Row]
+    world_from_camera: JsonPose
 
     def camera(self) -> Camera:
         """The noun; ``ValueError`` where its pose, size or focal length is none of a camera."""
@@ -78,11 +78,7 @@ class StoredIndex(msgspec.Struct, frozen=True):
 
 
 def increasing(values: list[float], name: str) -> Float[np.ndarray, " t"]:
-    """Times as an array.
-
-    Raises:
-        ValueError: They do not increase.
-    """
+    """Times as an array; ``ValueError`` where they do not increase."""
     times_s = np.array(values, dtype=np.float64)
     if (np.diff(times_s) <= 0).any():
         raise ValueError(f"{name} do not increase")

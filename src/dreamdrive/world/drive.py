@@ -37,15 +37,10 @@ _FOCAL = 0.8  # of the width: 64 degrees across
 
 @dataclass(frozen=True)
 class WorldBox:
-    """The hull of a road user.
+    """The hull of a road user: its name and kind in the layout, and whether it ever moves.
 
-    Attributes:
-        instance: Label of its pixels, from 1.
-        id: Its name in the layout.
-        kind: What it is.
-        moving: Whether it ever moves.
-        size_m: Length, width and height (3,), along its x (ahead), y (left) and z (up).
-        world_from_box: Pose of its centre (F, 4, 4) at each frame.
+    ``instance`` is the label of its pixels, from 1. Its size is that along x (ahead), y (left) and z (up);
+    its pose is that of its centre (F, 4, 4) at each frame.
     """
 
     instance: int
@@ -60,19 +55,10 @@ class WorldBox:
 class Drive:
     """One camera's drive; world = the camera of the first frame, metres. Truth is that of pixel centres.
 
-    Attributes:
-        frames: RGB (F, H, W, 3).
-        times_s: Times (F,), from 0.
-        cameras: Posed pinholes (F,).
-        depth_m: Depth along z (F, H, W); 0 in the sky.
-        instance: Labels (F, H, W): 0 for none, otherwise :attr:`WorldBox.instance`.
-        semantic: Classes (F, H, W), see ``materials.Semantic``.
-        moving: Pixels of moving road users (F, H, W).
-        flow_px: Way of each point to its place in the next frame (F, H, W, 2), the last to one not drawn.
-        boxes: Hulls of all road users.
-        ground: The road plane.
-        layout: What the street is made from.
-        world_from_map: Pose (4, 4) of the layout's frame.
+    Arrays hold a picture a frame (F, H, W): depth along z, 0 in the sky; instances, 0 for none and otherwise
+    :attr:`WorldBox.instance`; classes of ``Semantic``; pixels of moving road users; the way of each point to
+    its place in the next frame, the last to one not drawn. Times start at 0. ``world_from_map`` is the pose
+    of the layout's frame.
     """
 
     frames: UInt8[np.ndarray, "f h w 3"]

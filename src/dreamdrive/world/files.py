@@ -1,25 +1,24 @@
 """Worlds on disk: what each camera records, and all truth beside it."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import cv2
 import msgspec
 import numpy as np
 from msgspec import Meta
 
 from dreamdrive.data.array_file import read_npz
-from dreamdrive.data.formats.cameras import IndexedPinhole
+from dreamdrive.data.formats.cameras import IndexedPinhole, indexed_pinhole
+from dreamdrive.data.formats.rigid import JsonPose
 from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
-from dreamdrive.data.picture_file import read_picture
+from dreamdrive.data.picture_file import read_picture, write_picture
 from dreamdrive.data.rig import write_rig
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
-from dreamdrive.files.json_file import of_type, read_json
+from dreamdrive.files.json_file import of_type, read_json, write_json
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.layout import Layout, Size
 from dreamdrive.scene.trajectory import Trajectory
@@ -30,8 +29,6 @@ from dreamdrive.world.materials import Semantic
 
 _MOST_PIXELS = 500_000_000
 """More pixels of all frames would take more than 20 GB with their depth, flow and labels."""
-_Row = tuple[float, float, float, float]
-_Pose = tuple[_Row, _Row, _Row, _Row]
 
 
 class _Hull(msgspec.Struct):
@@ -42,13 +39,13 @@ class _Hull(msgspec.Struct):
     kind: str
     moving: bool
     size_m: tuple[Size, Size, Size]
-    world_from_box: list[_Pose]
+    world_from_box: list[JsonPose]
 
 
 class _Path(msgspec.Struct):
     """What poses.json holds."""
 
-    world_from_camera: Annotated[list[_Pose], Meta(min_length=1)]
+    world_from_camera: Annotated[list[JsonPose], Meta(min_length=1)]
     times_s: Annotated[list[float], Meta(min_length=1)]
 
 
@@ -56,7 +53,7 @@ class _Hulls(msgspec.Struct):
     """What boxes.json holds."""
 
     boxes: list[_Hull]
-    world_from_map: _Pose
+    world_from_map: JsonPose
 
 
 MARK = "layout.json"
@@ -66,24 +63,16 @@ MARK = "layout.json"
 def write_world(
     drives: Mapping[Mount, Drive], path: Path, *, corruption: Corruption | None = None, replace: bool = False
 ) -> None:
-    """Write a world folder; it appears whole or not at all.
+    """Write a world folder, with a drive for each camera; it appears whole or not at all.
 
     ``layout.json``, its drawing ``layout.png`` and ``classes.json`` (the semantic classes) lie in the folder
     itself. Of every camera there are: ``frames/NNNN.png``; ``cameras.json`` (calibration and poses, principal
-    point by integer pixel index) and ``depth/NNNN.npz`` (``depth_m``, 0 in the sky), which together are what
-    ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``); ``flow.npz`` (``flow_px``, to
-    the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``, ``moving/NNNN.png``, ``sky/NNNN.png``;
-    ``boxes.json`` (hulls with a pose a frame, in the camera's world). One camera lies in the folder itself,
-    several in folders of their names, with their mountings in ``rig.json``, see ``data.rig``.
-
-    Args:
-        drives: One for each camera, by its mount.
-        path: The folder.
-        corruption: What was done to the frames, noted in ``cameras.json``.
-        replace: Whether an existing world folder may be replaced.
-
-    Raises:
-        InputError: Something else is at ``path``, or it cannot be written; what was there stays.
+    point by integer pixel index, what was done to the frames) and ``depth/NNNN.npz`` (``depth_m``, 0 in the
+    sky), which together are what ``--geometry-files`` takes; ``poses.json`` (a trajectory for ``--poses``);
+    ``flow.npz`` (``flow_px``, to the next frame); ``instances/NNNN.png``, ``semantics/NNNN.png``,
+    ``moving/NNNN.png``, ``sky/NNNN.png``; ``boxes.json`` (hulls with a pose a frame, in the camera's world).
+    One camera lies in the folder itself, several in folders of their names, with their mountings in
+    ``rig.json``, see ``data.rig``.
     """
     first = next(iter(drives.values()))
     if len(first.boxes) > MOST_BOXES:
@@ -91,8 +80,8 @@ def write_world(
     with new_folder(path, replace=replace, mark=MARK) as folder:
         write_layout(first.layout, folder / "layout.json")
         seconds = float(first.times_s[-1])
-        _write_png(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
-        _write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
+        write_picture(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
+        write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
         if len(drives) > 1:
             write_rig({name: front_from_mount(name) for name in drives}, folder, "cameras.json")
         for name, drive in drives.items():
@@ -102,11 +91,7 @@ def write_world(
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:
-    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone.
-
-    Raises:
-        InputError: It is no world folder, or a part of it is missing, damaged or of another size.
-    """
+    """Read the drive of one of a world folder's cameras; a folder of a single one holds that one alone."""
     if not (path / "layout.json").is_file():
         raise InputError(
             f"{path} is no world: layout.json is missing; expected a folder of dreamdrive world make"
@@ -202,7 +187,7 @@ def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> 
     ):
         (folder / name).mkdir()
         for i, image in enumerate(images):
-            _write_png(folder / name / f"{i:04d}.png", image)
+            write_picture(folder / name / f"{i:04d}.png", image)
     (folder / "depth").mkdir()
     for place, depth_m in zip(_depth_files(folder, len(drive.depth_m)), drive.depth_m, strict=True):
         np.savez_compressed(place, depth_m=depth_m)
@@ -210,27 +195,6 @@ def _write_camera(drive: Drive, folder: Path, corruption: Corruption | None) -> 
     made = {} if corruption is None else {"corruption": asdict(corruption)}
     poses = {"world_from_camera": drive.trajectory.world_from_camera}
     boxes = [vars(box) for box in drive.boxes]
-    _write_json(folder / "cameras.json", {**_calibration(drive), **poses, **made})
-    _write_json(folder / "poses.json", {**poses, "times_s": drive.times_s})
-    _write_json(folder / "boxes.json", {"boxes": boxes, "world_from_map": drive.world_from_map})
-
-
-def _write_png(path: Path, image: np.ndarray) -> None:
-    path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
-
-
-def _write_json(path: Path, values: dict[str, Any]) -> None:
-    """Values and arrays as readable JSON without NaN."""
-    text = json.dumps(values, indent=1, allow_nan=False, default=np.ndarray.tolist)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def _calibration(drive: Drive) -> dict[str, Any]:
-    camera = drive.cameras[0]
-    intrinsics = {
-        "fx": camera.fx_px,
-        "fy": camera.fy_px,
-        "cx": camera.cx_px - 0.5,
-        "cy": camera.cy_px - 0.5,
-    }
-    return {"width": camera.width_px, "height": camera.height_px, "intrinsics": intrinsics}
+    write_json(folder / "cameras.json", {**indexed_pinhole(drive.cameras[0]), **poses, **made})
+    write_json(folder / "poses.json", {**poses, "times_s": drive.times_s})
+    write_json(folder / "boxes.json", {"boxes": boxes, "world_from_map": drive.world_from_map})

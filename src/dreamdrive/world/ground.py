@@ -32,13 +32,9 @@ _PAINT = np.array([226, 226, 220], np.float32)
 
 @dataclass(frozen=True)
 class GroundMap:
-    """A rectangle of the map seen from above, north up.
+    """A rectangle of the map seen from above, north up: its colours, and the ``Semantic`` of every texel.
 
-    Attributes:
-        image: Its colours (H, W, 3).
-        label: The ``Semantic`` of every texel (H, W).
-        corner_m: x and y of its upper left corner.
-        texel_m: Size of a texel.
+    ``corner_m`` is x and y of its upper left corner.
     """
 
     image: Image

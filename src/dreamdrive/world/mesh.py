@@ -14,12 +14,9 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles.
+    """Triangles: places in metres by triangle, corner and axis, and the index of the material of each.
 
-    Attributes:
-        corners: Places (M, 3, 3) in metres: triangle, corner, axis.
-        uv: Place of each corner on its texture (M, 3, 2): 0 to 1 is once across, v downwards.
-        material: Index of its material (M,).
+    ``uv`` is the place of each corner on its texture: 0 to 1 is once across, v downwards.
     """
 
     corners: Float[np.ndarray, "m 3 3"]

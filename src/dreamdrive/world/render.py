@@ -24,13 +24,8 @@ _GROUND_MIRRORED = np.array([0.12, 0.12, 0.12], np.float32)
 class WorldView:
     """Everything known about one picture. Truth is that of the ray through the pixel's centre.
 
-    Attributes:
-        frame: RGB (H, W, 3).
-        depth_m: Depth along z (H, W); 0 in the sky.
-        instance: Label of the box (H, W), 0 for none.
-        semantic: ``Semantic`` (H, W).
-        moving: Whether the box ever moves (H, W).
-        flow_px: Way of each surface point to its place in the next picture (H, W, 2), columns and rows.
+    Depth is along z, 0 in the sky; instances are labels of boxes, 0 for none; moving is what ever moves; the
+    flow leads each surface point to its place in the next picture, columns and rows.
     """
 
     frame: UInt8[np.ndarray, "h w 3"]

@@ -24,13 +24,9 @@ _OTHERS_SHARE = 10 / 16
 
 @dataclass(frozen=True)
 class Road:
-    """A road along a middle line, given every metre from ``start_m`` on.
+    """A road along a middle line in the map, given every metre from station ``start_m`` on.
 
-    Attributes:
-        points: The middle line (N, 2) in the map.
-        headings: Its direction (N,) in radians.
-        start_m: Station of the first point.
-        lanes: Lanes in each direction.
+    Headings are in radians; lanes are those of each direction.
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -100,13 +96,9 @@ def crossing_road(main: Road, station_m: float, angle_rad: float, lanes: int, wa
 
 @dataclass(frozen=True)
 class RoadNet:
-    """Roads as polygons.
+    """Roads as polygons: the main road, then the one that crosses it, if any.
 
-    Attributes:
-        roads: The main road, then the one that crosses it, if any.
-        crossing_m: Station of the crossing on the main road, None without.
-        paved: Everything between kerbs.
-        walks: The sidewalks.
+    ``crossing_m`` is the station of the crossing on the main road; all between kerbs is paved.
     """
 
     roads: tuple[Road, ...]

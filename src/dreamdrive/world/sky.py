@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.scene.layout import Light
+from dreamdrive.world.materials import sampled
 from dreamdrive.world.paint import noise
-from dreamdrive.world.textures import sampled
 
 _SHAPE = (128, 512)
 _SUN = np.array([1.0, 0.94, 0.84], np.float32)
@@ -20,13 +20,9 @@ _ZENITH, _HORIZON, _CLOUD = (
 class Sky:
     """The upper half of all directions, and what comes from there. Colours are linear, white about 1.
 
-    Attributes:
-        panorama: Colours (H, W, 3), rows from zenith to horizon, columns a turn from x towards y.
-        towards_sun: Unit vector (3,).
-        sunlight: Light of the sun on a surface that faces it (3,).
-        skylight: Light of the sky on a surface that faces up (3,).
-        haze_per_m: Light lost along each metre.
-        haze: Colour of what is seen instead (3,).
+    The panorama has rows from zenith to horizon, its columns are a turn from x towards y. Sunlight falls on a
+    surface that faces the sun, skylight on one that faces up. Of the light ``haze_per_m`` is lost along each
+    metre, and the colour of the haze seen instead.
     """
 
     panorama: Float[np.ndarray, "h w 3"]

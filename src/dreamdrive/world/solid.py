@@ -25,12 +25,8 @@ class Hits:
 class Solid:
     """Triangles in the map frame.
 
-    Attributes:
-        corners: Places (M, 3, 3) in metres.
-        normals: Unit normals (M, 3), outwards.
-        material: Index of the material (M,).
-        owner: Index of the rigid part each belongs to (M,).
-        to_uv: Rows of u and v (M, 2, 4), to be multiplied by (x, y, z, 1).
+    ``owner`` is the index of the rigid part each belongs to. ``to_uv`` holds rows of u and v (M, 2, 4), to be
+    multiplied by (x, y, z, 1).
     """
 
     def __init__(self, mesh: Mesh, owner: Int[np.ndarray, " m"], device: EmbreeDevice) -> None:

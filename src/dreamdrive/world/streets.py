@@ -30,13 +30,8 @@ _AFTER_S = 1.2  # for which traffic goes on behind the end
 class StreetOptions:
     """What a drawn street has to be like; None leaves a choice to the seed.
 
-    Attributes:
-        seconds: Length of the drive.
-        speed_m_s: Speed of the recording car.
-        movers: Number of moving road users.
-        parked: Number of parked vehicles.
-        camera_height_m: Height of the camera.
-        edition: By which edition it is drawn, see ``scene.layout.EDITIONS``.
+    Speed is that of the recording car; movers and parked are numbers of road users; editions see
+    ``scene.layout``.
     """
 
     seconds: float = 2.4
@@ -52,9 +47,6 @@ def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
 
     Of three streets one is straight, one bends and one crosses another. In those of an even seed some parked
     vehicles look the same as moving ones.
-
-    Raises:
-        InputError: The drive is longer than ``MOST_SECONDS``, or the edition is unknown.
     """
     if options.seconds <= 0 or min(options.speed_m_s or 0, options.movers or 0, options.parked or 0) < 0:
         raise ValueError(f"street: cannot draw {options}")

@@ -25,13 +25,7 @@ _WAY_STEP_S = 0.05
 class Mover:
     """A box of the layout with its body.
 
-    Attributes:
-        box: The box.
-        instance: Label of its pixels, from 1.
-        moving: Whether it ever moves.
-        parts: Its rigid pieces.
-        places: From times (T,) to x, y and yaw (T, 3).
-        way_m: From times (T,) to the way travelled since time 0.
+    ``places`` leads from times (T,) to x, y and yaw (T, 3), ``way_m`` to the way travelled since time 0.
     """
 
     box: Box
@@ -61,16 +55,7 @@ class Moment:
 
 
 class World:
-    """The street of a layout, in the map frame.
-
-    Attributes:
-        layout: What it is made from.
-        materials: Of all its surfaces.
-        ground: The map as it is painted.
-        sky: Its light.
-        movers: All boxes.
-        standing: All triangles that never move.
-    """
+    """The street of a layout, in the map frame; what never moves is ``standing``."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,12 +16,7 @@ from dreamdrive.scene.camera import Camera
 
 @dataclass(frozen=True)
 class LensCamera:
-    """A camera of a model of several pictures.
-
-    Attributes:
-        camera: Its pinhole, at the size of its pictures.
-        distortion: Its lens, or ``None`` for a pinhole.
-    """
+    """A camera of a model: its pinhole, at the size of its pictures, and its lens, None for a pinhole."""
 
     camera: Camera
     distortion: Distortion | None
@@ -45,11 +41,7 @@ def different(found: Sequence[LensCamera]) -> tuple[list[LensCamera], Int[np.nda
 
 
 def lens_camera(numbers: Mapping[str, float], size: tuple[int, int], fisheye: bool, where: str) -> LensCamera:
-    """The camera of numbers called fx, fy, cx, cy, k1 to k6, p1, p2; pixel centres at +0.5.
-
-    Raises:
-        InputError: The numbers are those of no camera.
-    """
+    """The camera of numbers called fx, fy, cx, cy, k1 to k6, p1, p2; pixel centres at +0.5."""
     if not all(map(isfinite, numbers.values())):
         raise InputError(f"{where}: the intrinsics hold NaN or infinite numbers")
     check_bend([numbers[key] for key in numbers if key[0] in "kp"], where)
@@ -74,6 +66,12 @@ class Intrinsics(msgspec.Struct):
     cy: float
 
 
+def indexed_pinhole(camera: Camera) -> dict[str, Any]:
+    """What ``IndexedPinhole`` reads, and ``--intrinsics``."""
+    numbers = {"fx": camera.fx_px, "fy": camera.fy_px, "cx": camera.cx_px - 0.5, "cy": camera.cy_px - 0.5}
+    return {"width": camera.width_px, "height": camera.height_px, "intrinsics": numbers}
+
+
 class IndexedPinhole(msgspec.Struct):
     """A calibration that counts pixels by integer index."""
 
@@ -82,10 +80,6 @@ class IndexedPinhole(msgspec.Struct):
     intrinsics: Intrinsics
 
     def camera(self) -> Camera:
-        """The pinhole as we count: the centre of the first pixel at 0.5.
-
-        Raises:
-            ValueError: Its numbers are those of no camera.
-        """
+        """The pinhole as we count, the centre of the first pixel at 0.5; ``ValueError`` if it is none."""
         k = self.intrinsics
         return Camera(k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, self.width, self.height)

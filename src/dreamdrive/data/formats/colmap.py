@@ -45,11 +45,7 @@ def find_colmap(folder: Path) -> Path | None:
 
 
 def read_colmap(folder: Path) -> Any:
-    """Read a COLMAP model, binary or text, as ``pycolmap.Reconstruction``; of both the binary one.
-
-    Raises:
-        InputError: A file of it is missing or damaged.
-    """
+    """Read a COLMAP model, binary or text, as ``pycolmap.Reconstruction``; of both the binary one."""
     import pycolmap  # here: reading a clip without such a model should not wait for it
 
     missing = {
@@ -80,11 +76,7 @@ def read_colmap(folder: Path) -> Any:
 
 
 def colmap_camera(camera: Any, where: str) -> LensCamera:
-    """A ``pycolmap.Camera`` of a COLMAP model.
-
-    Raises:
-        InputError: Its lens is of a kind that is not known here, or its numbers are none.
-    """
+    """A ``pycolmap.Camera`` of a COLMAP model."""
     name = camera.model.name
     if name not in _MODELS:
         raise InputError(

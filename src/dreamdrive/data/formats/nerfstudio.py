@@ -26,11 +26,7 @@ _OURS_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def transforms_frames(values: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
-    """The frames of a ``transforms.json``, each with what is shared by all of them.
-
-    Raises:
-        InputError: There are none, or one is no object.
-    """
+    """The frames of a ``transforms.json``, each with what is shared by all of them."""
     frames = values.get("frames")
     listed = cast("list[Any]", frames) if isinstance(frames, list) else []
     if not listed or not all(isinstance(frame, dict) for frame in listed):
@@ -44,9 +40,6 @@ def frame_camera(values: Mapping[str, Any], where: str) -> LensCamera:
 
     Without ``fl_y`` the pixels are square, without ``cx``, ``cy`` the principal point is in the middle, and
     ``camera_angle_x`` stands in for ``fl_x``, as in the files of instant-ngp.
-
-    Raises:
-        InputError: A number is missing or none, or the lens is of a kind that is not known here.
     """
 
     def number(key: str, default: float | None = None) -> float:
@@ -87,11 +80,7 @@ def frame_camera(values: Mapping[str, Any], where: str) -> LensCamera:
 
 
 def frame_names(frames: Sequence[Mapping[str, Any]], where: str) -> list[str]:
-    """The file name of each frame's picture.
-
-    Raises:
-        InputError: A frame has none.
-    """
+    """The file name of each frame's picture."""
     names = [frame.get("file_path") for frame in frames]
     for row, name in enumerate(names):
         if not isinstance(name, str) or not name:
@@ -100,11 +89,7 @@ def frame_names(frames: Sequence[Mapping[str, Any]], where: str) -> list[str]:
 
 
 def frame_poses(frames: Sequence[Mapping[str, Any]], where: str) -> Float[np.ndarray, "f 4 4"]:
-    """Poses world_from_camera (F, 4, 4) of named frames, with our axes.
-
-    Raises:
-        InputError: A matrix is missing or not rigid.
-    """
+    """Poses world_from_camera (F, 4, 4) of named frames, with our axes."""
     matrices: list[np.ndarray] = []
     for frame in frames:
         try:
@@ -123,11 +108,7 @@ def frame_poses(frames: Sequence[Mapping[str, Any]], where: str) -> Float[np.nda
 
 
 def depth_file(path: Path, frame: Mapping[str, Any]) -> Path | None:
-    """The depth file that a frame of the file ``path`` names, whether it is there or not.
-
-    Raises:
-        InputError: What it says is no name of a file.
-    """
+    """The depth file that a frame of the file ``path`` names, whether it is there or not."""
     name = frame.get("depth_file_path")
     if name is None:
         return None

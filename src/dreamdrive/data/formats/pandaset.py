@@ -31,24 +31,14 @@ class _Calibration(msgspec.Struct):
 
 @dataclass(frozen=True)
 class PandasetCamera:
-    """One camera of ``cameras.json``.
-
-    Attributes:
-        rows: Poses of its pictures.
-        sweeps: Index of each picture among all sweeps.
-        entry: All that the file says of it.
-    """
+    """One camera of ``cameras.json``: poses of its pictures, their indices among the sweeps, its entry."""
 
     rows: PoseRows
     sweeps: list[int]
     entry: Mapping[str, Any]
 
     def pinhole(self) -> Camera:
-        """Its pinhole.
-
-        Raises:
-            InputError: It has none.
-        """
+        """Its pinhole."""
         try:
             known = of_type(self.entry, _Calibration, "calibration")
             (fx, _, cx), (_, fy, cy), _ = known.K
@@ -61,11 +51,7 @@ class PandasetCamera:
 
 
 def pandaset_camera(values: Mapping[str, Any], where: str, name: str | None) -> PandasetCamera:
-    """A camera of what ``cameras.json`` holds.
-
-    Raises:
-        InputError: There is none of this name, or its poses or frames are unusable.
-    """
+    """A camera of what ``cameras.json`` holds."""
     listed = values.get("cameras")
     cameras = cast("dict[str, Any]", listed if isinstance(listed, dict) else {})
     if name not in cameras:
@@ -84,14 +70,10 @@ def pandaset_camera(values: Mapping[str, Any], where: str, name: str | None) -> 
 
 
 class Cuboid(msgspec.Struct):
-    """A box of one sweep; its yaw turns about the vertical.
+    """A box of one sweep in metres, z up: its middle in the world, and its yaw about the vertical in radians.
 
-    Attributes:
-        position: Its middle in the world, z up, in metres.
-        size_wlh: Width, length and height in metres.
-        yaw: In radians.
-        motion: PandaSet's label, such as ``Moving``.
-        stationary: What is told where there is no label of motion.
+    ``motion`` is PandaSet's label, such as ``Moving``; ``stationary`` is told where there is no label of
+    motion.
     """
 
     position: tuple[Place, Place, Place]
@@ -111,11 +93,7 @@ class _Cuboids(msgspec.Struct):
 
 
 def moving_cuboids(path: Path, option: str, sweeps: list[int]) -> list[list[Cuboid]]:
-    """Boxes of what moves in each of some sweeps, from ``cuboids.json``.
-
-    Raises:
-        InputError: The file is damaged or lacks a sweep.
-    """
+    """Boxes of what moves in each of some sweeps, from ``cuboids.json``."""
     try:
         frames = of_type(read_json(path, option), _Cuboids, "cuboids").frames
         return [[box for box in frames[sweep] if box.moves] for sweep in sweeps]

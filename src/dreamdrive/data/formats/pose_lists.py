@@ -28,11 +28,7 @@ FORMATS = (
 
 
 def poses_of_text(text: str, where: str) -> PoseRows:
-    """The poses of KITTI or TUM.
-
-    Raises:
-        InputError: It is neither, or a pose is not rigid.
-    """
+    """The poses of KITTI or TUM."""
     rows: list[list[float]] = []
     lines: list[int] = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -67,11 +63,7 @@ def poses_of_text(text: str, where: str) -> PoseRows:
 
 
 def poses_of_json(values: Mapping[str, Any], where: str) -> PoseRows:
-    """The poses of Trajectory JSON.
-
-    Raises:
-        InputError: It is malformed, or a pose is not rigid.
-    """
+    """The poses of Trajectory JSON."""
     poses = clean_poses(numbers(values["world_from_camera"], where), where, pose_name)
     times = numbers(values.get("times_s", []), where)
     if times.shape != (len(poses),):
@@ -107,16 +99,7 @@ def json_of(trajectory: Trajectory) -> str:
 
 
 def kitti_camera(path: Path, name: str, picture: tuple[int, int]) -> tuple[Camera, Float[np.ndarray, "4 4"]]:
-    """The pinhole of a camera in KITTI's ``calib.txt``, and camera_0_from_camera (4, 4).
-
-    Args:
-        path: The file.
-        name: P0 to P3.
-        picture: Width and height of its pictures.
-
-    Raises:
-        InputError: The file is malformed, or its numbers are those of no camera.
-    """
+    """The pinhole of a camera P0 to P3 in ``calib.txt``, for its pictures' size, and camera_0_from_camera."""
     try:
         lines = [line.partition(":") for line in read_text(path).splitlines()]
         rows = {key.strip(): [float(word) for word in rest.split()] for key, _, rest in lines if key.strip()}

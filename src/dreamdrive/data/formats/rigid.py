@@ -13,14 +13,16 @@ RIGID_TOLERANCE = 1e-3
 """How far R R^T may be from the identity, and a quaternion's length from 1: files print few digits."""
 
 
+_Row = tuple[float, float, float, float]
+JsonPose = tuple[_Row, _Row, _Row, _Row]
+"""A 4x4 matrix in JSON."""
+
+
 @dataclass(frozen=True)
 class PoseRows:
-    """The poses of a file, as they stand there.
+    """The poses (N, 4, 4) of a file as they stand there, in its own world; ``where`` is how messages call it.
 
-    Attributes:
-        where: How messages call the file.
-        world_from_camera: Rigid poses (N, 4, 4) in the file's own world.
-        times_s: Times (N,), strictly increasing, or ``None`` where the format has none.
+    Times (N,) are strictly increasing, or None where the format has none.
     """
 
     where: str
@@ -32,11 +34,7 @@ class PoseRows:
 
 
 def numbers(values: object, where: str) -> Float[np.ndarray, "..."]:
-    """JSON values as an array.
-
-    Raises:
-        InputError: They are no numbers, or of uneven lengths.
-    """
+    """JSON values as an array."""
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -53,13 +51,7 @@ def clean_poses(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Check each pose and take the rounding of the file out of its rotation.
 
-    Args:
-        poses: As they stand in the file.
-        where: How messages call the file.
-        name: How messages call a pose, by its row.
-
-    Raises:
-        InputError: They are no 4x4 matrices, or one holds NaN or is not rigid.
+    Messages call the file ``where``, and a pose what ``name`` makes of its row.
     """
     if poses.ndim != 3 or poses.shape[1:] != (4, 4) or not len(poses):
         raise InputError(f"{where}: the poses have the shape {poses.shape}; expected (N, 4, 4), N at least 1")

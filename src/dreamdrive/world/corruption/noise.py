@@ -14,13 +14,9 @@ _WEIGHT_RMS = np.float32(np.sqrt(151 / 315))
 class Noise:
     """Cubic B-splines over a lattice of random numbers: zero mean, RMS 1 over all seeds.
 
-    Attributes:
-        seed: Not negative.
-        stream: Tells apart the fields of one seed.
-        channels: Number of independent fields.
-        cells: Lattice cells across the width of the picture.
-        hold: Frames from one lattice to the next, over which the field changes smoothly; 0 for a new field
-            in each frame.
+    ``stream`` tells apart the independent fields of one seed. ``cells`` of the lattice lie across the width
+    of the picture; from one lattice to the next there are ``hold`` frames, over which the field changes
+    smoothly, and none for a new field in each frame.
     """
 
     seed: int

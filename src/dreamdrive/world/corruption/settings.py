@@ -59,9 +59,6 @@ def parse_corruption(text: str, seed: int = 0) -> Corruption:
     """Read strengths such as ``warp=0.5,flicker=1`` or ``generated,far=0``.
 
     Names of ``STRENGTHS`` with a value, or of ``PRESETS``, stand between commas; a later one overrides.
-
-    Raises:
-        InputError: An unknown name, or a strength that is negative or no number.
     """
     strengths: dict[str, float] = {}
     for part in text.split(","):
