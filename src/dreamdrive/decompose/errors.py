@@ -10,6 +10,7 @@ from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.windows import grown
 from dreamdrive.splat import one_torch_thread, render
 
 
@@ -42,5 +43,9 @@ def static_picture(
 
 
 def smoothed(errors: Float[np.ndarray, "f h w"], sigma_px: float) -> Float[np.ndarray, "f h w"]:
-    """Error maps blurred over ``sigma_px``: an object fails as an area, a mis-registered edge as a line."""
+    """Error maps blurred over ``sigma_px``: an object fails as an area, a mis-registered edge as a line.
+
+    The blur grows with the picture, see ``scene.windows``.
+    """
+    sigma_px = grown(sigma_px, errors.shape[2])
     return np.stack([cv2.GaussianBlur(error, (0, 0), sigma_px) for error in errors]) if sigma_px else errors

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.windows import window_px
 
 # The panorama reaches this far beyond what the frames saw, so that turned and raised views stay inside it.
 MARGIN_RAD = math.radians(40.0)
@@ -66,7 +67,8 @@ def _sky_only(clip: Clip, geometry: Geometry) -> list[Bool[np.ndarray, "h w"]]:
 
 def _near_moving(geometry: Geometry, frame: int) -> Bool[np.ndarray, "h w"]:
     moving = (geometry.moving[frame] >= 0.5).astype(np.uint8)
-    return cv2.dilate(moving, np.ones((9, 9), np.uint8)) > 0
+    side = window_px(9, moving.shape[1])
+    return cv2.dilate(moving, np.ones((side, side), np.uint8)) > 0
 
 
 def _gathered(
@@ -102,7 +104,8 @@ def _texel(offset: Float[np.ndarray, "h w"], span: tuple[float, float], count: i
 
 def _clear_sky(sky: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
     """Sky without its border, where branches and roofs mix in."""
-    return cv2.erode(sky.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=1) > 0
+    side = window_px(5, sky.shape[1])
+    return cv2.erode(sky.astype(np.uint8), np.ones((side, side), np.uint8), borderValue=1) > 0
 
 
 def _filled(

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.geometry.depth.one_frame import Swept
 from dreamdrive.geometry.depth.sweep import Warp, inside
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.windows import window_px
 
 GROUND_PRIOR_CONFIDENCE = 0.3  # road that has its depth from the plane alone
 _ABSOLUTE = 0.006  # 1/m
@@ -107,7 +108,8 @@ def _stands(
     solid: Bool[np.ndarray, "h w"], hidden: Bool[np.ndarray, "h w"], height: Float[np.ndarray, "h w"]
 ) -> Bool[np.ndarray, "h w"]:
     """Pixels of connected regions that reach down to the road; heights are in camera heights."""
-    kernel = np.ones((_CLOSE_PX, _CLOSE_PX), np.uint8)
+    side = window_px(_CLOSE_PX, solid.shape[1])
+    kernel = np.ones((side, side), np.uint8)
     closed = np.asarray(cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, kernel)) > 0
     count, found = cv2.connectedComponents((closed | hidden).astype(np.uint8))
     labels = np.asarray(found, np.intp)

@@ -6,6 +6,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
+from dreamdrive.scene.windows import window_px
 
 _GRADIENT = 6.0  # grey levels; the sky is smooth
 _BLUE_B = 124  # Lab b below this is bluish
@@ -42,7 +43,8 @@ def sky_mask(
     top = usable & (np.cumsum(usable, axis=0) <= max(2, len(frame) // 50))
     reaching = np.unique(labels[top & (candidate > 0)])
     mask = np.isin(labels, reaching[reaching > 0]).astype(np.uint8)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_CLOSING_PX, _CLOSING_PX))
+    side = window_px(_CLOSING_PX, frame.shape[1])
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
     return (closed > 0) & above & usable
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.windows import window_px
 
 LABELS = 64
 MAX_INVERSE_DEPTH = 0.30  # 1/m; nearest plane 3.3 m
@@ -88,8 +89,9 @@ class Correlation:
     Keeps working buffers, so one object serves one thread.
     """
 
-    def __init__(self, grey: Float[np.ndarray, "h w"], window_px: int = _WINDOW_PX) -> None:
-        self._row = np.full(window_px, 1 / window_px, np.float32)
+    def __init__(self, grey: Float[np.ndarray, "h w"], window: int = _WINDOW_PX) -> None:
+        side = window_px(window, grey.shape[1])
+        self._row = np.full(side, 1 / side, np.float32)
         # Centred values keep the differences of squares exact enough in float32.
         self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(_CENTRE)
         self._buffers = [np.empty_like(self.grey) for _ in range(4)]

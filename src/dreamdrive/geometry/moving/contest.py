@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.depth import Correlation, View, Warp, sample
 from dreamdrive.geometry.moving.flow import PairFlow
+from dreamdrive.scene.windows import window_px
 
 _PLANE_SHARE = 0.85  # static things are no farther than this share of the plane's inverse depth
 _FLOOR_SHARE = 0.8
@@ -128,7 +129,8 @@ class _Pair:
 
     def _error(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         difference = np.minimum(np.abs(sample(self.grey, x, y) - self.reference), np.float32(_ERROR_CAP))
-        return cv2.boxFilter(difference, cv2.CV_32F, (_GAIN_WINDOW_PX, _GAIN_WINDOW_PX))
+        side = window_px(_GAIN_WINDOW_PX, x.shape[1])
+        return cv2.boxFilter(difference, cv2.CV_32F, (side, side))
 
     def wins(self, correlation: Correlation) -> np.ndarray:
         """Flow clearly better correlated than the best static explanation, some slack granted to that one."""

@@ -11,6 +11,7 @@ from dreamdrive.geometry.moving import contest
 from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.moving.oncoming import oncoming
 from dreamdrive.geometry.moving.outline import outline
+from dreamdrive.scene.windows import grown, window_px
 
 FLAGGED = 0.5  # evidence from which a pixel counts as moving
 _EXCESS_PX = 1.0
@@ -82,11 +83,12 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
     rgb = view.rgb[view.used].astype(np.float32)
     median = np.median(rgb, axis=0).astype(np.float32)
     # A pixel may look like any of its neighbours: edges must not fire when the standing car shakes.
-    kernel = np.ones((3, 3), np.uint8)
+    side = window_px(3, view.grey.shape[2])
+    kernel = np.ones((side, side), np.uint8)
     low, high = np.asarray(cv2.erode(median, kernel)), np.asarray(cv2.dilate(median, kernel))
     for frame, picture in zip(view.frames, rgb, strict=True):
         outside = np.maximum(np.maximum(picture - high, low - picture), 0).max(axis=-1)
-        difference = np.asarray(cv2.GaussianBlur(outside, (0, 0), 1.0))
+        difference = np.asarray(cv2.GaussianBlur(outside, (0, 0), grown(1.0, view.grey.shape[2])))
         votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
         evidence[frame] = decide(votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame])
     return evidence
@@ -114,7 +116,8 @@ def _carried(
 ) -> Bool[np.ndarray, "h w"]:
     """What at least half of the frame and its neighbours hold for moving, without specks."""
     votes = _vote({key: value.astype(np.float32) for key, value in flagged.items()}, frame, flows)
-    mask = cv2.morphologyEx((votes >= 0.5).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    side = window_px(3, votes.shape[1])
+    mask = cv2.morphologyEx((votes >= 0.5).astype(np.uint8), cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     _, found, stats, _ = cv2.connectedComponentsWithStats(mask)
     large = stats[:, cv2.CC_STAT_AREA] >= _MIN_AREA * mask.size
     large[0] = False

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from dreamdrive.geometry.depth import View, Warp, inside, sample
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
+from dreamdrive.scene.windows import window_px
 
 _REACH = 2  # offsets beyond this are not asked
 _SAME_PX = 2.0  # explanations that land this near are one
@@ -188,7 +189,8 @@ def _misfit(
     difference = np.minimum(
         np.abs(sample(view.grey[other], x, y) - view.grey[frame]), np.float32(_CAP_LEVELS)
     )
-    mean = cv2.boxFilter(difference, cv2.CV_32F, (_WINDOW_PX, _WINDOW_PX))
+    side = window_px(_WINDOW_PX, x.shape[1])
+    mean = cv2.boxFilter(difference, cv2.CV_32F, (side, side))
     return np.where(inside(x, y, view.usable[other]), mean, np.float32(np.nan))
 
 

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from dreamdrive.geometry.road.ground_points import Plane, up_direction
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.windows import window_px
 
 ROWS, COLUMNS = (0.62, 0.97), (0.25, 0.75)
 HEIGHTS = 56
@@ -141,7 +142,8 @@ def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | Non
 
 
 def _box(image: np.ndarray) -> np.ndarray:
-    return cv2.boxFilter(image, cv2.CV_32F, (5, 5), borderType=cv2.BORDER_REPLICATE)
+    side = window_px(5, image.shape[1])
+    return cv2.boxFilter(image, cv2.CV_32F, (side, side), borderType=cv2.BORDER_REPLICATE)
 
 
 def _pairs(poses: np.ndarray, typical: float) -> list[Pair]:
