@@ -7,7 +7,7 @@ import pytest
 import torch
 from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.fit.densify import DensifySettings, GradientDensifier
+from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.parameters import LearningRates, Parameters
@@ -120,14 +120,11 @@ def test_thread_count_changes_no_bit_of_three_steps(parts) -> None:
             assert torch.equal(value, other[name]), name
 
 
-class Greedy:
+class Greedy(Densifier):
     """A densifier that changes nothing and draws a given number of random numbers after each step."""
 
     def __init__(self, draws: int) -> None:
         self.draws = draws
-
-    def observe(self, rows, gradient_px, visible) -> None:
-        """Nothing is collected."""
 
     def update(self, parameters, step, steps, generator) -> None:
         torch.randn(self.draws, generator=generator)

@@ -8,6 +8,7 @@ from tests.geometry.toy import HEIGHT_M, Toy, drive
 from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry import GeometryOptions
 from dreamdrive.geometry.cameras.paths import stands
 from dreamdrive.geometry.evidence.look import look
 from dreamdrive.geometry.finish import check_frames, finish
@@ -44,8 +45,8 @@ def measured(toy: Toy, poses: np.ndarray, **more: object) -> Measured:
     return Measured(poses, toy.clip.rig[0], True, depth, (depth > 0).astype(np.float32), **more)  # type: ignore[arg-type]
 
 
-def finished(clip: Clip, found: Measured, **more: object) -> Geometry:
-    return finish(clip, found, look(clip), **more)  # type: ignore[arg-type]
+def finished(clip: Clip, found: Measured, height_m: float | None = None) -> Geometry:
+    return finish(clip, found, look(clip), GeometryOptions(camera_height_m=height_m))
 
 
 def depth_ratio(found: Geometry, toy: Toy) -> float:
@@ -59,7 +60,11 @@ def test_a_standing_clip_has_one_pose_and_its_scale_from_the_road_in_the_depth(
     still: Toy, jitter_m: float
 ) -> None:
     count = len(still.clip)
-    found = finished(still.clip, measured(still, jittered(count, jitter_m)), camera_height_m=HEIGHT_M)
+    found = finished(
+        still.clip,
+        measured(still, jittered(count, jitter_m)),
+        HEIGHT_M,
+    )
     poses = np.stack([camera.world_from_camera for camera in found.cameras])
     np.testing.assert_array_equal(poses, np.tile(np.eye(4), (count, 1, 1)))
     assert depth_ratio(found, still) == pytest.approx(1, abs=0.03)
@@ -83,7 +88,9 @@ def test_frames_that_move_but_poses_that_hardly_do_keep_the_scale_of_the_road(
     moving: Toy, metres: float
 ) -> None:
     found = finished(
-        moving.clip, measured(moving, jittered(len(moving.clip), metres)), camera_height_m=HEIGHT_M
+        moving.clip,
+        measured(moving, jittered(len(moving.clip), metres)),
+        HEIGHT_M,
     )
     assert found.details["metres_per_unit"] == pytest.approx(UNIT, rel=0.05)
     assert "ground plane" in found.scale.source
@@ -103,7 +110,7 @@ def test_poses_in_metres_that_stand_are_kept(still: Toy) -> None:
     given = jittered(len(still.clip), 0.02)
     given[:, :3, 3] -= given[0, :3, 3]
     clip = replace(still.clip, known=Known(given, intrinsics=True))
-    found = finished(clip, measured(still, jittered(len(clip), 0.01)), camera_height_m=HEIGHT_M)
+    found = finished(clip, measured(still, jittered(len(clip), 0.01)), HEIGHT_M)
     path = np.stack([camera.world_from_camera for camera in found.cameras])
     np.testing.assert_allclose(path, given, atol=1e-12)
     assert depth_ratio(found, still) == pytest.approx(1, abs=0.03)
@@ -113,7 +120,7 @@ def test_a_known_road_says_how_high_the_camera_is(still: Toy) -> None:
     road = Ground(np.array([0.0, -1.0, 0.0]), HEIGHT_M)
     given = np.tile(np.eye(4), (len(still.clip), 1, 1))
     clip = replace(still.clip, known=Known(given, intrinsics=True, ground=road))
-    found = finished(clip, measured(still, given), camera_height_m=3.0)
+    found = finished(clip, measured(still, given), 3.0)
     assert found.ground is not None
     np.testing.assert_array_equal(found.ground.normal_world, road.normal_world)
     assert found.ground.offset_m == HEIGHT_M
@@ -125,7 +132,7 @@ def test_known_depth_of_an_unknown_unit_is_scaled_with_the_poses(moving: Toy) ->
     own = measured(moving, poses)
     known = Known(own.world_from_camera, True, own.depth, metric=False)
     clip = replace(moving.clip, known=known)
-    found = finished(clip, own, camera_height_m=HEIGHT_M)
+    found = finished(clip, own, HEIGHT_M)
     assert depth_ratio(found, moving) == pytest.approx(1, abs=0.05)
 
 
@@ -133,7 +140,7 @@ def test_known_depth_of_an_unknown_unit_is_left_out_where_the_camera_stands(stil
     given = jittered(len(still.clip), 0.01)
     wrong = np.full_like(still.depth_m, 1000.0, dtype=np.float32)
     clip = replace(still.clip, known=Known(given, True, wrong, metric=False))
-    found = finished(clip, measured(still, given), camera_height_m=HEIGHT_M)
+    found = finished(clip, measured(still, given), HEIGHT_M)
     assert depth_ratio(found, still) == pytest.approx(1, abs=0.03)
     assert any("unknown unit, are not used" in note for note in found.detected)
 

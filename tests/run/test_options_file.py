@@ -19,12 +19,17 @@ def read(folder: Path, text: str):
 
 
 def test_what_the_file_names_is_changed_and_nothing_else(tmp_path: Path) -> None:
-    made = read(tmp_path, 'representation = "static"\n[fit]\nsteps = 7\n[geometry]\ncamera_height_m = 2\n')
+    made = read(
+        tmp_path,
+        'representation = "static"\n[fit]\nsteps = 7\n[geometry]\ncamera_height_m = 2\n'
+        "[geometry.moving]\nrounds = 1\noncoming = false\n",
+    )
+    moving = replace(DRAFT.geometry.moving, rounds=1, oncoming=False)
     wanted = replace(
         DRAFT,
         representation="static",
         fit=replace(DRAFT.fit, steps=7),
-        geometry=replace(DRAFT.geometry, camera_height_m=2.0),
+        geometry=replace(DRAFT.geometry, camera_height_m=2.0, moving=moving),
     )
     assert made == wanted
     assert read(tmp_path, "") == DRAFT

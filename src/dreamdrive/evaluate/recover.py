@@ -37,9 +37,7 @@ def recover(
     """Find the path of a clip of one camera; None where the frames show none.
 
     Structure from motion counts here even where ``geometry.reconstruct`` refuses it as too coarse to build a
-    scene on: its residual is what inconsistent frames look like. On two built-in streets its
-    path ends 0.1 % of a stretch off, that of odometry 0.9 %; corrupted by ``generated``, structure from
-    motion ends 2.0 and 2.3 % off (docs/results/figures_of_evaluate.md).
+    scene on: its residual is what inconsistent frames look like.
 
     The street that stands still is given at the size of ``seen.grey``, features at that of ``seen.working``.
     """

@@ -1,6 +1,5 @@
 """F_MVS (eq. 4): from a clip to cameras, depth, confidence, sky and evidence of motion."""
 
-from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -10,7 +9,8 @@ from dreamdrive.choices import BACKENDS
 from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
 from dreamdrive.geometry.cameras import Posed, refined
 from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.protocol import GeometryBackend, GeometryOptions
+from dreamdrive.geometry.options import DepthOptions, GateOptions, GeometryOptions, MovingOptions
+from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
@@ -44,15 +44,13 @@ def reconstruct(
         InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.
     """
     backend = backend_of(options.method, options.weights)
-    how = partial(
-        backend.reconstruct,
-        camera_height_m=options.camera_height_m,
-        seed=seed,
-        weights=options.weights,
-    )
+
+    def how(part: Clip, work: Work = work) -> Geometry:
+        return backend.reconstruct(part, options, seed=seed, work=work)
+
     if options.refine_poses:
-        return refined(clip, lambda part: how(part, work=work))
+        return refined(clip, how)
     if len(clip.rig) == 1:
-        return how(clip, work=work)
+        return how(clip)
     cameras, turn = len(np.unique(clip.camera)), count()
-    return reconstruct_cameras(clip, lambda part: how(part, work=work.part(next(turn), cameras)))
+    return reconstruct_cameras(clip, lambda part: how(part, work.part(next(turn), cameras)))

@@ -20,6 +20,7 @@ from dreamdrive.geometry.depth import (
     unheard,
 )
 from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -41,6 +42,7 @@ DepthMaps = tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]
 def densify(
     clip: Clip,
     posed: Posed,
+    options: GeometryOptions = GeometryOptions(),
     measured: DepthMaps | None = None,
     tell: Tell = unheard,
     keep: Keep = at_once,
@@ -54,7 +56,7 @@ def densify(
     median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for each frame
     of at most ``PASSES``.
     """
-    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, tell)
+    view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
     with single_threaded_opencv():
@@ -115,6 +117,8 @@ def _swept(view: View, sky: Bool[np.ndarray, "f h w"]) -> DepthMaps:
         neighbours = temporal_neighbours(view.used, frame)
         agreeing = agreement(frame, neighbours, view.cameras, inverse, view.usable)
         confidence[frame] = combine(agreeing, swept.correlation, swept.on_plane)
+        if not view.options.depth.flanks:
+            continue
         filled[frame], confidence[frame] = fill_flanks(
             swept, confidence[frame], view.plane_inverse[frame], view.usable[frame] & ~sky[frame]
         )

@@ -11,6 +11,7 @@ from dreamdrive.geometry.cameras import as_posed, contradiction, rebase, stands,
 from dreamdrive.geometry.dense import densify
 from dreamdrive.geometry.evidence import Evidence, look
 from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
 from dreamdrive.geometry.road import scale as scales
 from dreamdrive.scene.clip import Clip, Known
@@ -51,7 +52,12 @@ def check_frames(clip: Clip, backend: str) -> None:
 
 
 def finish(
-    clip: Clip, measured: Measured, evidence: Evidence, *, camera_height_m: float | None = None, seed: int = 0
+    clip: Clip,
+    measured: Measured,
+    evidence: Evidence,
+    options: GeometryOptions = GeometryOptions(),
+    *,
+    seed: int = 0,
 ) -> Geometry:
     """Bring what was measured to metres and find road, sky and what moves, as for any clip.
 
@@ -63,7 +69,7 @@ def finish(
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)
     poses = np.tile(np.eye(4), (len(clip), 1, 1)) if still else measured.world_from_camera.astype(np.float64)
     poses[:, :3, 3] *= factor
-    metric = _metric(clip, measured, evidence, poses, factor, camera_height_m, seed)
+    metric = _metric(clip, measured, evidence, poses, factor, options.camera_height_m, seed)
     metres = factor * metric.factor
     poses, _ = rebase(poses, np.zeros((0, 3)))
     poses[:, :3, 3] *= metric.factor
@@ -81,7 +87,7 @@ def finish(
     posed = replace(posed, standing=still, metres_per_unit=None if still else metres)
     depth_m = (measured.depth * np.float32(metres)).astype(np.float32)
     known = in_metres(clip, _of_known(clip, metres, still))
-    return densify(known, posed, (depth_m, measured.confidence))
+    return densify(known, posed, options, (depth_m, measured.confidence))
 
 
 def _rough_factor(measured: Measured) -> float:

@@ -90,7 +90,9 @@ def request_of(
 
 def _quality_of(options: Options) -> str:
     """The name of the options, whatever is chosen beside the quality."""
-    plain = replace(options, geometry=GeometryOptions(), representation="hybrid", device="cpu", seed=0)
+    g = options.geometry
+    geometry = GeometryOptions(gate=g.gate, depth=g.depth, moving=g.moving)
+    plain = replace(options, geometry=geometry, representation="hybrid", device="cpu", seed=0)
     named = {name: with_method(one, options.method) for name, one in QUALITIES.items()}
     return next((name for name, one in named.items() if one == plain), "custom")
 

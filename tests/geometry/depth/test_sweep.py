@@ -53,9 +53,9 @@ def test_sources_are_used_frames_on_both_sides_at_the_wanted_baselines():
     positions = np.zeros((12, 3))
     positions[:, 2] = 0.5 * np.arange(12)
     usable = np.ones(12, bool)
-    assert sweep.choose_sources(positions, usable, 6) == (2, 4, 8, 10)
+    assert sweep.choose_sources(positions, usable, 6, reach=5) == (2, 4, 8, 10)
     usable[[4, 8]] = False
-    chosen = sweep.choose_sources(positions, usable, 6)
+    chosen = sweep.choose_sources(positions, usable, 6, reach=5)
     assert usable[list(chosen)].all()
     assert min(chosen) < 6 < max(chosen)
 

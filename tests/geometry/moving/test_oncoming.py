@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.geometry import toy
 
+from dreamdrive.geometry import GeometryOptions, MovingOptions
 from dreamdrive.geometry.dense import densify
 from dreamdrive.geometry.depth.view import View, make_view
 from dreamdrive.geometry.moving.evidence import FLAGGED
@@ -64,5 +65,7 @@ def test_an_oncoming_box_is_flagged_and_the_same_parked_is_not() -> None:
     flagged, box = dense.moving[MIDDLE] >= FLAGGED, coming.box[MIDDLE]
     assert flagged[box].mean() > 0.6
     assert flagged[~box].mean() < 0.01
+    unlooked = GeometryOptions(moving=MovingOptions(oncoming=False))
+    assert (densify(coming.clip, coming.posed, unlooked).moving[coming.box] >= FLAGGED).mean() < 0.3
     parked = toy.drive([toy.Box(15, -3.5, 0)], step_m=STEP_M)
     assert (densify(parked.clip, parked.posed).moving[parked.box] >= FLAGGED).mean() < 0.02

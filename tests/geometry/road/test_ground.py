@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, straight, turning
 
+from dreamdrive.geometry import GeometryOptions
 from dreamdrive.geometry.cameras.posing import pose_clip
 from dreamdrive.geometry.evidence import look as evidence
 from dreamdrive.geometry.road.ground_points import fit_points
@@ -83,7 +84,7 @@ def test_the_speed_that_was_asked_for_is_that_of_the_moving_part() -> None:
 
 
 def test_the_camera_height_gives_metres() -> None:
-    posed = pose_clip(make_clip(straight([0.5] * 7)), camera_height_m=HEIGHT_M)
+    posed = pose_clip(make_clip(straight([0.5] * 7)), GeometryOptions(camera_height_m=HEIGHT_M))
     assert posed.cameras[-1].world_from_camera[2, 3] == pytest.approx(3.5, rel=0.03)
     assert posed.ground is not None
     assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)

@@ -1,10 +1,10 @@
 """Geometry from pycolmap and OpenCV alone: no weights, no GPU."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 from dreamdrive.geometry.cameras import STEPS, pose_clip
 from dreamdrive.geometry.dense import PASSES, densify
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.road import in_metres
 from dreamdrive.progress import Work
@@ -12,14 +12,7 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 
-def reconstruct(
-    clip: Clip,
-    *,
-    camera_height_m: float | None = None,
-    seed: int = 0,
-    weights: Path | None = None,
-    work: Work = Work(),
-) -> Geometry:
+def reconstruct(clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Work = Work()) -> Geometry:
     """Pose a clip and find its depth, see ``geometry.protocol``; no network.
 
     Steps are counted in frames that are gone through once. A step of posing takes about as long as one pass
@@ -28,9 +21,9 @@ def reconstruct(
     passes, used = len(clip), int((~clip.held_out).sum())
     posing, total = (1 + STEPS) * passes, (1 + STEPS) * passes + PASSES * used
     tell = _counted(work, 0, passes, total)
-    posed = work.keep("posed", lambda: pose_clip(clip, camera_height_m=camera_height_m, seed=seed, tell=tell))
+    posed = work.keep("posed", lambda: pose_clip(clip, options, seed=seed, tell=tell))
     known = in_metres(clip, posed.metres_per_unit)
-    found = densify(known, posed, tell=_counted(work, posing, 1, total), keep=work.keep)
+    found = densify(known, posed, options, tell=_counted(work, posing, 1, total), keep=work.keep)
     work(total, total)
     return found
 

@@ -7,14 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.options import GateOptions
 
-MIN_REGISTERED = 0.9
-MIN_POINTS, MIN_POINTS_A_FRAME = 600, 25
-MIN_SEEN = 60
-MAX_REPROJECTION_PX = 0.5
-WOBBLING_PX, STRETCH = 1.0, 3
-MIN_FORWARD = 0.9
-MAX_VARIATION = 0.6
+STRETCH = 3
+"""Steps over which the direction of a path that wobbles is judged."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +23,7 @@ class Verdict:
     wobbling: bool = False  # the frames are not quite pictures of one street, as generated ones are not
 
 
-def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
+def judge(model: Model, moving: Bool[np.ndarray, " s"], options: GateOptions = GateOptions()) -> Verdict:
     """Test registration, support, fit and the plausibility of the steps.
 
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
@@ -40,7 +36,7 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
     if not registered.any():
         return Verdict(("structure from motion placed no frame",), {"registered_share": 0.0}, False)
     seen = model.seen[registered].sum(axis=1)
-    wobbling = model.reprojection_px > MAX_REPROJECTION_PX
+    wobbling = model.reprojection_px > options.wobbling_px
     forward, length = _steps(model.world_from_camera)
     judged = moving & np.isfinite(forward)
     backwards = bool(judged.any() and np.median(forward[judged]) < 0)
@@ -56,18 +52,18 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"]) -> Verdict:
         "moving_steps": int(judged.sum()),
     }
     reasons: list[str] = []
-    if share < MIN_REGISTERED:
+    if share < options.registered:
         reasons.append(f"only {registered.sum()} of {len(registered)} frames could be placed")
-    enough = min(MIN_POINTS, MIN_POINTS_A_FRAME * len(registered))
-    if len(model.points) < enough and seen.min() < MIN_SEEN:
+    enough = min(options.points, options.points_a_frame * len(registered))
+    if len(model.points) < enough and seen.min() < options.seen:
         reasons.append(f"only {len(model.points)} points, {seen.min()} in the poorest frame")
-    if model.reprojection_px > WOBBLING_PX:
+    if model.reprojection_px > options.reprojection_px:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")
-    if least < MIN_FORWARD:
+    if least < options.forward:
         reasons.append(
             f"the path jumps: a step deviates {np.degrees(np.arccos(max(least, -1.0))):.0f} degrees"
         )
-    if variation > MAX_VARIATION:
+    if variation > options.variation:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
     return Verdict(tuple(reasons), figures, backwards, wobbling)
 

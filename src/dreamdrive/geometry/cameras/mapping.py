@@ -12,6 +12,7 @@ from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
 from dreamdrive.geometry.depth import Tell, unheard
 from dreamdrive.geometry.evidence import Evidence, Features, features, look
+from dreamdrive.geometry.options import GateOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Fallback
@@ -39,7 +40,9 @@ class Outcome:
     refusal: Fallback | None = None
 
 
-def reconstruct(clip: Clip, evidence: Evidence, seed: int, tell: Tell = unheard) -> Outcome:
+def reconstruct(
+    clip: Clip, evidence: Evidence, options: GateOptions, seed: int, tell: Tell = unheard
+) -> Outcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
     Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
@@ -67,7 +70,7 @@ def reconstruct(clip: Clip, evidence: Evidence, seed: int, tell: Tell = unheard)
                 failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
             else:
                 settled = settle(database, model, square, clip.known.intrinsics, seed)
-                verdict = gate.judge(settled.model, evidence.motion.moving)
+                verdict = gate.judge(settled.model, evidence.motion.moving, options)
                 failed = verdict.reasons
                 figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
                 if not failed:

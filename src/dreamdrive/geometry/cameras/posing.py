@@ -12,6 +12,7 @@ from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
 from dreamdrive.geometry.evidence import Evidence, look
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.road import Metric, Street, depth_points, depth_ratios, scale
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -57,7 +58,7 @@ class Posed:
 
 
 def pose_clip(
-    clip: Clip, *, camera_height_m: float | None = None, seed: int = 0, tell: Tell = unheard
+    clip: Clip, options: GeometryOptions = GeometryOptions(), *, seed: int = 0, tell: Tell = unheard
 ) -> Posed:
     """Pose every frame of a clip of one camera.
 
@@ -67,10 +68,11 @@ def pose_clip(
     is assumed. ``tell`` is called for the first look, and for the steps of ``reconstruct.STEPS``.
 
     Raises:
-        InputError: Without frames; for a camera height that is not positive; for known poses that contradict
-            the frames.
+        InputError: Without frames; for known poses that contradict the frames.
     """
-    _check(clip, camera_height_m)
+    if len(clip) == 0:
+        raise InputError("The clip holds no frame; at least two are needed for geometry from motion.")
+    camera_height_m = options.camera_height_m
     evidence = look.look(clip)
     contradiction.check(clip, evidence)
     tell()
@@ -84,17 +86,10 @@ def pose_clip(
     if evidence.motion.standing:
         reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
         return _standing(clip, evidence, camera_height_m, reason)
-    outcome = reconstruct(clip, evidence, seed, tell)
+    outcome = reconstruct(clip, evidence, options.gate, seed, tell)
     if outcome.settled is None:
         return _from_odometry(clip, evidence, outcome, camera_height_m)
     return _from_model(clip, evidence, outcome, camera_height_m, seed)
-
-
-def _check(clip: Clip, camera_height_m: float | None) -> None:
-    if len(clip) == 0:
-        raise InputError("The clip holds no frame; at least two are needed for geometry from motion.")
-    if camera_height_m is not None and not (np.isfinite(camera_height_m) and camera_height_m > 0):
-        raise InputError(f"The camera height is {camera_height_m} m; give a positive height above the road.")
 
 
 def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int) -> Posed:

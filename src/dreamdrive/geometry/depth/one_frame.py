@@ -51,7 +51,7 @@ def sweep_frames(view: View, sky: Bool[np.ndarray, "f h w"]) -> dict[int, Swept 
 def _sweep_frame(
     view: View, frame: int, sky: Bool[np.ndarray, "h w"], work: smoothing.Workspace
 ) -> Swept | None:
-    chosen = sweep.choose_sources(view.positions_m, view.used, frame)
+    chosen = sweep.choose_sources(view.positions_m, view.used, frame, view.options.depth.reach_frames)
     if not chosen:
         return None
     sources = [

@@ -13,7 +13,6 @@ LABELS = 64
 MAX_INVERSE_DEPTH = 0.30  # 1/m; nearest plane 3.3 m
 BASELINES_M = (0.8, 2.0)
 UNSEEN_SCORE = 0.0
-REACH_FRAMES = 5
 _WINDOW_PX = 5
 _NOISE = 6.0**2  # grey levels squared, added to both variances: noise on bare asphalt must not correlate
 _CENTRE = 128.0
@@ -25,14 +24,14 @@ _NEAREST = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
 
 
 def choose_sources(
-    positions_m: Float[np.ndarray, "f 3"], usable: Bool[np.ndarray, " f"], reference: int
+    positions_m: Float[np.ndarray, "f 3"], usable: Bool[np.ndarray, " f"], reference: int, reach: int
 ) -> tuple[int, ...]:
-    """Usable frames nearest to each wanted baseline, behind and ahead, within the reach; sorted."""
+    """Usable frames nearest to each wanted baseline, behind and ahead, at most ``reach`` away; sorted."""
     chosen: set[int] = set()
     count = len(positions_m)
     sides = (
-        [i for i in range(max(0, reference - REACH_FRAMES), reference) if usable[i]],
-        [i for i in range(reference + 1, min(count, reference + REACH_FRAMES + 1)) if usable[i]],
+        [i for i in range(max(0, reference - reach), reference) if usable[i]],
+        [i for i in range(reference + 1, min(count, reference + reach + 1)) if usable[i]],
     )
     for side in sides:
         baseline = {i: float(np.linalg.norm(positions_m[i] - positions_m[reference])) for i in side}

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Ground
@@ -39,6 +40,7 @@ class View:
         cameras: One posed pinhole a frame.
         plane_inverse: Inverse depth of the road plane (F, H, W) in 1/m; 0 above the horizon or without one.
         ground: The road plane, where found.
+        options: Of depth and of what moves.
         tell: Called for each frame of each pass over the frames.
     """
 
@@ -49,6 +51,7 @@ class View:
     cameras: tuple[Camera, ...]
     plane_inverse: Float[np.ndarray, "f h w"]
     ground: Ground | None
+    options: GeometryOptions
     tell: Tell = unheard
 
     @property
@@ -67,6 +70,7 @@ def make_view(
     cameras: tuple[Camera, ...],
     fixed_regions: Int[np.ndarray, "h w"],
     ground: Ground | None,
+    options: GeometryOptions = GeometryOptions(),
     tell: Tell = unheard,
 ) -> View:
     """The clip with its poses; frames that are held out are blanked."""
@@ -77,7 +81,7 @@ def make_view(
     plane = np.zeros(grey.shape, np.float32)
     if ground is not None:
         plane = np.stack([1.0 / ground.depth_m(camera) for camera in cameras]).astype(np.float32)
-    return View(rgb, grey, usable, used, cameras, plane, ground, tell)
+    return View(rgb, grey, usable, used, cameras, plane, ground, options, tell)
 
 
 @contextmanager

@@ -11,21 +11,15 @@ from dreamdrive.geometry.moving import contest
 from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.moving.oncoming import oncoming
 from dreamdrive.geometry.moving.outline import outline
+from dreamdrive.geometry.options import MovingOptions
 from dreamdrive.scene.windows import grown, window_px
 
 FLAGGED = 0.5  # evidence from which a pixel counts as moving
-_EXCESS_PX = 1.0
-_GAIN = 2.5  # grey levels
-_SURE_EXCESS_PX = 3.0
-_SURE_GAIN = 5.0
-_VOTE = 0.45
 _VOTING_REACH = 2
 _CLOSE_SHARE = 9 / 480  # of the image width
 _OPEN_SHARE = 5 / 480
-_MIN_AREA = 0.0006  # of the image
 _MIN_SURE_SHARE = 0.05  # of a component
 _MIN_SURE_PX = 12
-_ROUNDS = 2  # of outlines, carried to the neighbours in between
 _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 
 
@@ -42,27 +36,32 @@ def moving_evidence(
     static ones; they are found where they visibly do not stand on the road, see ``oncoming``, unless depth
     was given rather than found.
     """
-    flows = neighbour_flows(view)
+    flows, options = neighbour_flows(view), view.options.moving
 
     def judged(frame: int) -> contest.Verdict:
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
 
     verdicts = by_frame(view, judged)
-    likely = {f: _beyond(v, _EXCESS_PX, _GAIN).astype(np.float32) for f, v in verdicts.items()}
+    likely = {
+        f: _beyond(v, options.excess_px, options.gain_levels, options).astype(np.float32)
+        for f, v in verdicts.items()
+    }
 
     def decided(frame: int) -> np.ndarray:
-        sure = _beyond(verdicts[frame], _SURE_EXCESS_PX, _SURE_GAIN)
-        return decide(_vote(likely, frame, flows[frame]), sure, view.usable[frame])
+        sure = _beyond(verdicts[frame], options.sure_excess_px, options.sure_gain_levels, options)
+        return decide(_vote(likely, frame, flows[frame]), sure, view.usable[frame], options)
 
     found = by_frame(view, decided)
     coming: dict[int, np.ndarray] = {}
-    if not known_depth:
+    if options.oncoming and not known_depth:
         coming = {frame: mask & ~sky[frame] for frame, mask in oncoming(view).items()}
     found |= {frame: np.where(mask, 1, found[frame]) for frame, mask in coming.items()}
     flagged = {frame: found[frame] >= FLAGGED for frame in view.frames}
-    for around in range(_ROUNDS):
+    for around in range(options.rounds):
         if around > 0:
-            flagged = {frame: _carried(flagged, frame, flows[frame]) for frame in view.frames}
+            flagged = {
+                frame: _carried(flagged, frame, flows[frame], options.least_area) for frame in view.frames
+            }
 
         def whole(frame: int, parts: Mapping[int, np.ndarray] = flagged) -> np.ndarray:
             return outline(view, frame, flows[frame], inverse_depth[frame], parts[frame], sky[frame])
@@ -90,12 +89,17 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
         outside = np.maximum(np.maximum(picture - high, low - picture), 0).max(axis=-1)
         difference = np.asarray(cv2.GaussianBlur(outside, (0, 0), grown(1.0, view.grey.shape[2])))
         votes = np.clip(difference / (2 * _STANDING_LEVELS), 0, 1).astype(np.float32)
-        evidence[frame] = decide(votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame])
+        evidence[frame] = decide(
+            votes, difference > 1.5 * _STANDING_LEVELS, view.usable[frame], view.options.moving
+        )
     return evidence
 
 
-def _beyond(verdict: contest.Verdict, excess_px: float, gain: float) -> Bool[np.ndarray, "h w"]:
-    return ((verdict.excess_px > excess_px) & (verdict.gain > gain)) | verdict.off_line
+def _beyond(
+    verdict: contest.Verdict, excess_px: float, gain: float, options: MovingOptions
+) -> Bool[np.ndarray, "h w"]:
+    beyond = (verdict.excess_px > excess_px) & (verdict.gain > gain)
+    return beyond | verdict.off_line if options.off_line else beyond
 
 
 def _vote(
@@ -112,32 +116,37 @@ def _vote(
 
 
 def _carried(
-    flagged: Mapping[int, Bool[np.ndarray, "h w"]], frame: int, flows: list[PairFlow]
+    flagged: Mapping[int, Bool[np.ndarray, "h w"]], frame: int, flows: list[PairFlow], least_area: float
 ) -> Bool[np.ndarray, "h w"]:
     """What at least half of the frame and its neighbours hold for moving, without specks."""
     votes = _vote({key: value.astype(np.float32) for key, value in flagged.items()}, frame, flows)
     side = window_px(3, votes.shape[1])
     mask = cv2.morphologyEx((votes >= 0.5).astype(np.uint8), cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     _, found, stats, _ = cv2.connectedComponentsWithStats(mask)
-    large = stats[:, cv2.CC_STAT_AREA] >= _MIN_AREA * mask.size
+    large = stats[:, cv2.CC_STAT_AREA] >= least_area * mask.size
     large[0] = False
     return large[np.asarray(found, np.intp)]
 
 
 def decide(
-    votes: Float[np.ndarray, "h w"], sure: Bool[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
+    votes: Float[np.ndarray, "h w"],
+    sure: Bool[np.ndarray, "h w"],
+    usable: Bool[np.ndarray, "h w"],
+    options: MovingOptions = MovingOptions(),
 ) -> Float[np.ndarray, "h w"]:
     """Votes in [0, 1] to evidence: at least ``FLAGGED`` inside kept and filled regions, less outside.
 
     A region is kept that has some sure pixels. Evidence is 0 where pixels are not usable.
     """
-    mask = ((votes >= _VOTE) & usable).astype(np.uint8)
+    mask = ((votes >= options.vote) & usable).astype(np.uint8)
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _ellipse(_CLOSE_SHARE * mask.shape[1]))
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _ellipse(_OPEN_SHARE * mask.shape[1]))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
     sure_px = np.bincount(labels[sure], minlength=count)
     area = stats[:, cv2.CC_STAT_AREA]
-    keep = (area >= _MIN_AREA * mask.size) & (sure_px >= np.maximum(_MIN_SURE_PX, _MIN_SURE_SHARE * area))
+    keep = (area >= options.least_area * mask.size) & (
+        sure_px >= np.maximum(_MIN_SURE_PX, _MIN_SURE_SHARE * area)
+    )
     flagged = np.zeros(mask.shape, bool)
     for label in np.flatnonzero(keep[1:]) + 1:
         flagged |= fill(labels == label)

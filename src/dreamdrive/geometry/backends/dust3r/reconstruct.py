@@ -31,6 +31,7 @@ from dreamdrive.geometry.finish import begin, finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.moving import FLAGGED
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Progress, Work
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -42,14 +43,7 @@ _WORTH_A_NOTE = 0.03  # relative, of the focal length
 _NARROWER = ("swin-3-noncyclic", "swin-2-noncyclic")
 
 
-def reconstruct(
-    clip: Clip,
-    *,
-    camera_height_m: float | None = None,
-    seed: int = 0,
-    weights: Path | None = None,
-    work: Work = Work(),
-) -> Geometry:
+def reconstruct(clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Work = Work()) -> Geometry:
     """Pointmaps of pairs of frames, aligned, brought to metres; see ``geometry.protocol``.
 
     Held-out frames take part in the alignment, which poses them; their depth is not handed on. Work is told
@@ -58,7 +52,7 @@ def reconstruct(
     Raises:
         InputError: As ``finish.begin`` says; or weights or pointmaps cannot be used.
     """
-    path, evidence, shown = begin(clip, "dust3r", weights)
+    path, evidence, shown = begin(clip, "dust3r", options.weights)
     maps, how = _seen(clip, path, lambda done, total: work(done, total + 1))
     usable = _usable(clip, evidence, how)
     maps = maps.masked(tuple(usable))
@@ -66,7 +60,7 @@ def reconstruct(
     def found(still: tuple[Bool[np.ndarray, "h w"], ...] | None) -> Geometry:
         aligned = align(maps, AlignOptions(seed=seed), _known(shown, how), still)
         seen = measured(shown, aligned, how)
-        return finish(clip, seen, evidence, camera_height_m=camera_height_m, seed=seed)
+        return finish(clip, seen, evidence, options, seed=seed)
 
     first = found(None)
     still = None if stands(clip, evidence) else _still(first.moving, usable, how)

@@ -16,6 +16,7 @@ from dreamdrive.geometry.evidence import free_pixels
 from dreamdrive.geometry.finish import begin, finish
 from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.measured import Measured, trusted
+from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Progress, Work, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -41,13 +42,7 @@ class FeedForward:
     overlap: int = 8  # frames that two chunks share
 
     def __call__(
-        self,
-        clip: Clip,
-        *,
-        camera_height_m: float | None = None,
-        seed: int = 0,
-        weights: Path | None = None,
-        work: Work = Work(),
+        self, clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Work = Work()
     ) -> Geometry:
         """Cameras and depth of the network, brought to metres.
 
@@ -57,10 +52,10 @@ class FeedForward:
         Raises:
             InputError: As ``finish.begin`` says; or weights or results cannot be used.
         """
-        path, evidence, shown = begin(clip, self.name, weights)
+        path, evidence, shown = begin(clip, self.name, options.weights)
         free = free_pixels(clip, evidence)
         found = work.keep("measured", lambda: self.measure(shown, free, path, seed, work))
-        return finish(clip, found, evidence, camera_height_m=camera_height_m, seed=seed)
+        return finish(clip, found, evidence, options, seed=seed)
 
     def measure(
         self,

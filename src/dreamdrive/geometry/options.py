@@ -1,0 +1,106 @@
+"""What can be chosen of the geometry."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+
+
+@dataclass(frozen=True)
+class GateOptions:
+    """When a sparse reconstruction of a drive is believed.
+
+    Lengths in pixels are of the picture that features are found in, 480 to 640 wide.
+
+    Attributes:
+        registered: Share of the frames that have to be placed.
+        points: Points that have to be there ...
+        points_a_frame: ... or so many for each frame, if these are fewer ...
+        seen: ... or else so many in the poorest frame.
+        wobbling_px: Mean reprojection error above which frames are not quite pictures of one street, as
+            generated ones are not: recorded drives stay below 0.4.
+        reprojection_px: Mean reprojection error above which the model is refused.
+        forward: Least cosine between a step and the optical axis.
+        variation: Standard deviation of the lengths of the steps about their trend, over their mean.
+    """
+
+    registered: float = 0.9
+    points: int = 600
+    points_a_frame: int = 25
+    seen: int = 60
+    wobbling_px: float = 0.5
+    reprojection_px: float = 1.0
+    forward: float = 0.9
+    variation: float = 0.6
+
+
+@dataclass(frozen=True)
+class DepthOptions:
+    """How the plane sweep finds depth.
+
+    Attributes:
+        reach_frames: Sources are at most so many frames away.
+        flanks: Whether the sides of things are filled down to the road. Without it withheld frames lose
+            0.38 dB (``benchmarks/results/parts-2026-11-23.md``).
+    """
+
+    reach_frames: int = 5
+    flanks: bool = True
+
+
+@dataclass(frozen=True)
+class MovingOptions:
+    """When pixels count as moving.
+
+    Figures are what the IoU of the evidence loses without the part, in ``benchmarks/results/parts-*.md``.
+
+    Attributes:
+        excess_px: Flow beyond what a static point may show ...
+        gain_levels: ... which explains the pixel better by so many grey levels, for a vote ...
+        sure_excess_px: ... and the same for a sure pixel,
+        sure_gain_levels: of which a region needs some.
+        off_line: Whether flow beside the epipolar line counts as well: 0.022.
+        vote: Mean of the votes of a frame and its neighbours from which a pixel is in a region.
+        least_area: Smaller regions are noise, as a share of the picture.
+        oncoming: Whether oncoming traffic is looked for where it does not stand on the road: 0.044.
+        rounds: How often regions are completed to outlines of whole things: 0.164 for none, 0.016 for one.
+    """
+
+    excess_px: float = 1.0
+    gain_levels: float = 2.5
+    sure_excess_px: float = 3.0
+    sure_gain_levels: float = 5.0
+    off_line: bool = True
+    vote: float = 0.45
+    least_area: float = 0.0006
+    oncoming: bool = True
+    rounds: int = 2
+
+
+@dataclass(frozen=True)
+class GeometryOptions:
+    """How cameras and depth are found.
+
+    Attributes:
+        method: Name of the way.
+        weights: The network's file or folder, for methods that have one.
+        camera_height_m: Height of the camera above the road, which fixes the metric scale where nothing
+            better does; None assumes 1.5 m.
+        refine_poses: Whether known poses give the length of the path only, see ``cameras.refine``.
+        gate: When structure from motion is believed.
+        depth: How the plane sweep finds depth.
+        moving: When pixels count as moving.
+    """
+
+    method: str = "classical"
+    weights: Path | None = None
+    camera_height_m: float | None = None
+    refine_poses: bool = False
+    gate: GateOptions = field(default_factory=GateOptions)
+    depth: DepthOptions = field(default_factory=DepthOptions)
+    moving: MovingOptions = field(default_factory=MovingOptions)
+
+    def __post_init__(self) -> None:
+        height_m = self.camera_height_m
+        if height_m is not None and not 0 < height_m < float("inf"):
+            raise InputError(f"--camera-height {height_m:g}: expected metres above the road, such as 1.5")
