@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.cameras.paths import path_length
+from dreamdrive.geometry.cameras.paths import path_length, without_poses
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 from dreamdrive.scene.similarity import fit_similarity
@@ -31,8 +31,7 @@ def refined(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
         raise InputError(f"poses can only be refined where they are given in metres; {what}")
     if len(clip.rig) > 1:
         raise InputError(f"poses of one camera can be refined; the clip has {len(clip.rig)}")
-    own = replace(clip, known=replace(clip.known, world_from_camera=None, points=None))
-    found = reconstruct(own) if path_length(known) > _STANDING_M else None
+    found = reconstruct(without_poses(clip)) if path_length(known) > _STANDING_M else None
     if found is None or found.fallback is not None:
         why = "the camera stands still" if found is None else found.fallback
         given = reconstruct(clip)
