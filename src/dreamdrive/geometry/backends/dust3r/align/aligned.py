@@ -24,9 +24,10 @@ _SURE_STEP = 0.5  # of the way between paired images, by which a pair's own came
 class Aligned:
     """Cameras and depth of all images in one world.
 
-    Without known poses the world is the camera of image 0 and the unit is free. The focal length is 0.05 off
-    or more where nothing but the network speaks for it. Pairs are spread by the median distance between where
-    each has its first camera and where that ended, in units of the median distance between paired cameras.
+    Without known poses the world is the camera of image 0 and the unit is free. Where nothing but the network
+    speaks for the focal lengths, their error is 0.05 or more. The spread of pairs is the median distance
+    between where a pair has its first camera and where that ended, in units of the median distance between
+    paired cameras.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
