@@ -4,7 +4,7 @@
 
 One run is left alone; its time is the range that the moments are drawn from. Each of the others is killed
 (SIGKILL) at its moment, in the prior, the geometry, the fits, or while results are put in place, and the
-same command is given again. What is compared are all files of scene, videos and withheld frames.
+same command is given again. What is compared are all files of scene, videos and held-out frames.
 """
 
 import shutil

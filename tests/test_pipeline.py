@@ -130,7 +130,7 @@ def test_a_finished_output_is_left_alone(finished: Path) -> None:
     before = {p: p.stat().st_mtime_ns for p in finished.rglob("*")}
     outcome = make(finished)
     assert outcome.already_finished
-    assert (outcome.frames, outcome.size, outcome.withheld) == (6, (64, 40), 1)
+    assert (outcome.frames, outcome.size, outcome.held_out) == (6, (64, 40), 1)
     assert list(outcome.seconds) == [*STAGES, "videos"]
     assert outcome.rough[0].startswith("there are only 6 frames. ")
     assert {p: p.stat().st_mtime_ns for p in finished.rglob("*")} == before

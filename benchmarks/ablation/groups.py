@@ -97,7 +97,7 @@ def space_time(
 ) -> Float[np.ndarray, "m d"]:
     """Place, training frame, score and Z_ref of some seeds, all as metres.
 
-    Withheld frames are not counted: no cluster ends at them.
+    Held-out frames are not counted: no cluster ends at them.
     """
     assert seeds.features is not None
     features = seeds.features.numpy()

@@ -9,7 +9,7 @@ from common.markdown import grid, number
 from common.worlds import common_worlds
 
 FIGURES = {
-    "held_out_psnr": ("withheld, dB", ".2f"),
+    "held_out_psnr": ("held out, dB", ".2f"),
     "novel_psnr": ("novel, dB", ".2f"),
     "mask_iou": ("mask IoU", ".3f"),
     "mask_precision": ("mask precision", ".2f"),

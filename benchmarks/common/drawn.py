@@ -24,7 +24,7 @@ def drawn_clip(
         made: The drive.
         frames: What is to be seen in place of its own frames.
         known: What is told of the geometry; the lens is a guess where that is no part of it.
-        hold_out: Every how many frames one is withheld; None withholds none.
+        hold_out: Every how many frames one is held out; None withholds none.
     """
     known = known or Known()
     count, height, width = made.frames.shape[:3]

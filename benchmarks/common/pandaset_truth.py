@@ -56,7 +56,7 @@ class Movers:
 
         Args:
             dynamic_share: Share of each pixel that dynamic Gaussians fill (H, W), of each frame.
-            errors: Rendered less recorded colour (H, W, 3) in units of 1, by the index of withheld frames.
+            errors: Rendered less recorded colour (H, W, 3) in units of 1, by the index of held-out frames.
 
         Returns:
             IoU over all frames, and PSNR inside the hulls.

@@ -29,7 +29,7 @@ OTHER_CLIPS = {
 }
 FIGURES: dict[str, tuple[Callable[[dict[str, Any]], float | None], str]] = {
     "moving mask, IoU": (lambda row: row["mask_iou"], ".2f"),
-    "withheld, dB": (lambda row: row["views"]["held_out"]["psnr"], ".2f"),
+    "held out, dB": (lambda row: row["views"]["held_out"]["psnr"], ".2f"),
     "2 m aside, dB": (lambda row: row["views"]["shift_2"]["psnr"], ".2f"),
 }
 """Of a fit of a drawn street, by the heads of their columns."""
@@ -119,8 +119,8 @@ def _main_clip(clips: dict[str, dict[str, Any]]) -> str:
     flow = first["baselines"]["flow_interpolation"]
     likeness = f"{flow['psnr']:.1f} / {flow['ssim']:.3f}"
     body.append(["flow interpolation between the neighbours", likeness, "", ""])
-    about = "24 frames, 480x270, no intrinsics, no poses, three withheld"
-    head = ["", "withheld PSNR / SSIM", "inside moving cars, dB", "seconds"]
+    about = "24 frames, 480x270, no intrinsics, no poses, three held out"
+    head = ["", "held-out PSNR / SSIM", "inside moving cars, dB", "seconds"]
     end = (
         f"The camera path is within {100 * first['path_error']:.2f} % of its length; the pixels called "
         f"moving overlap the labelled boxes with an IoU of {number(first['moving_iou'])}."
@@ -139,7 +139,7 @@ def _clip_details(clips: dict[str, dict[str, Any]]) -> str:
             body.append([name, _likeness(row, ".2f"), *moving, f"{100 * row['path_error']:.2f} %", *cost])
     if not body:
         return ""
-    head = ["", "withheld PSNR / SSIM", "inside moving boxes, dB", "moving pixels, IoU", "path error"]
+    head = ["", "held-out PSNR / SSIM", "inside moving boxes, dB", "moving pixels, IoU", "path error"]
     first = next(clips[run] for run in MAIN_CLIP if run in clips)
     stages = ", ".join(f"{stage} {seconds:.0f}" for stage, seconds in first["stages"].items())
     end = f"Baselines: {_baselines(first)}. Seconds of each stage in the first row: {stages}."
@@ -157,7 +157,7 @@ def _other_clips(clips: dict[str, dict[str, Any]]) -> str:
             moves = row["gaussians"]["dynamic"]
             what = f"{moves:,} Gaussians" if moves else "nothing"
             body.append([name, _likeness(row, ".2f"), _baselines(row), path, focal, what])
-    head = ["development clip", "withheld PSNR / SSIM", "baselines", "path error", "focal length, px"]
+    head = ["development clip", "held-out PSNR / SSIM", "baselines", "path error", "focal length, px"]
     return table([*head, "what moves"], body) if body else ""
 
 

@@ -123,7 +123,7 @@ def _recording(rows: list[dict[str, Any]]) -> Iterator[Claim]:
     by = {row["representation"]: row for row in rows}
     if "hybrid" not in by or len(by) < 2:
         return
-    for figure, about in (("psnr", "PSNR of withheld frames"), ("moving_psnr", "the same inside hulls")):
+    for figure, about in (("psnr", "PSNR of held-out frames"), ("moving_psnr", "the same inside hulls")):
         values = {name: row[figure] for name, row in by.items() if row[figure] is not None}
         best = max((name for name in values if name != "hybrid"), key=values.__getitem__)
         gain = values["hybrid"] - values[best]

@@ -1,4 +1,4 @@
-"""The same five fits on a recorded clip: withheld frames, and labelled boxes as the truth of what moves."""
+"""The same five fits on a recorded clip: held-out frames, and labelled boxes as the truth of what moves."""
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -96,7 +96,7 @@ def run_recorded(job: Recorded) -> None:
 
 
 def measure_recorded(scene: Scene, clip: Clip, geometry: Geometry, truth: Movers) -> dict[str, Any]:
-    """Likeness of withheld frames, overall and inside the hulls of moving boxes, and IoU over all frames.
+    """Likeness of held-out frames, overall and inside the hulls of moving boxes, and IoU over all frames.
 
     A pixel counts as moving as it does in the drawn worlds, see ``evaluate.decomposition``.
     """

@@ -129,7 +129,7 @@ def _paired(found: list[dict[str, Any]]) -> dict[str, Any]:
     """PSNR of ours less that of the best other, world by world, with a bootstrap interval over worlds.
 
     The best other of a view is the one with the highest mean over worlds. ``novel`` is the mean over all
-    views but the withheld frames. A world without a frame that counts in a view is left out of it.
+    views but the held-out frames. A world without a frame that counts in a view is left out of it.
     """
     by, result = _seeds(found), {}
     if OURS not in by or len(by) == 1:

@@ -73,7 +73,7 @@ def _claim_lines(rows: list[dict[str, Any]]) -> str:
 def _recording_lines(rows: list[dict[str, Any]]) -> str:
     width, height = rows[0]["size"]
     cores = " or ".join(sorted({str(row["threads"]) for row in rows}))
-    head = ["representation", "steps", f"s on {cores} threads", "withheld", "moving IoU", "inside hulls, dB"]
+    head = ["representation", "steps", f"s on {cores} threads", "held out", "moving IoU", "inside hulls, dB"]
     lines = [head]
     for row in sorted(rows, key=lambda r: -r["psnr"]):
         cells = [f"{row['psnr']:.2f} / {row['ssim']:.3f}"]
@@ -155,7 +155,7 @@ def _frames_line(row: dict[str, Any]) -> str:
     """Of how many frames the figures of each view are."""
     whole = row["worlds"] * FRAMES
     parts = [f"{view} {count}" for view, count in row["frames"].items()]
-    return f"Frames that count, of {whole} a view but the withheld ones: {', '.join(parts)}.\n"
+    return f"Frames that count, of {whole} a view but the held-out ones: {', '.join(parts)}.\n"
 
 
 def _captions(report: dict[str, Any]) -> list[str]:

@@ -169,7 +169,7 @@ def test_the_order_of_frames_matters_to_the_path_alone() -> None:
     assert wrong.path.ate_percent > 10
 
 
-def test_withheld_frames_count_for_the_path_alone() -> None:
+def test_held_out_frames_count_for_the_path_alone() -> None:
     truth = known()
     estimate = found(truth)
     assert estimate.depth_m is not None
@@ -188,7 +188,7 @@ def test_withheld_frames_count_for_the_path_alone() -> None:
     assert group(figures, "all").coverage == 1
     assert figures.depth is not None
     assert figures.depth.frames == FRAMES - 1
-    assert "Withheld frames (1)" in figures.notes[-1]
+    assert "Held-out frames (1)" in figures.notes[-1]
 
 
 def test_a_standing_camera_has_no_path_and_no_scale() -> None:

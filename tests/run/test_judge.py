@@ -34,7 +34,7 @@ REFUSED = (
 )
 ROUGH = {
     "good": (GOOD, ()),
-    "nothing withheld": (replace(GOOD, psnr=None, blended_psnr=None), ()),
+    "nothing held out": (replace(GOOD, psnr=None, blended_psnr=None), ()),
     "black or noise": (replace(GOOD, fallback="blank"), (BLANK,)),
     "standing": (
         replace(GOOD, fallback="standing"),
@@ -76,14 +76,14 @@ ROUGH = {
     "worse than blending": (
         replace(GOOD, psnr=21.2, blended_psnr=23.0),
         (
-            "withheld frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
+            "held-out frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
             "dB): --quality standard takes more steps",
         ),
     ),
     "worse although high": (
         replace(GOOD, psnr=21.2, blended_psnr=23.0, quality="high"),
         (
-            "withheld frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
+            "held-out frames are predicted worse than by blending the frames beside them (21.2 against 23.0 "
             "dB): a shorter stretch, chosen with --frames, is easier",
         ),
     ),

@@ -35,7 +35,7 @@ def test_a_good_run_is_told_in_four_lines() -> None:
     assert lines() == (
         "made    a scene of 141,263 Gaussians with 2 moving things, from 24 frames of 480x270, in 2 min 20 s "
         "(fit 1 min 30 s, geometry 23 s, static 20 s, the rest 9 s)",
-        "checked 3 withheld frames are predicted with 28.9 dB; blending the frames beside gives 25.6 dB "
+        "checked 3 held-out frames are predicted with 28.9 dB; blending the frames beside gives 25.6 dB "
         "(more is better)",
         "metres  from the height of the camera, within 4 %.",
         "aside   views up to 2 m beside hold best.",

@@ -92,7 +92,7 @@ def test_exposure_network_starts_at_the_identity_and_learns_each_frame_apart() -
         optimiser.step()
     frozen = network.freeze(np.array([0.0, 0.1, 0.2]), np.array([True, False, True]))
     torch.testing.assert_close(frozen.transforms[0], 0.8 * torch.eye(3, 4), atol=0.03, rtol=0)
-    # The middle frame was withheld: its neighbours say what it looked like.
+    # The middle frame was held out: its neighbours say what it looked like.
     torch.testing.assert_close(frozen.at(0.1), 1.05 * torch.eye(3, 4), atol=0.03, rtol=0)
     assert not frozen.transforms.requires_grad
 

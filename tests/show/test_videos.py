@@ -1,4 +1,4 @@
-"""Videos and withheld frames: the right number, size, rate and distortion."""
+"""Videos and held-out frames: the right number, size, rate and distortion."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ def distorted(scene: Scene) -> Scene:
     return replace(scene, provenance=Provenance(lens=lens.to_json(), up=(0.0, -0.8, 0.6)))
 
 
-def test_withheld_frames_carry_their_source_index_and_size(tmp_path: Path) -> None:
+def test_held_out_frames_carry_their_source_index_and_size(tmp_path: Path) -> None:
     write_held_out(tmp_path, make_scene(), [20, 22, 24])
     assert [p.name for p in tmp_path.iterdir()] == ["0022.png"]
     image = cv2.imread(str(tmp_path / "0022.png"))

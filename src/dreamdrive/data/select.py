@@ -1,4 +1,4 @@
-"""Which frames of a source are read, and which of those are withheld."""
+"""Which frames of a source are read, and which of those are held out."""
 
 import re
 import sys
@@ -79,7 +79,7 @@ def out_of_range(index: int, count: int, name: str) -> InputError:
 
 
 def held_out_mask(count: int, every: int | None) -> Bool[np.ndarray, " f"]:
-    """Which of ``count`` selected frames are withheld: i mod N = N // 2, never the first or the last."""
+    """Which of ``count`` selected frames are held out: i mod N = N // 2, never the first or the last."""
     index = np.arange(count)
     if every is None:
         return np.zeros(count, dtype=bool)

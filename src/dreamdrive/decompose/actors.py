@@ -31,7 +31,7 @@ class ActorOptions:
     """Constants of the tracks.
 
     Figures are means over four drawn streets with corrupted references and true poses
-    (``benchmarks/ablation.py``). Without any tracks withheld frames lose 0.71 dB, novel views 0.23 dB.
+    (``benchmarks/ablation.py``). Without any tracks held-out frames lose 0.71 dB, novel views 0.23 dB.
 
     Attributes:
         tracks: False leaves every copy in its place, alive for ever, for F_deform alone to move (eq. 11).

@@ -22,7 +22,7 @@ def density_labels(
 
     Args:
         places_m: Where the Gaussians are.
-        frames: Number of the training frame that each came from; withheld frames are not counted.
+        frames: Number of the training frame that each came from; held-out frames are not counted.
         scores: Their dynamic scores.
         smallest: Members that make a cluster.
     """

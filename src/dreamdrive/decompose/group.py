@@ -47,7 +47,7 @@ class GroupOptions:
         clusters: What votes together: ``"flow"``, what hangs together in frames and along optical flow;
             ``"density"``, clusters of HDBSCAN over all Gaussians, of which ``majority`` and ``smallest``
             alone count (the paper); ``"none"``, each for itself: 0.495, but there are no things then that
-            could have tracks, and withheld frames lose 0.7 dB.
+            could have tracks, and held-out frames lose 0.7 dB.
     """
 
     threshold: float = 0.35

@@ -169,7 +169,7 @@ def _pinhole(estimate: Estimate, truth: GeometryTruth) -> PinholeError:
 
 
 def _depth(estimate: Estimate, truth: GeometryTruth, scale: ScaleError | None) -> DepthFigures | None:
-    """Errors of all pixels with true depth, in the frames that are not withheld."""
+    """Errors of all pixels with true depth, in the frames that are not held out."""
     if estimate.depth_m is None:
         return None
     known = (truth.depth_m > 0) & (truth.depth_m <= BANDS_M[-1][1]) & ~estimate.held_out[:, None, None]
@@ -233,6 +233,6 @@ def _notes(
     if depth is not None and truth.moving is None:
         notes.append("The truth does not say what moves: moving pixels count with the others.")
     if depth is not None and estimate.held_out.any():
-        withheld = int(estimate.held_out.sum())
-        notes.append(f"Withheld frames ({withheld}) have poses and no depth: the path alone counts them.")
+        held_out = int(estimate.held_out.sum())
+        notes.append(f"Held-out frames ({held_out}) have poses and no depth: the path alone counts them.")
     return notes

@@ -31,7 +31,7 @@ class LearningRates:
         sh_dc: Base colour.
         sh_rest: View-dependent colour.
         swings: Velocities, in footprints per frame interval. On the built-in street (1,000 steps) 0.05 lost
-            0.7 dB on withheld frames.
+            0.7 dB on held-out frames.
         peak: Centres of life spans, in frame intervals; decays like ``offsets`` (PVG: 0.04).
         log_span: Logarithm of their deviations (PVG: 2e-3 over 30,000 steps). There 3e-3 lost 1.3 dB.
         interval_s: The frame interval of the two.

@@ -33,7 +33,7 @@ class FitOptions:
     Attributes:
         steps: Optimisation steps, one frame each.
         loss: Weights of L1 and SSIM, see ``losses.WEIGHTS``. On four drawn streets with corrupted references
-            (``benchmarks/ablation.py``) the paper's lose 0.08 dB in withheld frames, 0.07 dB in novel views.
+            (``benchmarks/ablation.py``) the paper's lose 0.08 dB in held-out frames, 0.07 dB in novel views.
         half_size_share: Share of the steps, from the first, that look at half-size frames.
         sh_after: Share of the steps after which view-dependent colour is learned.
         depth_weight: Weight of the inverse-depth term (1/m), decayed to a tenth over the fit. Without it the
@@ -42,7 +42,7 @@ class FitOptions:
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
         plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times the
-            network's, as in 4D-GS and S3Gaussian. On withheld frames of the built-in street 5e-2 lost 1 dB in
+            network's, as in 4D-GS and S3Gaussian. On held-out frames of the built-in street 5e-2 lost 1 dB in
             1,000 steps and won 3 dB in 300, where this left cars standing.
         track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth.
         exposure_rate: Adam's step for the exposure network.

@@ -76,9 +76,11 @@ def finish(
     notes = [*measured.notes, *metric.notes]
     if still:
         notes.append(_STANDING)
-        if not clip.known.metric and clip.known.world_from_camera is not None:
+        known = clip.known.world_from_camera
+        if known is not None and clip.known.metric:
+            poses, _ = rebase(known.astype(np.float64), np.zeros((0, 3)))
+        elif known is not None:
             notes.append("the given poses and depth, in an unknown unit, are not used")
-        poses = _known_in_metres(clip, poses)
     others = {name: metres_in_one / metres for name, metres_in_one in measured.others.items()}
     metric = replace(metric, scale=replace(metric.scale, others={**metric.scale.others, **others}))
     # Of a standing clip it is not that of the poses, as which others read it.
@@ -93,14 +95,6 @@ def finish(
 def _rough_factor(measured: Measured) -> float:
     depth = measured.depth[measured.depth > 0]
     return _MEDIAN_DEPTH_M / float(np.median(depth)) if len(depth) else 1.0
-
-
-def _known_in_metres(clip: Clip, poses: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "f 4 4"]:
-    """The known poses in the frame of the first, if they are in metres, else the given ones."""
-    known = clip.known.world_from_camera
-    if known is None or not clip.known.metric:
-        return poses
-    return rebase(known.astype(np.float64), np.zeros((0, 3)))[0]
 
 
 def _of_known(clip: Clip, metres: float, still: bool) -> float | None:

@@ -29,7 +29,10 @@ def ranks(values: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
 
 
 def weighted_median(values: Float[np.ndarray, " n"], weights: Float[np.ndarray, " n"]) -> float:
-    """The lowest value with half of the weight at or below it; NaN are absent, and stand for no value."""
+    """The lowest value with half of the weight at or below it; NaN where nothing weighs.
+
+    NaN values count as absent.
+    """
     counts = ~np.isnan(values) & (weights > 0)
     values, weights = values[counts], weights[counts]
     if not len(values):

@@ -40,7 +40,7 @@ class DepthOptions:
 
     Attributes:
         reach_frames: Sources are at most so many frames away.
-        flanks: Whether the sides of things are filled down to the road. Without it withheld frames lose
+        flanks: Whether the sides of things are filled down to the road. Without it held-out frames lose
             0.38 dB (``benchmarks/results/parts-2026-11-23.md``).
     """
 

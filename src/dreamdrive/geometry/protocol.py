@@ -31,10 +31,6 @@ class Reconstruct(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class GeometryBackend(Backend):
-    """A way of getting geometry, by its name for ``--geometry``.
-
-    Attributes:
-        reconstruct: The way itself.
-    """
+    """A way of getting geometry, by its name for ``--geometry``."""
 
     reconstruct: Reconstruct

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.errors import InputError
+from dreamdrive.geometry.road import in_metres
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
@@ -70,28 +71,18 @@ def _other(
     reconstruct: Callable[[Clip], Geometry],
 ) -> Geometry:
     """One of the other cameras, from known poses over the known road."""
-    part = clip.only(camera)
+    part = in_metres(clip.only(camera), 1.0 if clip.known.metric else first.metres_per_unit)
     known: Known = replace(
         part.known,
         world_from_camera=poses[clip.of_camera(camera)],
         metric=True,
         points=None,
         ground=first.ground,
-        depth_m=None if part.known.depth_m is None else _in_metres(part.known.depth_m, clip, first),
     )
     try:
         return reconstruct(replace(part, known=known))
     except InputError as error:
         raise InputError(f"camera {camera} of the rig: {error}") from error
-
-
-def _in_metres(
-    depth: Float[np.ndarray, "k h w"], clip: Clip, first: Geometry
-) -> Float[np.ndarray, "k h w"] | None:
-    if clip.known.metric:
-        return depth
-    factor = first.metres_per_unit
-    return None if factor is None else depth * np.float32(factor)
 
 
 def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.ndarray, "f 4 4"]) -> Geometry:

@@ -34,7 +34,7 @@ class HexPlaneConfig(MotionConfig):
         resolution: Nodes along each axis of space of the coarsest level (both: 64).
         levels: Levels, each twice as fine in space as the one before, all alike in time (4D-GS: 2; S3Gaussian
             4, the finest of which alone has 25 million numbers). A third made a step of the built-in street
-            1.6 times as long, and the frames withheld no better (27.84 dB for 27.82).
+            1.6 times as long, and held-out frames no better (27.84 dB for 27.82).
         times: Nodes along time; a fit puts half the number of frames (4D-GS's advice; S3Gaussian: 25 for 50).
         coefficients: Spherical-harmonic coefficients a channel of the Gaussians; a fit puts theirs.
         plane_weight: Weight of the total variation of the planes without time (both: 1e-4).

@@ -1,4 +1,4 @@
-"""How well withheld frames are predicted, beside what needs no scene at all."""
+"""How well held-out frames are predicted, beside what needs no scene at all."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ class Likeness:
 
 
 Predictor = Callable[[Clip, int], Float[np.ndarray, "h w 3"]]
-"""Guesses a withheld frame of a clip, by index, from the frames that may be seen."""
+"""Guesses a held-out frame of a clip, by index, from the frames that may be seen."""
 
 
 def score_scene(clip: Clip, geometry: Geometry, scene: Scene) -> dict[int, Likeness]:
-    """Likeness of the scene's view of each withheld frame, by index in the clip."""
+    """Likeness of the scene's view of each held-out frame, by index in the clip."""
 
     def rendered(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
         camera, of_rig = geometry.cameras[frame], int(clip.camera[frame])
@@ -38,14 +38,14 @@ def score_scene(clip: Clip, geometry: Geometry, scene: Scene) -> dict[int, Liken
 
 
 def score_baselines(clip: Clip, geometry: Geometry) -> dict[str, dict[int, Likeness]]:
-    """Likeness of what ``BASELINES`` predict for each withheld frame."""
+    """Likeness of what ``BASELINES`` predict for each held-out frame."""
     return {name: _score(clip, geometry, predict) for name, predict in BASELINES.items()}
 
 
 def _score(clip: Clip, geometry: Geometry, predict: Predictor) -> dict[int, Likeness]:
     street = geometry.fixed_regions[clip.camera] == 0
-    withheld = np.flatnonzero(clip.held_out).tolist()
-    return {i: likeness(predict(clip, i), clip.frames[i], clip.valid[i] & street[i]) for i in withheld}
+    held_out = np.flatnonzero(clip.held_out).tolist()
+    return {i: likeness(predict(clip, i), clip.frames[i], clip.valid[i] & street[i]) for i in held_out}
 
 
 def likeness(

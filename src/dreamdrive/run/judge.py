@@ -29,7 +29,7 @@ class Facts:
     """What the judgement rests on, of one camera.
 
     ``placed`` frames found their place on the path; ``scenes`` are first and last index in the source of each
-    piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the withheld frames in
+    piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the held-out frames in
     decibels, and that of blending their neighbours along the motion in the picture. ``basis`` is what metres
     rest on, ``spread`` how far they may be off, as a fraction.
     """
@@ -86,7 +86,7 @@ def _mean_psnr(scores: dict[int, Likeness]) -> float | None:
 
 def rough_because(facts: Facts) -> tuple[str, ...]:
     """Why the result is rough, and what helps, a sentence each; nothing where it is not."""
-    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_withheld(facts)]
+    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_held_out(facts)]
     return tuple(reason for reason in reasons if reason is not None)
 
 
@@ -141,11 +141,11 @@ def _of_few(facts: Facts) -> str | None:
     return None
 
 
-def _of_withheld(facts: Facts) -> str | None:
+def _of_held_out(facts: Facts) -> str | None:
     if facts.psnr is None or facts.blended_psnr is None or facts.psnr >= facts.blended_psnr:
         return None
     return (
-        "withheld frames are predicted worse than by blending the frames beside them "
+        "held-out frames are predicted worse than by blending the frames beside them "
         f"({_apart(facts.psnr, facts.blended_psnr)} dB): {_BETTER.get(facts.quality, _SHORTER)}"
     )
 

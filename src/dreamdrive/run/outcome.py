@@ -62,7 +62,7 @@ class Outcome:
         moving: Gaussians of what moves.
         things: Number of things that move.
         seconds: What each stage took when it was computed.
-        withheld: Number of withheld frames.
+        held_out: Number of held-out frames.
         psnr: Their mean likeness to what the scene shows, in decibels; None without any.
         blended_psnr: The same of blending their neighbours along the motion in the picture.
         rough: Why the result is rough and what helps, a sentence each; empty where it is not.
@@ -76,7 +76,7 @@ class Outcome:
     moving: int
     things: int
     seconds: dict[str, float]
-    withheld: int
+    held_out: int
     psnr: float | None
     blended_psnr: float | None
     rough: tuple[str, ...]
@@ -112,7 +112,7 @@ def lines_of(outcome: Outcome) -> tuple[str, ...]:
     """Five lines at most that say how a run went, each with a first word that tells of what."""
     lines = [("made", _made(outcome))]
     if outcome.psnr is not None and outcome.blended_psnr is not None:
-        lines.append(("checked", _checked(outcome.withheld, outcome.psnr, outcome.blended_psnr)))
+        lines.append(("checked", _checked(outcome.held_out, outcome.psnr, outcome.blended_psnr)))
     if outcome.rough:
         lines.append(("rough", f"because {'. Also, '.join(outcome.rough)}."))
     lines += [(word, f"{note}.") for word, note in zip(("metres", "aside"), outcome.notes, strict=False)]
@@ -153,8 +153,8 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def _checked(withheld: int, psnr: float, blended: float) -> str:
-    what = "1 withheld frame is" if withheld == 1 else f"{withheld} withheld frames are"
+def _checked(held_out: int, psnr: float, blended: float) -> str:
+    what = "1 held-out frame is" if held_out == 1 else f"{held_out} held-out frames are"
     return (
         f"{what} predicted with {psnr:.1f} dB; blending the frames beside gives {blended:.1f} dB (more is "
         "better)"

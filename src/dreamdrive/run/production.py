@@ -51,7 +51,7 @@ class Production(Stages):
         return value
 
     def publish(self, scene: Scene) -> Outcome:
-        """Put scene, videos, withheld frames and report into the output folder, all at once."""
+        """Put scene, videos, held-out frames and report into the output folder, all at once."""
         request, staging = self.request, self.workspace.fresh_staging()
         clip: Clip = self.results["prior"]
         geometry: Geometry = self.results["geometry"]

@@ -35,7 +35,7 @@ def describe(
 ) -> dict[str, Any]:
     """The report as JSON values; a number that is not finite becomes null.
 
-    Likeness is that of withheld frames, by index in the clip; baselines are predictions that need no scene.
+    Likeness is that of held-out frames, by index in the clip; baselines are predictions that need no scene.
     """
     options = request["options"]
     blended = baselines.get("flow_interpolation", {})

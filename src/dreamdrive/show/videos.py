@@ -1,4 +1,4 @@
-"""What ``generate`` shows of a scene: videos, withheld frames, a picture of the geometry."""
+"""What ``generate`` shows of a scene: videos, held-out frames, a picture of the geometry."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def write_videos(
 
 
 def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
-    """Write the view of each withheld frame as ``NNNN.png``, in the source's distortion.
+    """Write the view of each held-out frame as ``NNNN.png``, in the source's distortion.
 
     The number is the frame's index in the source. Of several cameras, those after the first add ``_cameraK``.
     """

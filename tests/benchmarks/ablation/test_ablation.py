@@ -113,7 +113,7 @@ def test_clusters_of_density_within_reach_are_one() -> None:
     assert (labels >= 0).mean() > 0.9
 
 
-def test_space_time_does_not_count_withheld_frames() -> None:
+def test_space_time_does_not_count_held_out_frames() -> None:
     seeds = SimpleNamespace(
         means=torch.zeros(3, 3), source_frame=torch.tensor([0, 2, 3]), features=torch.ones(3, 2)
     )

@@ -82,7 +82,7 @@ def test_sections_say_what_was_measured() -> None:
 
 def test_no_mean_is_over_both_sets_of_worlds() -> None:
     with pytest.raises(ValueError, match="several sets"):
-        tables.mean_and_error([fit(0), fit(1000)], "withheld, dB")
+        tables.mean_and_error([fit(0), fit(1000)], "held out, dB")
 
 
 def test_a_whole_run_writes_the_sections_that_a_page_has(tmp_path: Path) -> None:

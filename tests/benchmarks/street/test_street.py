@@ -347,7 +347,7 @@ def test_tables_tell_frames_time_and_worlds() -> None:
         row["views"]["shift_3"] = {"psnr": 12.0, "ssim": 0.5, "frames": 13}
     late = [{**row, "budget": "equal_time", "hybrid_s": 50.0} for row in records[1::2]]
     text = street.markdown(street.summary([*records, *late], {}, {}))
-    assert "of 48 a view but the withheld ones: held_out 48, shift_1 48, shift_2 48, shift_3 26" in text
+    assert "of 48 a view but the held-out ones: held_out 48, shift_1 48, shift_2 48, shift_3 26" in text
     assert "| static | 2 | 1 | 60.0 | 1.20 (1.00 to 1.40), off by more than 10 % |" in text
     assert "| 0 | - | - | - | - |" not in text
     assert "| 1 | 0.75 | - | - | - |" in text

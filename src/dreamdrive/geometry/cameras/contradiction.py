@@ -46,7 +46,8 @@ def check(clip: Clip, evidence: Evidence) -> None:
     if clip.known.world_from_camera is None or clip.known.generated:
         return
     poses = clip.known.world_from_camera
-    if _stand(poses, clip.known.metric) and _moves(evidence):
+    stand = np.abs(poses - poses[0]).max() < (_SAME_POSE if clip.known.metric else 1e-9)  # up to rounding
+    if stand and _moves(evidence):
         raise InputError(
             "the given poses are all the same, but the camera moves in the frames: with them nothing has a "
             "depth. Give the pose of each frame, or none to have them found"
@@ -87,11 +88,6 @@ def _pairs(count: int) -> list[tuple[int, int]]:
     apart = min(_APART, count - 1)
     firsts = np.unique(np.linspace(0, count - 1 - apart, _PAIRS).round().astype(int))
     return [(first, first + apart) for first in firsts.tolist()]
-
-
-def _stand(world_from_camera: Float[np.ndarray, "f 4 4"], metric: bool) -> bool:
-    """Whether all poses are one, up to rounding."""
-    return bool(np.abs(world_from_camera - world_from_camera[0]).max() < (_SAME_POSE if metric else 1e-9))
 
 
 def _moves(evidence: Evidence) -> bool:

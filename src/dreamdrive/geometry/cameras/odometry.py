@@ -72,10 +72,10 @@ def _relative(
     if flow < STILL_PX:
         return np.eye(3), ahead, flow
     pixels, moved = here.astype(np.float64) + 0.5, there.astype(np.float64) + 0.5
-    found: Any = cv2.findEssentialMat(
+    essential: Any  # None where nothing fits
+    essential, inliers = cv2.findEssentialMat(
         pixels, moved, camera.matrix, method=cv2.USAC_MAGSAC, prob=0.999, threshold=ESSENTIAL_PX
     )
-    essential, inliers = found
     if essential is None or essential.shape != (3, 3):
         return np.eye(3), ahead, flow
     _, rotation, shift, _ = cv2.recoverPose(essential, pixels, moved, camera.matrix, mask=inliers)

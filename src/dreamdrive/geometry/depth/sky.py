@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
@@ -35,7 +35,9 @@ def sky_mask(
     grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
     lab_b = cv2.cvtColor(frame, cv2.COLOR_RGB2LAB)[..., 2]
     blurred = cv2.GaussianBlur(grey, (0, 0), 0.7).astype(np.float32)
-    smooth = gradient(blurred) < _GRADIENT
+    # Central differences with Sobel's weights, in grey levels a pixel.
+    dx, dy = (cv2.Sobel(blurred, cv2.CV_32F, *way, ksize=3, scale=0.125) for way in ((1, 0), (0, 1)))
+    smooth = cv2.magnitude(dx, dy) < _GRADIENT
     coloured = ((lab_b < _BLUE_B) & (grey > _BLUE_GREY)) | (grey > _BRIGHT_GREY)
     candidate = (above & usable & smooth & coloured).astype(np.uint8)
     _, labels = cv2.connectedComponents(candidate, connectivity=4)
@@ -47,10 +49,3 @@ def sky_mask(
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
     return (closed > 0) & above & usable
-
-
-def gradient(grey: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
-    """Gradient magnitude in grey levels a pixel (central differences, Sobel weights)."""
-    dx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
-    dy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    return cv2.magnitude(dx, dy)

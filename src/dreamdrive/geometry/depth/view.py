@@ -30,33 +30,21 @@ def unheard() -> None:
 
 @dataclass(frozen=True)
 class View:
-    """Posed frames; a held-out frame is blank here, so that no dense step can see it.
-
-    Attributes:
-        rgb: Frames (F, H, W, 3).
-        grey: The same in grey levels, float32 (F, H, W).
-        usable: Pixels that show the street (F, H, W).
-        used: Frames that may be looked at (F,).
-        cameras: One posed pinhole a frame.
-        plane_inverse: Inverse depth of the road plane (F, H, W) in 1/m; 0 above the horizon or without one.
-        ground: The road plane, where found.
-        options: Of depth and of what moves.
-        tell: Called for each frame of each pass over the frames.
-    """
+    """Posed frames; a held-out frame is blank here, so that no dense step can see it."""
 
     rgb: UInt8[np.ndarray, "f h w 3"]
-    grey: Float[np.ndarray, "f h w"]
-    usable: Bool[np.ndarray, "f h w"]
-    used: Bool[np.ndarray, " f"]
-    cameras: tuple[Camera, ...]
-    plane_inverse: Float[np.ndarray, "f h w"]
+    grey: Float[np.ndarray, "f h w"]  # grey levels, float32
+    usable: Bool[np.ndarray, "f h w"]  # pixels that show the street
+    used: Bool[np.ndarray, " f"]  # frames that may be looked at
+    cameras: tuple[Camera, ...]  # one posed pinhole a frame
+    plane_inverse: Float[np.ndarray, "f h w"]  # of the road, in 1/m; 0 above the horizon or without a plane
     ground: Ground | None
-    options: GeometryOptions
-    tell: Tell = unheard
+    options: GeometryOptions  # of depth and of what moves
+    tell: Tell = unheard  # called for each frame of each pass over the frames
 
     @property
     def positions_m(self) -> Float[np.ndarray, "f 3"]:
-        """Camera centres (F, 3)."""
+        """Camera centres."""
         return np.array([camera.world_from_camera[:3, 3] for camera in self.cameras])
 
     @property

@@ -17,12 +17,10 @@ MASK_MARGIN_PX = 4
 class Features:
     """SIFT features of one frame.
 
-    Attributes:
-        keypoints_px: Positions (N, 2), pixel centres at +0.5.
-        descriptors: RootSIFT (N, 128) as COLMAP stores it: square root of the L1-normalised vector times 512.
+    Descriptors are RootSIFT as COLMAP stores it: square root of the L1-normalised vector times 512.
     """
 
-    keypoints_px: Float[np.ndarray, "n 2"]
+    keypoints_px: Float[np.ndarray, "n 2"]  # pixel centres at +0.5
     descriptors: UInt8[np.ndarray, "n 128"]
 
 

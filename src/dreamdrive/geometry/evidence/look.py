@@ -16,25 +16,15 @@ from dreamdrive.scene.clip import Clip
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the pictures show before any geometry.
+    """What the pictures show before any geometry."""
 
-    Attributes:
-        grey: Frames at 320 px width.
-        street: Pixels that belong to the street, at that size.
-        small: Pinhole of that size.
-        working: Pinhole of the size at which features are sought.
-        motion: Whether the camera moves.
-        fixed: Regions fixed to the camera, at the clip's size.
-        detected: Sentences for the report.
-    """
-
-    grey: UInt8[np.ndarray, "f h w"]
-    street: Bool[np.ndarray, "f h w"]
-    small: Camera
-    working: Camera
+    grey: UInt8[np.ndarray, "f h w"]  # at 320 px width
+    street: Bool[np.ndarray, "f h w"]  # pixels that belong to the street, at that size
+    small: Camera  # pinhole of that size
+    working: Camera  # pinhole of the size at which features are sought
     motion: Motion
-    fixed: Fixed
-    detected: tuple[str, ...]
+    fixed: Fixed  # to the camera, at the clip's size
+    detected: tuple[str, ...]  # sentences for the report
 
 
 def look(clip: Clip) -> Evidence:

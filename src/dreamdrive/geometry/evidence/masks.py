@@ -73,10 +73,9 @@ def find_fixed(
         if (regions > 0).mean() > 0.5:
             regions[:], objects[:] = 0, False
     regions[bars] = 3
-    names = tuple(name for code, name in enumerate((BONNET, OVERLAY, BAR), 1) if (regions == code).any())
-    renumbered = np.zeros_like(regions)
-    for index, name in enumerate(names, 1):
-        renumbered[regions == (BONNET, OVERLAY, BAR).index(name) + 1] = index
+    codes = np.unique(regions[regions > 0])
+    names = tuple((BONNET, OVERLAY, BAR)[code - 1] for code in codes.tolist())
+    renumbered = np.searchsorted(codes, regions, side="right").astype(np.uint8)
     maps = renumbered, objects.astype(np.uint8)
     resized, kept = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in maps)
     return Fixed(resized.astype(np.int32), names, kept > 0)

@@ -15,7 +15,7 @@ from dreamdrive.scene.windows import window_px
 ROWS, COLUMNS = (0.62, 0.97), (0.25, 0.75)
 HEIGHTS = 56
 RANGE_STEPS = (0.08, 12.0)
-REFERENCES, NEIGHBOURS = 7, 3
+REFERENCES = 7
 MIN_TEXTURE = 2.0
 NOISE = 2.0
 MIN_PEAK = 0.05
@@ -153,7 +153,7 @@ def _pairs(poses: np.ndarray, typical: float) -> list[Pair]:
     pairs: list[Pair] = []
     for reference in np.unique(np.linspace(0, count - 1, min(REFERENCES, count)).round().astype(int)):
         apart = np.linalg.norm(centres - centres[reference], axis=1)
-        for wanted in (1.0, 2.0, 3.0)[:NEIGHBOURS]:
+        for wanted in (1.0, 2.0, 3.0):
             source = int(np.argmin(np.abs(apart - wanted * typical)))
             if source != reference and apart[source] > 0.3 * typical:
                 pairs.append(Pair(int(reference), source))

@@ -24,25 +24,15 @@ GIVEN_SPREAD, USUAL_SPREAD, FOCAL_SPREAD, SPEED_SPREAD = 0.03, 0.15, 0.35, 0.6
 
 @dataclass(frozen=True)
 class Street:
-    """A clip with poses, in which the road is looked for.
+    """A clip with poses, in which the road is looked for."""
 
-    Attributes:
-        grey: Frames at 320 px width.
-        usable: Pixels that belong to the street.
-        camera: Pinhole at that size.
-        world_from_camera: Poses (F, 4, 4), the first the identity.
-        points: Sparse points (P, 3) in the same units.
-        times_s: Times (F,).
-        asked_m_s: Speed of the path that the frames were asked to follow, where they were generated for one.
-    """
-
-    grey: UInt8[np.ndarray, "f h w"]
-    usable: Bool[np.ndarray, "f h w"]
-    camera: Camera
-    world_from_camera: Float[np.ndarray, "f 4 4"]
-    points: Float[np.ndarray, "p 3"]
+    grey: UInt8[np.ndarray, "f h w"]  # at 320 px width
+    usable: Bool[np.ndarray, "f h w"]  # pixels that belong to the street
+    camera: Camera  # at that size
+    world_from_camera: Float[np.ndarray, "f 4 4"]  # the first the identity
+    points: Float[np.ndarray, "p 3"]  # sparse ones, in the same units
     times_s: Float[np.ndarray, " f"]
-    asked_m_s: float | None = None
+    asked_m_s: float | None = None  # speed of the path that generated frames were asked to follow
 
     @staticmethod
     def of(
@@ -60,19 +50,12 @@ class Street:
 
 @dataclass(frozen=True)
 class Metric:
-    """How to get to metres.
+    """How to get to metres."""
 
-    Attributes:
-        factor: Metres per unit of the poses.
-        ground: The road in metres, where found.
-        scale: What fixed the scale.
-        notes: What went wrong, a sentence each.
-    """
-
-    factor: float
-    ground: Ground | None
+    factor: float  # metres per unit of the poses
+    ground: Ground | None  # in metres
     scale: Scale
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what went wrong, a sentence each
 
 
 def find_ground(
@@ -104,16 +87,16 @@ def from_ground(street: Street, height_m: float | None, focal_spread: float, see
     plane, how = find_ground(street, seed)
     if plane is None:
         return _from_speed(street, "no road plane was found")
-    wanted = USUAL_HEIGHT_M if height_m is None else height_m
-    factor = wanted / plane.height
-    speed = median_speed(street) * factor
+    found = _by_plane(plane, how, height_m, focal_spread)
+    speed = median_speed(street) * found.factor
     if not SPEEDS_M_S[0] <= speed <= SPEEDS_M_S[1]:
         problem = f"the road plane that was found implies {speed:.1f} m/s, which no car drives"
         return _from_speed(street, problem)
-    return _by_plane(plane, how, factor, height_m, focal_spread)
+    return found
 
 
-def _by_plane(plane: Plane, how: str, factor: float, height_m: float | None, focal_spread: float) -> Metric:
+def _by_plane(plane: Plane, how: str, height_m: float | None, focal_spread: float) -> Metric:
+    factor = (USUAL_HEIGHT_M if height_m is None else height_m) / plane.height
     terms = plane.spread, USUAL_SPREAD if height_m is None else GIVEN_SPREAD, focal_spread
     source = f"ground plane ({how}), {height_words(height_m)}"
     found = Scale(source, float(np.linalg.norm(terms)), basis=height_basis(height_m))
@@ -130,10 +113,8 @@ def from_road_points(street: Street, height_m: float | None, focal_spread: float
     plane = fit_points(street.points, street.world_from_camera, seed)
     if plane is None or plane.support < MIN_INLIERS or plane.share < MIN_SHARE:
         return None
-    factor = (USUAL_HEIGHT_M if height_m is None else height_m) / plane.height
-    if median_speed(street) * factor > SPEEDS_M_S[1]:
-        return None
-    return _by_plane(plane, "points", factor, height_m, focal_spread)
+    found = _by_plane(plane, "points", height_m, focal_spread)
+    return None if median_speed(street) * found.factor > SPEEDS_M_S[1] else found
 
 
 def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:

@@ -53,14 +53,10 @@ def _of_graph(frames: int, graph: str) -> list[Pair]:
     if count < 1:
         raise InputError(f"graph {graph!r}: the window has to be at least 1")
     steps = [1 + i if window == "swin" else 2**i for i in range(count)]
-    return _within(frames, steps, cyclic=noncyclic is None)
-
-
-def _within(frames: int, steps: list[int], *, cyclic: bool) -> list[Pair]:
     found = {
         (min(i, j), max(i, j))
         for i in range(frames)
-        for j in ((i + step) % frames if cyclic else i + step for step in steps)
+        for j in (i + step if noncyclic else (i + step) % frames for step in steps)
         if i != j and j < frames
     }
     return sorted(found)

@@ -79,9 +79,7 @@ def _seen(clip: Clip, weights: Path, progress: Progress) -> tuple[PairMaps, Fitt
 def planned_pairs(network: Dust3r, frames: int, size: tuple[int, int]) -> Int[np.ndarray, "e 2"]:
     """Pairs of frames: those of ``video_graph``, or of narrower windows where they would not fit.
 
-    Raises:
-        InputError: Not even pairs of close neighbours fit into the memory allowed, through the network or in
-            the alignment.
+    They have to fit into the memory allowed through the network and in the alignment.
     """
     sizes = [(size[1], size[0])] * frames
     refused: InputError | None = None

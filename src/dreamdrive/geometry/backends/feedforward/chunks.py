@@ -89,8 +89,8 @@ def _onto(
     (target, target_depth, target_rank), (source, source_depth, source_rank) = (
         _part(part, shared, camera) for part in (before, after)
     )
-    weights = target_rank * source_rank
-    counts = (weights > 0) & usable[shared.start : shared.stop, :: _stride(camera), :: _stride(camera)]
+    weights, stride = target_rank * source_rank, _stride(camera)
+    counts = (weights > 0) & usable[shared.start : shared.stop, ::stride, ::stride]
     if not counts.any():
         raise InputError(
             f"frames {shared.start} to {shared.stop - 1}: two chunks see nothing in common there"
@@ -101,7 +101,7 @@ def _onto(
     rotation = nearest_rotation(turns.sum(axis=0))
     translation = np.median(target[:, :3, 3] - scale * source[:, :3, 3] @ rotation.T, axis=0)
     found = Similarity(scale, rotation, translation)
-    rays = camera.rays()[:: _stride(camera), :: _stride(camera)]
+    rays = camera.rays()[::stride, ::stride]
     distance = found(_points(source, source_depth, rays)) - _points(target, target_depth, rays)
     return found, float(np.median(np.linalg.norm(distance, axis=-1)[counts] / target_depth[counts]))
 

@@ -24,48 +24,28 @@ _SURE_STEP = 0.5  # of the way between paired images, by which a pair's own came
 class Aligned:
     """Cameras and depth of all images in one world.
 
-    Without known poses the world is the camera of image 0 and the unit is free; pixels are counted as in
-    :class:`PairMaps`.
-
-    Attributes:
-        world_from_camera: Poses (N, 4, 4).
-        focals_px: Focal lengths (N,).
-        depth: Depth along z (H, W) of each image, positive, in the unit of the poses.
-        pairs: Similarity from each pair's first camera, in the pair's own unit, to the world.
-        confidence: The greatest confidence (H, W) that an edge gave each pixel; 1 is masked out.
-        loss: Of the objective that was solved, over all pixels, in the unit in which the pairs' scales
-            average 0.5.
-        losses: Over the solver's samples, before each of its last steps and at the end.
-        focal_error: Standard deviation of the focal lengths, relative; 0 where they are known, 0.05 or more
-            where nothing but the network speaks for them.
-        network_focal_px: Median over edges of what pointmaps speak for.
-        focal_spread: Robust standard deviation over edges of the focal lengths that pointmaps speak for,
-            relative.
-        pair_spread: Median distance between where a pair has its first camera and where that ended, in units
-            of the median distance between paired cameras.
-        residual: Median relative miss (E,) of each pair's points.
-        masked_share: Share of the pixels (N,) that no edge weighs.
-        focal_observed: The focal lengths are known, or the turns of the camera show them.
-        focal_agreed: The pointmaps agree on one.
-        path_observed: The cameras move by more than pairs disagree; if not, the path is not to be believed.
+    Without known poses the world is the camera of image 0 and the unit is free. Where nothing but the network
+    speaks for the focal lengths, their error is 0.05 or more. The spread of pairs is the median distance
+    between where a pair has its first camera and where that ended, in units of the median distance between
+    paired cameras.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focals_px: Float[np.ndarray, " n"]
-    depth: tuple[Float[np.ndarray, "_ _"], ...]
-    pairs: tuple[Similarity, ...]
-    confidence: tuple[Float[np.ndarray, "_ _"], ...]
-    loss: float
-    losses: tuple[float, ...]
-    focal_error: float
-    network_focal_px: float
-    focal_spread: float
+    depth: tuple[Float[np.ndarray, "_ _"], ...]  # along z, positive, in the unit of the poses
+    pairs: tuple[Similarity, ...]  # from each pair's first camera, in the pair's own unit, to the world
+    confidence: tuple[Float[np.ndarray, "_ _"], ...]  # the greatest that an edge gave; 1 is masked out
+    loss: float  # of the objective, over all pixels, in the unit in which the pairs' scales average 0.5
+    losses: tuple[float, ...]  # over the solver's samples, before each of its last steps and at the end
+    focal_error: float  # standard deviation of the focal lengths, relative; 0 where they are known
+    network_focal_px: float  # median over edges of what pointmaps speak for
+    focal_spread: float  # robust standard deviation of that over edges, relative
     pair_spread: float
-    residual: Float[np.ndarray, " e"]
-    masked_share: Float[np.ndarray, " n"]
-    focal_observed: bool
-    focal_agreed: bool
-    path_observed: bool
+    residual: Float[np.ndarray, " e"]  # median relative miss of each pair's points
+    masked_share: Float[np.ndarray, " n"]  # of the pixels, that no edge weighs
+    focal_observed: bool  # the focal lengths are known, or the turns of the camera show them
+    focal_agreed: bool  # the pointmaps agree on one
+    path_observed: bool  # the cameras move by more than pairs disagree; else the path is not to be believed
 
 
 @dataclass(frozen=True)

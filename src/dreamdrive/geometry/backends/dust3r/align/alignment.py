@@ -62,10 +62,8 @@ class AlignOptions:
 class Known:
     """What need not be found.
 
-    Attributes:
-        intrinsics: Pinhole of each image (N, 3, 3), pixels counted from 0; None leaves the focal lengths to
-            be found and has the principal points in the middle, (W/2, H/2).
-        world_from_camera: Poses (N, 4, 4), or None. The scene then is given in their world and unit.
+    Without pinholes, whose pixels count from 0, the focal lengths are found and the principal points in the
+    middle, (W/2, H/2). With poses the scene is given in their world and unit.
     """
 
     intrinsics: Float[np.ndarray, "n 3 3"] | None = None
@@ -81,14 +79,8 @@ def align(
     """Bring pairwise pointmaps into one world.
 
     Without known poses the world is the camera of image 0, in a unit in which the scales of the pairs have a
-    geometric mean of 0.5. Confidences of exactly 1 mask pixels out.
-
-    Args:
-        maps: Pairs that link all images, directed.
-        options: None are the defaults.
-        known: Pinholes or poses to keep.
-        still: Pixels (H, W) of each image that cameras and pairs are solved with; the depth is that of all.
-            None solves with all.
+    geometric mean of 0.5. Confidences of exactly 1 mask pixels out. Cameras and pairs are solved with the
+    ``still`` pixels of each image, all where none are given; the depth is that of all.
 
     Raises:
         InputError: The pairs or what is known cannot be used, or memory would not do.
@@ -133,11 +125,7 @@ def check_memory(
     options: AlignOptions,
     storage_bytes: int = 4,
 ) -> None:
-    """Refuse an alignment that would not fit, before it starts.
-
-    Raises:
-        InputError: ``predicted_bytes`` is above what the options allow.
-    """
+    """Refuse an alignment that would not fit, before it starts."""
     predicted = predicted_bytes(sizes, edges, options.samples_per_image, storage_bytes)
     if predicted > int(options.memory_gb * 1e9):
         raise InputError(

@@ -93,11 +93,7 @@ def robust_px(
     Weiszfeld's result from 36 px to 10. Here the weighted median of the radial votes p·q / q·q, each weighing
     as much as its distance from the principal point, starts steps with Tukey's weights, which end at zero.
 
-    Args:
-        points: Pointmap (H, W, 3) in the frame of its own camera.
-        confidence: At least 1 (H, W); 1 masks a pixel out. None weighs all alike.
-        principal_px: Of the camera.
-        stretch: fx / fy.
+    A confidence of 1 masks a pixel out; none weighs all alike. The stretch is fx / fy.
     """
     p, q = _pixels_and_slopes(points, principal_px, stretch)
     pq, qq = (p * q).sum(axis=1), (q * q).sum(axis=1)

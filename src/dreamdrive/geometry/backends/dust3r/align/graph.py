@@ -23,21 +23,16 @@ class Half:
 
 @dataclass(frozen=True)
 class Graph:
-    """Images and the halves of edges that speak of them.
+    """Images and the halves of edges that hold pointmaps of them.
 
-    Attributes:
-        sizes: Height and width of each image.
-        halves: For each image the halves of edges that hold a pointmap of it.
-        principal_px: Column and row (N, 2) of the principal points, pixels counted from 0.
-        stretch: fx / fy (N,); rows times it have the focal length of columns.
-        lateral: Factor (E,) on x and y of an edge's points that gives its first pointmap the focal length to
-            be used; 1 leaves them as they are.
+    The ``lateral`` factor on x and y of an edge's points gives its first pointmap the focal length to be
+    used; 1 leaves them as they are.
     """
 
-    sizes: tuple[tuple[int, int], ...]
+    sizes: tuple[tuple[int, int], ...]  # height and width
     halves: tuple[tuple[Half, ...], ...]
-    principal_px: Float[np.ndarray, "n 2"]
-    stretch: Float[np.ndarray, " n"]
+    principal_px: Float[np.ndarray, "n 2"]  # column and row, pixels counted from 0
+    stretch: Float[np.ndarray, " n"]  # fx / fy; rows times it have the focal length of columns
     lateral: Float[np.ndarray, " e"]
 
     def __len__(self) -> int:

@@ -62,9 +62,6 @@ def register(
     """Minimise sum w |s R x + t - y|^2 over points x and y (Umeyama 1991, weighted), in float64; w >= 0.
 
     In each robust step a point weighs w / |s R x + t - y|; their limit minimises sum w |s R x + t - y|.
-
-    Raises:
-        ValueError: Fewer than three points weigh anything.
     """
     counts = weights > 0
     if np.count_nonzero(counts) < 3:

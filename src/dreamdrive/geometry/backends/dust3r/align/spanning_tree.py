@@ -24,19 +24,12 @@ _NEAREST = 0.01  # quantile of the valid depths that replaces those behind the c
 
 @dataclass(frozen=True)
 class Start:
-    """Where an alignment begins. The world is any; the scales of the pairs have a geometric mean of 0.5.
-
-    Attributes:
-        world_from_camera: Poses (N, 4, 4).
-        focals_px: Focal length (N,) of each image.
-        depth: Depth along z (H, W) of each image, positive.
-        pairs: Similarity of each edge from its first camera's frame to the world.
-    """
+    """Where an alignment begins. The world is any; the scales of the pairs have a geometric mean of 0.5."""
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
     focals_px: Float[np.ndarray, " n"]
-    depth: tuple[Float[np.ndarray, "_ _"], ...]
-    pairs: tuple[Similarity, ...]
+    depth: tuple[Float[np.ndarray, "_ _"], ...]  # along z, positive
+    pairs: tuple[Similarity, ...]  # from the frame of each edge's first camera to the world
 
 
 def spanning_tree(

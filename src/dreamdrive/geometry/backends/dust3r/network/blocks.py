@@ -138,10 +138,3 @@ def _attend(
     q: Float[Tensor, "b heads n c"], k: Float[Tensor, "b heads m c"], v: Float[Tensor, "b heads m c"]
 ) -> Float[Tensor, "b n d"]:
     return functional.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2)
-
-
-def lower(module: nn.Module) -> None:
-    """Turn the linear layers inside a module to bfloat16, in place; norms stay float32."""
-    for part in module.modules():
-        if isinstance(part, Linear):
-            part.to(torch.bfloat16)

@@ -33,12 +33,10 @@ _UNUSED = re.compile(
 
 
 def load_dust3r(path: Path, *, bfloat16: bool = False) -> Dust3r:
-    """Load a network for inference.
+    """Load a network from a ``.pth``; a ``.safetensors`` with ``config.json`` beside it; or their folder.
 
-    Args:
-        path: A ``.pth``; a ``.safetensors`` with ``config.json`` beside it; or the folder of these two.
-            Nothing in a file is executed.
-        bfloat16: Whether encoder and decoders compute in bfloat16, in half the memory; the heads never do.
+    Nothing in a file is executed. With ``bfloat16`` encoder and decoders compute in half the memory; the
+    heads never do.
 
     Raises:
         InputError: A file is missing, damaged or unsafe, or it holds another model.

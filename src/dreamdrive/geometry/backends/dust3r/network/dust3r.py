@@ -14,11 +14,10 @@ from dreamdrive.geometry.backends.dust3r.network.blocks import (
     Linear,
     Rotation,
     grid_positions,
-    lower,
     rotation,
 )
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
-from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap, make_head, pointmap
+from dreamdrive.geometry.backends.dust3r.network.heads import DptHead, LinearHead, Pointmap, pointmap
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,8 @@ class Dust3r(nn.Module):
         self.dec_blocks = _decoder(config)
         self.dec_blocks2 = _decoder(config)
         self.dec_norm = nn.LayerNorm(config.dec_dim, eps=NORM_EPS)
-        self.downstream_head1 = make_head(config)
-        self.downstream_head2 = make_head(config)
+        head = DptHead if config.head == "dpt" else LinearHead
+        self.downstream_head1, self.downstream_head2 = head(config), head(config)
 
     def forward(
         self, first: Float[Tensor, "b 3 h w"], second: Float[Tensor, "b 3 u v"]
@@ -61,11 +60,7 @@ class Dust3r(nn.Module):
         return self.decode(self.encode(first), self.encode(second))
 
     def encode(self, images: Float[Tensor, "b 3 h w"]) -> Tokens:
-        """Encode images in [-1, 1], one by one: a frame's tokens serve all its pairs.
-
-        Raises:
-            ValueError: A side is no multiple of the patch.
-        """
+        """Encode images in [-1, 1], one by one: a frame's tokens serve all its pairs."""
         (height, width), patch = images.shape[-2:], self.config.patch
         if height % patch or width % patch:
             raise ValueError(f"images are {width}x{height} px; both sides must be multiples of {patch}")
@@ -99,9 +94,11 @@ class Dust3r(nn.Module):
         return taps, other_taps
 
     def lower_trunk(self) -> None:
-        """Turn the linear layers of encoder and decoders to bfloat16, in place; the heads stay float32."""
+        """Turn the linear layers of encoder and decoders to bfloat16, in place, but no norms or heads."""
         for part in (self.enc_blocks, self.decoder_embed, self.dec_blocks, self.dec_blocks2):
-            lower(part)
+            for layer in part.modules():
+                if isinstance(layer, Linear):
+                    layer.to(torch.bfloat16)
 
     def _rotation(self, tokens: Tokens, head_dim: int) -> Rotation:
         positions = grid_positions(tokens.rows, tokens.columns, tokens.values.device)

@@ -135,11 +135,6 @@ class ResidualUnit(nn.Module):
         return x + self.conv2(functional.relu(self.conv1(functional.relu(x))))
 
 
-def make_head(config: NetworkConfig) -> LinearHead | DptHead:
-    """The head a configuration names."""
-    return DptHead(config) if config.head == "dpt" else LinearHead(config)
-
-
 def pointmap(raw: Float[Tensor, "b 4 h w"], config: NetworkConfig) -> Pointmap:
     """Points and confidences from the raw channels of a head."""
     last = raw.permute(0, 2, 3, 1)

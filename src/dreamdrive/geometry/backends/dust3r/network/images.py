@@ -20,12 +20,7 @@ _MULTIPLE = 16
 
 
 def fitting(width_px: int, height_px: int, size: int = 512) -> Fitting:
-    """How frames of a size are brought to that of the network.
-
-    Args:
-        width_px: Width of the frame.
-        height_px: Height of the frame.
-        size: Length of the long side, or 224 for squares.
+    """How frames are brought to the size of the network: the length of the long side, or 224 for squares.
 
     Raises:
         InputError: Nothing would be left of one side, or a side would be no multiple of 16.

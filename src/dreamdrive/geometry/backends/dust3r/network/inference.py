@@ -32,14 +32,10 @@ def infer(
     budget_bytes: int = BUDGET_BYTES,
     progress: Progress = silent,
 ) -> PairMaps:
-    """Points and confidences of all pairs; each frame is encoded once.
+    """Points and confidences of all pairs of pictures, RGB, whose shapes may differ; each is encoded once.
 
-    Args:
-        network: The network.
-        pictures: Frames as ``fitting.prepare`` makes them, RGB; shapes may differ.
-        edges: Pairs of indices of pictures.
-        budget_bytes: Memory that may be taken, the weights included.
-        progress: Told after each batch of the frames and pairs done, of all of them.
+    Memory may be taken up to the budget, the weights included. Progress is told after each batch of the
+    frames and pairs done, of all of them.
 
     Raises:
         InputError: Not even one pair at a time fits into the memory allowed.

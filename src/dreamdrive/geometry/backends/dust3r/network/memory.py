@@ -57,8 +57,7 @@ def plan_memory(
 ) -> MemoryPlan:
     """What the inference on pairs of frames will take, in batches as large as the budget allows.
 
-    Raises:
-        InputError: Not even one pair at a time fits.
+    Where not even one pair at a time fits it is refused.
     """
     config = network.config
     used = {int(i): sizes[int(i)] for i in edges.flatten()}
