@@ -66,14 +66,14 @@ def _agreement(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """By shift the squared error where the box may be; and that of its own pixels, with their number."""
     scene, truth = before.scene, before.truth
-    own = gaussians_of(scene, before.views[frame], truth, frame, instance, moving=dynamic)
-    if own is None:
+    found = gaussians_of(scene, before.views[frame], truth, frame, instance, moving=dynamic)
+    if found is None:
         return None
+    shown, own, _ = found
     here, there = brought(before), brought(after)
     camera = to_scene(_from_scene(after.views[frame], there), here)
     camera = before.views[frame].at(camera.world_from_camera)
     way = here.rotation.T @ along / here.scale
-    shown = scene.at(float(scene.times_s[frame]))
     pictures, covers = zip(
         *(_moved_picture(scene, shown, own, m * way, camera) for m in SHIFTS_M), strict=True
     )

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dreamdrive.cli.actions import EXAMPLES, parse_action
+from dreamdrive.cli.arguments import EXAMPLES, parse_action
 from dreamdrive.errors import InputError
 from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
 

@@ -111,7 +111,7 @@ def test_the_doctor_says_what_is_there(run: Run) -> None:
 def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("dreamdrive.run", "dreamdrive.run.report"):
         monkeypatch.setattr(f"{module}.PACKAGES", ("torch", "not-installed-package"))
-    monkeypatch.setattr("dreamdrive.cli.doctor.available_memory_mb", lambda: 500)
+    monkeypatch.setattr("dreamdrive.cli.doctor.free_bytes", lambda: 500_000_000)
     result = run("doctor")
     assert result.code == 2
     assert "missing: less than 3 GB of memory is free" in result.out

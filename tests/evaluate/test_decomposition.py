@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.streets import street_clip, true_geometry
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition
-from dreamdrive.evaluate.true_labels import true_labels
+from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition, true_labels
 from dreamdrive.evaluate.truth import Truth
 from dreamdrive.fit import SeedOptions, initialise
 from dreamdrive.motion import (

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from dreamdrive.errors import InputError
-from dreamdrive.models.hub import cache, find_weights
+from dreamdrive.models.weights import cache, find_weights
 
 NAME, COMMIT = "naver/DUSt3R_ViTLarge_BaseDecoder_512_dpt", "ab12"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from dreamdrive.cli.actions import EXAMPLES, parse_action
+from dreamdrive.cli.arguments import EXAMPLES, parse_action
 from dreamdrive.data.intrinsics import read_intrinsics
 from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.poses import of_frames, read_pose_file, read_trajectory, write_trajectory

@@ -7,14 +7,15 @@ from rich.console import Console
 from rich.table import Table
 
 from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
-from dreamdrive.cli.machine import available_cores, available_memory_mb, use_all_cores
+from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.errors import InputError
+from dreamdrive.machine import available_cores, free_bytes
 
 if TYPE_CHECKING:
     from dreamdrive.data import DataSet
     from dreamdrive.models import Backend
 
-_NEEDED_MB = 3000
+_NEEDED_BYTES = 3e9
 """Free memory with which 24 frames at 480x270 fit."""
 
 
@@ -34,12 +35,12 @@ def doctor() -> None:
     ]
     native, trouble = _native()
     table.add_row("native core", native)
-    memory_mb = available_memory_mb()
+    free = free_bytes()
     table.add_row("cores", str(available_cores()))
-    table.add_row("free memory", "unknown" if memory_mb is None else f"{memory_mb / 1000:.1f} GB")
-    if memory_mb is not None and memory_mb < _NEEDED_MB:
+    table.add_row("free memory", "unknown" if free is None else f"{free / 1e9:.1f} GB")
+    if free is not None and free < _NEEDED_BYTES:
         missing.append(
-            f"less than {_NEEDED_MB / 1000:.0f} GB of memory is free: use fewer frames or a smaller --size"
+            f"less than {_NEEDED_BYTES / 1e9:.0f} GB of memory is free: use fewer frames or a smaller --size"
         )
     table.add_row("GPU", _gpu())
     console = Console()

@@ -1,6 +1,5 @@
 """``dreamdrive evaluate consistency``: whether a video keeps to its path and shows one and the same world."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,7 +47,7 @@ def consistency(
     for note in figures.notes:
         console.print(note, soft_wrap=True, highlight=False)
     if json is not None:
-        write_json(json, asdict(figures))
+        write_json(json, figures)
         console.print(f"{json}", soft_wrap=True)
 
 

@@ -1,6 +1,5 @@
 """``dreamdrive evaluate decomposition``: how well a scene tells what moves, against the world it is of."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,11 +9,9 @@ from tyro.conf import Positional, arg
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.cli.tables import fixed, print_table, write_json
-from dreamdrive.errors import InputError
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate import Decomposition, Truth
-    from dreamdrive.scene.scene import Scene
+    from dreamdrive.evaluate import Decomposition
 
 
 def decomposition(
@@ -31,55 +28,25 @@ def decomposition(
         json: Write the figures to this file as well.
     """
     use_all_cores()
-    from dreamdrive.evaluate import evaluate_decomposition
+    from dreamdrive.evaluate import evaluate_decomposition, read_truth
 
     scene = open_scene(out)
     console = Console()
     with console.status("drawing the truth and looking at the scene"):
-        figures = evaluate_decomposition(scene, _truth(scene, world))
+        figures = evaluate_decomposition(scene, read_truth(scene, world))
     title = f"{figures.frames} frames, {figures.width_px} px wide"
     print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     if json is not None:
-        write_json(json, asdict(figures))
+        write_json(json, figures)
         console.print(f"{json}", soft_wrap=True)
-
-
-def _truth(scene: "Scene", world: Path) -> "Truth":
-    """The truth of the scene's frames."""
-    from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.evaluate import Truth
-    from dreamdrive.world import drive, read_world
-
-    if not world.exists():
-        raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")
-    index = [int(i) for i in scene.provenance.source_index or range(len(scene.cameras))]
-    if world.is_dir():
-        made = read_world(world)
-    else:
-        size = (scene.cameras[0].width_px, scene.cameras[0].height_px)
-        made = drive(read_layout(world), max(index) + 1, _rate_hz(scene, index), size)
-    if max(index) >= len(made.frames):
-        raise InputError(
-            f"{world} has {len(made.frames)} frames but the scene shows frame {max(index)}; "
-            "give the world that the scene was made from"
-        )
-    return Truth.of(made, index)
-
-
-def _rate_hz(scene: "Scene", index: list[int]) -> float:
-    """Frames of the source in a second; of a single frame there is no other."""
-    span_s = float(scene.times_s[-1] - scene.times_s[0])
-    return (index[-1] - index[0]) / span_s if span_s > 0 else 10.0
 
 
 def _rows(figures: "Decomposition") -> list[tuple[str, str, str]]:
     """The figures with their units, one a row; a dash for what has no meaning."""
     rows: list[tuple[str, str, str]] = []
-    for name, found, of in (
-        ("pixels", figures.mask, "moving ones"),
-        ("Gaussians", figures.labels, "moving ones"),
-    ):
-        rows.append((f"{name}: IoU", fixed(found.iou, 3), f"{found.true} of {found.count} are {of}"))
+    for name, found in (("pixels", figures.mask), ("Gaussians", figures.labels)):
+        counts = f"{found.true} of {found.count} are moving ones"
+        rows.append((f"{name}: IoU", fixed(found.iou, 3), counts))
         rows.append((f"{name}: precision", fixed(found.precision, 3), ""))
         rows.append((f"{name}: recall", fixed(found.recall, 3), ""))
         rows.append((f"{name}: average precision", fixed(found.average_precision, 3), ""))

@@ -9,10 +9,9 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName, Stage
+from dreamdrive.cli.arguments import DataSetName, GeometryName, PriorName, parse_action, parse_size
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
-from dreamdrive.cli.names import DataSetName, GeometryName, PriorName
 from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.sizes import parse_size
 
 if TYPE_CHECKING:
     from dreamdrive.run import Outcome
@@ -102,7 +101,6 @@ def generate(
         strict: Exit with code 3 where the result is rough; it is kept.
     """
     use_all_cores()
-    from dreamdrive.cli.actions import parse_action
     from dreamdrive.options import QUALITIES, with_method
     from dreamdrive.pipeline import generate as run
     from dreamdrive.run import read_options

@@ -4,13 +4,7 @@ import os
 import signal
 from types import FrameType
 
-from dreamdrive.machine import available_cores, free_bytes
-
-
-def available_memory_mb() -> int | None:
-    """Memory that is free for use, in megabytes; None where the system does not tell."""
-    free = free_bytes()
-    return None if free is None else free // 1_000_000
+from dreamdrive.machine import available_cores
 
 
 def use_all_cores() -> None:

@@ -9,13 +9,13 @@ from rich.console import Console
 from rich.logging import RichHandler
 
 import dreamdrive
+from dreamdrive.cli.arguments import REGISTRY
 from dreamdrive.cli.clean import clean
 from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.machine import Terminated
-from dreamdrive.cli.names import REGISTRY
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.world import world

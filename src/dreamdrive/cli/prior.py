@@ -1,16 +1,15 @@
 """``dreamdrive prior``: priors on their own."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from rich.console import Console
-from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg, subcommand
+from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
 from dreamdrive.choices import DeviceName, DtypeName
+from dreamdrive.cli.arguments import PriorName, commands_of, parse_action, parse_size
 from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.cli.names import PriorName
 from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
 
 
@@ -87,7 +86,6 @@ def sample(
         force: Replace a folder that is there already.
     """
     use_all_cores()
-    from dreamdrive.cli.actions import parse_action
     from dreamdrive.data.recording import rate_hz
     from dreamdrive.device import computing_on
     from dreamdrive.run import sample as run
@@ -167,7 +165,6 @@ def features(
     """
     use_all_cores()
     _check_packages()
-    from dreamdrive.cli.actions import parse_action
     from dreamdrive.device import computing_on
     from dreamdrive.run import clip_features
 
@@ -199,11 +196,7 @@ def _check_packages() -> None:
         raise InputError(missing)
 
 
-_Prior = (
-    Annotated[Any, subcommand("sample", constructor=sample)]
-    | Annotated[Any, subcommand("features", constructor=features)]
-    | Annotated[Any, subcommand("convert", constructor=convert)]
-)
+_Prior = commands_of({"sample": sample, "features": features, "convert": convert})
 
 
 def prior(what: Annotated[_Prior, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]

@@ -9,10 +9,10 @@ from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
 from dreamdrive.choices import Format, Show
+from dreamdrive.cli.arguments import parse_size
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
-from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
 
 

@@ -1,11 +1,9 @@
 """Figures on the terminal and on disk."""
 
-import json
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+import msgspec
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
@@ -44,17 +42,9 @@ def interval(low: float | None, high: float | None) -> str:
     return "-" if low is None or high is None else f"{number(low)} to {number(high)}"
 
 
-def write_json(path: Path, values: Mapping[str, Any]) -> None:
+def write_json(path: Path, values: object) -> None:
     """Write values as JSON, whole or not at all; a number that is not finite becomes null."""
+    # NumPy's numbers, which msgspec does not know, are floating-point ones.
+    text = msgspec.json.format(msgspec.json.encode(values, enc_hook=float), indent=2)
     with new_file(path) as partial:
-        partial.write_text(json.dumps(_plain(values), indent=2, allow_nan=False) + "\n")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType]
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+        partial.write_bytes(text + b"\n")

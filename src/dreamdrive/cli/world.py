@@ -3,14 +3,14 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.console import Console
-from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Suppress, arg, subcommand
+from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, arg
 
+from dreamdrive.cli.arguments import commands_of, parse_size
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.sizes import parse_size
 from dreamdrive.errors import InputError
 
 if TYPE_CHECKING:
@@ -118,8 +118,7 @@ def _check_memory(count: int, size: tuple[int, int], free: int | None) -> None:
         )
 
 
-# As tyro does for the commands themselves; a union needs a second member where there is one command only.
-_World = Annotated[Any, subcommand("make", constructor=make)] | Annotated[None, Suppress]
+_World = commands_of({"make": make})
 
 
 def world(what: Annotated[_World, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]

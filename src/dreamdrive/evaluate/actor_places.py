@@ -49,21 +49,14 @@ def offset_m(
     frame: int,
     instance: int,
     truth_from_scene: Similarity,
-    *,
-    moving: bool = True,
 ) -> Float[np.ndarray, "3"] | None:
-    """From the true place of a road user to the place where a scene shows it, in the world of the truth.
+    """From the true place of a moving road user to where a scene shows it, in the world of the truth.
 
     The place is the mean of the centres of its Gaussians, each weighing by how much of the picture it fills;
     the true place that of the true surface in the picture. So it matters little which side can be seen. On
-    each axis the outer tenths are left out. A moving one's Gaussians are the dynamic ones that fill its
-    pixels, or those within a metre beside it, more than others: one that is shown beside its true place, too,
-    is found. What stands has no Gaussians of its own; its are all that fill its pixels more than others. None
-    where it fills too little of the picture, or less than half of it is shown.
-
-    The camera is that of the frame at the size of the truth.
+    each axis the outer tenths are left out. The camera is that of the frame at the size of the truth.
     """
-    found = _fills(scene, camera, truth, frame, instance, moving=moving)
+    found = gaussians_of(scene, camera, truth, frame, instance)
     if found is None:
         return None
     shown, own, fills = found
@@ -74,16 +67,14 @@ def offset_m(
 
 def gaussians_of(
     scene: Scene, camera: Camera, truth: Truth, frame: int, instance: int, *, moving: bool = True
-) -> Bool[np.ndarray, " n"] | None:
-    """Which Gaussians of ``scene.at`` show a road user (N,); see ``offset_m`` for which do, and for None."""
-    found = _fills(scene, camera, truth, frame, instance, moving=moving)
-    return None if found is None else found[1]
-
-
-def _fills(
-    scene: Scene, camera: Camera, truth: Truth, frame: int, instance: int, *, moving: bool
 ) -> tuple[Gaussians, Bool[np.ndarray, " n"], Float[np.ndarray, " n"]] | None:
-    """The Gaussians in a frame, those that show a road user, and how many pixels each fills."""
+    """The Gaussians in a frame, those that show a road user, and how many pixels each fills.
+
+    A moving one's are the dynamic ones that fill its pixels, or those within a metre beside it, more than
+    others: one that is shown beside its true place, too, is found. What stands has no Gaussians of its own;
+    its are all that fill its pixels more than others. None where it fills too little of the picture, or less
+    than half of it is shown.
+    """
     mask = truth.instance[frame] == instance
     if mask.mean() < LEAST_SHARE:
         return None

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.evaluate.actor_places import ActorError, actor_error
 from dreamdrive.evaluate.retrieval import Retrieval, retrieval
-from dreamdrive.evaluate.true_labels import places, true_labels
 from dreamdrive.evaluate.truth import Truth, views_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
@@ -21,6 +20,8 @@ EDGE_SHARE = 1 / 64
 """Width of the rim around moving things, over that of the picture, which counts as no static surface."""
 MOVED_M = 0.1
 """Mean distance from which on something that is shown counts as moved."""
+BEHIND = 1.1
+"""Depth over the true one from which on a Gaussian lies behind the surface that a pixel shows."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Decomposition:
         path_rms_m: Root mean square distance of the cameras that is left then.
         mask: Pixels of moving things, all frames together; the score of a pixel is the share of it that
             dynamic Gaussians fill.
-        labels: Gaussians of moving things; see ``true_labels.true_labels``.
+        labels: Gaussians of moving things; see ``true_labels``.
         fake: How much the static street moves; None where the truth holds no static surface.
         actors: Where moving road users are, over time.
     """
@@ -92,14 +93,55 @@ def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
     )
 
 
+@torch.no_grad()
+def places(scene: Scene, t_s: float) -> Float[np.ndarray, "n 3"]:
+    """Centres of all Gaussians at a time, the static ones first; also of those whose life span is over."""
+    moved = scene.dynamic.without_features()
+    if scene.deformation is not None:
+        moved = scene.deformation.apply_at(moved, t_s)
+    return torch.cat([scene.static.means, moved.means]).numpy().astype(np.float64)
+
+
+def true_labels(
+    scene: Scene, views: Sequence[Camera], truth: Truth, scale: float
+) -> tuple[Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Whether each Gaussian, the static ones first, stands for something that moves; whether it was judged.
+
+    A Gaussian is judged in the frame it was seeded from, where it is at that frame's time. It is moving if
+    its centre falls on a pixel of a moving road user and does not lie behind it, by more than a tenth of the
+    true depth. What lies nearer counts: the pixel shows nothing nearer than the road user, so that this is
+    the road user itself at a wrong depth. One that has left the picture of its frame, or that names none, is
+    judged in the frame where its depth is nearest to the true one. One that is in no picture, or before the
+    sky only, is not judged.
+
+    The views are the scene's cameras at the size of the truth; ``scale`` is metres of the truth for one of
+    the scene.
+    """
+    source = torch.cat([scene.static.source_frame, scene.dynamic.source_frame]).numpy()
+    moving = np.zeros(len(source), dtype=bool)
+    # Logarithmic distance from the true depth in the frame that has judged so far; -1 is the last word.
+    distance = np.full(len(source), np.inf)
+    for frame, camera in enumerate(views):
+        projected = camera.project(places(scene, float(scene.times_s[frame])))
+        column, row, z = projected.T
+        seen = np.flatnonzero(camera.shows(projected))
+        pixel = frame, row[seen].astype(int), column[seen].astype(int)
+        solid = truth.depth_m[pixel] > 0
+        seen, pixel = seen[solid], (frame, pixel[1][solid], pixel[2][solid])
+        ratio = scale * z[seen] / truth.depth_m[pixel]
+        here = np.where(source[seen] == frame, -1.0, np.abs(np.log(ratio)))
+        nearer = here < distance[seen]
+        rows = seen[nearer]
+        distance[rows] = here[nearer]
+        moving[rows] = (truth.moving[pixel] & (ratio < BEHIND))[nearer]
+    return moving, np.isfinite(distance)
+
+
 @dataclass(frozen=True)
 class _Seen:
-    """One frame of a scene: what moves in it, and how far.
+    """One frame of a scene: shares of a pixel that dynamic Gaussians fill and that any cover, and what moves.
 
-    Attributes:
-        dynamic: Share of the pixel that dynamic Gaussians fill (H, W).
-        alpha: Share of the pixel covered by any (H, W).
-        moves: Distance to the other times, composited (H, W), in metres of the scene.
+    ``moves`` is the distance to the other times, composited, in metres of the scene.
     """
 
     dynamic: Float[np.ndarray, "h w"]

@@ -43,13 +43,9 @@ class WeightFiles:
 
 @dataclass(frozen=True)
 class Extractor:
-    """A network whose features two sets are compared by.
+    """A network whose features two sets are compared by, and the names of their two distances.
 
-    Attributes:
-        frechet: Name of the Fréchet distance of its features.
-        kernel: Name of their kernel distance.
-        window: Whether a feature vector describes a window of frames, not a frame.
-        features: From frames (t, h, w, 3) to (t, d), or to one vector (1, d) of a window.
+    From frames come features (t, d), or one vector (1, d) where they describe a ``window`` of frames.
     """
 
     frechet: str
@@ -60,14 +56,9 @@ class Extractor:
 
 @dataclass(frozen=True)
 class Toolbox:
-    """What can be computed.
+    """What can be computed: distances of sets, and what compares each frame with the real one it belongs to.
 
-    Attributes:
-        extractors: Networks for distances of sets.
-        likenesses: By name, what compares each frame with the real one it belongs to: from both clips to a
-            value a frame.
-        missing: Figures that cannot be computed, and why.
-        weights: File and sha256 behind each figure with a network.
+    Figures that are ``missing`` have a reason; ``weights`` are file and sha256 behind those with a network.
     """
 
     extractors: list[Extractor] = field(default_factory=list)
@@ -78,6 +69,11 @@ class Toolbox:
     def note(self, figure: str, path: Path) -> None:
         """Keep which file is behind a figure."""
         self.weights[figure] = {"file": path.name, "sha256": sha256(path)}
+
+    def add(self, extractor: Extractor, path: Path) -> None:
+        """Offer a network with the weights of a file."""
+        self.note(extractor.frechet, path)
+        self.extractors.append(extractor)
 
 
 def open_toolbox(
@@ -114,9 +110,9 @@ def _add_inception(box: Toolbox, path: Path | None, resize: Resize) -> None:
     if path is None:
         raise MissingWeightsError(f"no weights: --inception FILE, {inception.FILE}")
     network = inception.load_inception(path)
-    box.note("fid", path)
-    box.extractors.append(
-        Extractor("fid", "kid", False, lambda f: inception.inception_features(network, f, resize).numpy())
+    box.add(
+        Extractor("fid", "kid", False, lambda f: inception.inception_features(network, f, resize).numpy()),
+        path,
     )
 
 
@@ -124,18 +120,16 @@ def _add_i3d(box: Toolbox, path: Path | None) -> None:
     if path is None:
         raise MissingWeightsError(f"no weights: --i3d FILE, {i3d.FILE}")
     network = i3d.load_i3d(path)
-    box.note("fvd", path)
-    box.extractors.append(Extractor("fvd", "kvd", True, lambda f: i3d.i3d_features(network, f).numpy()[None]))
+    box.add(Extractor("fvd", "kvd", True, lambda f: i3d.i3d_features(network, f).numpy()[None]), path)
 
 
 def _add_efficientnet(box: Toolbox) -> None:
     name, network = "efficientnet_lite0", efficientnet_lite.load_efficientnet_lite0()
-    box.note(f"frechet_{name}", efficientnet_lite.FILE.locate())
-
-    def features(frames: Frames) -> Float[np.ndarray, "_ _"]:
-        return efficientnet_lite.efficientnet_lite0_features(network, frames).numpy()
-
-    box.extractors.append(Extractor(f"frechet_{name}", f"kernel_{name}", False, features))
+    features = efficientnet_lite.efficientnet_lite0_features
+    box.add(
+        Extractor(f"frechet_{name}", f"kernel_{name}", False, lambda f: features(network, f).numpy()),
+        efficientnet_lite.FILE.locate(),
+    )
 
 
 def _add_transnet(box: Toolbox, path: Path | None) -> None:
@@ -143,12 +137,11 @@ def _add_transnet(box: Toolbox, path: Path | None) -> None:
         network = transnet.load_transnet(path)
     except MissingWeightsError as error:
         raise MissingWeightsError(f"{error}; or --transnet FILE") from None
-    box.note("frechet_transnetv2", path or transnet.FILE.locate())
-
-    def features(frames: Frames) -> Float[np.ndarray, "_ _"]:
-        return transnet.transnet_features(network, frames).numpy()[None]
-
-    box.extractors.append(Extractor("frechet_transnetv2", "kernel_transnetv2", True, features))
+    name, features = "transnetv2", transnet.transnet_features
+    box.add(
+        Extractor(f"frechet_{name}", f"kernel_{name}", True, lambda f: features(network, f).numpy()[None]),
+        path or transnet.FILE.locate(),
+    )
 
 
 def _add_lpips(box: Toolbox, trunk: Path | None, heads: Path | None) -> None:

@@ -9,8 +9,6 @@ from jaxtyping import Float
 from dreamdrive.choices import Covariance
 from dreamdrive.errors import InputError
 
-"""Whether covariances are divided by N - 1, as most programs do, or by N, as StyleGAN-V and cd-fvd do."""
-
 KERNEL_SUBSETS = 100
 KERNEL_SUBSET_SIZE = 1000
 
@@ -20,9 +18,9 @@ def frechet_distance(
 ) -> float:
     """Squared Fréchet distance of the Gaussians with the moments of two sets (Heusel et al. 2017, eq. 6).
 
-    Exact for rank-deficient covariances and never complex. Depends strongly on the number of samples, a row
-    each: only distances of equal counts may be compared. Identical sets give 0 up to rounding, which may be
-    negative.
+    Covariances are divided by N - 1, as most programs do, or by N (``population``), as StyleGAN-V and cd-fvd
+    do. Exact for rank-deficient ones and never complex. Depends strongly on the number of samples, a row
+    each: only distances of equal counts may be compared. Identical sets give 0 up to rounding, perhaps less.
 
     Raises:
         InputError: Fewer than two samples, or features that are not finite.

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from dreamdrive.data.layout_file import read_layout
 from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.recorded_truth import Points, Recorded, read_cameras_json, read_poses_txt
+from dreamdrive.evaluate.truth import drawn_again
 from dreamdrive.scene.camera import Camera
-from dreamdrive.world import Drive, drive, read_world
+from dreamdrive.world import Drive, read_world
 
 EXPECTED = (
     "a folder of dreamdrive world make, a layout as JSON, a folder with PandaSet's cameras.json, or one with "
@@ -59,7 +59,8 @@ def read_geometry_truth(path: Path, estimate: Estimate) -> GeometryTruth:
     if not path.exists():
         raise InputError(f"{path} does not exist; expected {EXPECTED}")
     if path.is_file():
-        return of_drive(_drawn(path, estimate), estimate, path)
+        drawn = drawn_again(path, estimate.index, estimate.times_s, estimate.size)
+        return of_drive(drawn, estimate, path)
     if (path / "layout.json").is_file():
         return of_drive(read_world(path), estimate, path)
     if (path / "cameras.json").is_file():
@@ -71,18 +72,10 @@ def read_geometry_truth(path: Path, estimate: Estimate) -> GeometryTruth:
     )
 
 
-def _drawn(path: Path, estimate: Estimate) -> Drive:
-    """A layout drawn again as the estimate's source drew it; of a single frame any rate will do."""
-    last, span_s = int(estimate.index.max()), float(np.ptp(estimate.times_s))
-    rate_hz = float(np.ptp(estimate.index)) / span_s if span_s > 0 else 10.0
-    return drive(read_layout(path), last + 1, rate_hz, estimate.size)
-
-
 def of_drive(made: Drive, estimate: Estimate, path: Path) -> GeometryTruth:
     """The exact truth of a simulated drive; a pixel takes that of the true pixel under its centre."""
-    _check_frames(len(made.cameras), estimate, path)
-    sizing = _sizing((made.cameras[0].width_px, made.cameras[0].height_px), estimate, path)
-    rows = estimate.index
+    first, rows = made.cameras[0], estimate.index
+    sizing = _sizing(len(made.cameras), (first.width_px, first.height_px), estimate, path)
     return GeometryTruth(
         cameras=tuple(sizing.camera(made.cameras[i]) for i in rows.tolist()),
         depth_m=_nearest(made.depth_m[rows], sizing),
@@ -92,8 +85,7 @@ def of_drive(made: Drive, estimate: Estimate, path: Path) -> GeometryTruth:
 
 def of_recording(recorded: Recorded, estimate: Estimate, path: Path) -> GeometryTruth:
     """The truth of a recording; of several points in a pixel the nearest counts, which hides the others."""
-    _check_frames(len(recorded.world_from_camera), estimate, path)
-    sizing = _sizing(recorded.size, estimate, path)
+    sizing = _sizing(len(recorded.world_from_camera), recorded.size, estimate, path)
     poses = [recorded.world_from_camera[i] for i in estimate.index.tolist()]
     if recorded.pinhole is not None:
         cameras = tuple(sizing.camera(recorded.pinhole).at(pose) for pose in poses)
@@ -111,17 +103,14 @@ def of_recording(recorded: Recorded, estimate: Estimate, path: Path) -> Geometry
     return GeometryTruth(cameras, depth_m, known, recorded.pinhole is not None, tuple(notes))
 
 
-def _check_frames(count: int, estimate: Estimate, path: Path) -> None:
+def _sizing(count: int, true: tuple[int, int], estimate: Estimate, path: Path) -> Sizing:
+    """How frames of the truth became frames of the scene, as the reader of clips does it."""
     last = int(estimate.index.max())
     if last >= count:
         raise InputError(
             f"{path} knows {count} frames but the scene shows frame {last} of its source; "
             "give the truth of the recording that the scene was made from"
         )
-
-
-def _sizing(true: tuple[int, int], estimate: Estimate, path: Path) -> Sizing:
-    """How frames of the truth became frames of the scene, as the reader of clips does it."""
     try:
         return choose_size(true, estimate.size)
     except InputError as error:

@@ -31,12 +31,9 @@ class _About(msgspec.Struct):
 
 @dataclass(frozen=True)
 class Points:
-    """Points of one frame with known depth.
+    """Points of one frame with known depth along z, and whether they lie in the box of something that moves.
 
-    Attributes:
-        place_px: Column and row (N, 2) at the recording's size; the centre of the first pixel is (0.5, 0.5).
-        depth_m: Depth along z (N,), positive.
-        moving: Whether each lies in the box of something that moves (N,).
+    Places are column and row at the recording's size; the centre of the first pixel is (0.5, 0.5).
     """
 
     place_px: Float[np.ndarray, "n 2"]
@@ -48,12 +45,8 @@ class Points:
 class Recorded:
     """What a recording's folder says about the geometry of its frames.
 
-    Attributes:
-        world_from_camera: One pose a frame (N, 4, 4).
-        size: Width and height of the frames in pixels.
-        pinhole: Their calibration; None where there is none.
-        depth_files: File with the points of a frame, by its index.
-        boxes: Boxes of what moves in each frame; None where nothing says what moves.
+    Files with points are by the frame's index. Without a calibration the pinhole is None, as the boxes of
+    what moves in each frame are where nothing says what moves.
     """
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
@@ -79,9 +72,7 @@ class Recorded:
 def read_cameras_json(folder: Path, camera: str | None) -> Recorded:
     """A folder like PandaSet's: ``cameras.json``, and ``lidar_depth_NAME`` and ``cuboids.json`` where given.
 
-    Args:
-        folder: The recording.
-        camera: The one whose frames are asked for, ``NAME_camera``: the name of the scene's input.
+    The camera is ``NAME_camera``, as the scene's input is called.
     """
     file = folder / "cameras.json"
     found = pandaset_camera(read_json(file, "--truth"), f"--truth {file}", camera)

@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive.data.layout_file import read_layout
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
-from dreamdrive.world import Drive
+from dreamdrive.world import Drive, drive, read_world
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,37 @@ class Truth:
         camera = self.cameras[frame]
         local = camera.rays()[mask] * self.depth_m[frame][mask][:, None]
         return local @ camera.world_from_camera[:3, :3].T + camera.world_from_camera[:3, 3]
+
+
+def read_truth(scene: Scene, world: Path) -> Truth:
+    """The truth of a scene's frames, by a world folder or by a layout, which is drawn again.
+
+    Raises:
+        InputError: There is neither, it is damaged, or it has fewer frames.
+    """
+    if not world.exists():
+        raise InputError(f"{world} does not exist; expected a folder of dreamdrive world make, or a layout")
+    index = np.array(scene.provenance.source_index or range(len(scene.cameras)), dtype=np.int64)
+    if world.is_dir():
+        made = read_world(world)
+    else:
+        size = (scene.cameras[0].width_px, scene.cameras[0].height_px)
+        made = drawn_again(world, index, scene.times_s, size)
+    if index.max() >= len(made.frames):
+        raise InputError(
+            f"{world} has {len(made.frames)} frames but the scene shows frame {index.max()}; "
+            "give the world that the scene was made from"
+        )
+    return Truth.of(made, index.tolist())
+
+
+def drawn_again(
+    layout: Path, index: Int[np.ndarray, " f"], times_s: Float[np.ndarray, " f"], size: tuple[int, int]
+) -> Drive:
+    """A layout as the source was drawn whose frames ``index`` are; of a single frame any rate will do."""
+    span_s = float(np.ptp(times_s))
+    rate_hz = float(np.ptp(index)) / span_s if span_s > 0 else 10.0
+    return drive(read_layout(layout), int(index.max()) + 1, rate_hz, size)
 
 
 def views_of(scene: Scene, truth: Truth) -> tuple[Camera, ...]:

@@ -1,12 +1,12 @@
 """What every method with a network needs: its table entry, weights from files and from the hub."""
 
 from dreamdrive.models.backend import Backend
-from dreamdrive.models.hub import find_weights
 from dreamdrive.models.weights import (
     as_state,
     check_sizes,
     fill,
     fill_network,
+    find_weights,
     in_words,
     load_network,
     misfits,

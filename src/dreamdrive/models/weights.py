@@ -1,6 +1,8 @@
-"""Weights from a file into a network, or a message that says what is wrong with the file.
+"""Weights from a file, found by its path or its name on a model hub, into a network.
 
-In messages ``source`` or ``where`` is where something was read, and ``expected`` which file is expected.
+What is missing, unreadable, damaged, of other keys, shapes or types, not finite, or no plain weights is an
+InputError everywhere; nothing in a file is executed. In messages ``source`` or ``where`` is where something
+was read, and ``expected`` which file is expected.
 """
 
 import hashlib
@@ -21,12 +23,13 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.paths import open_file
+from dreamdrive.files.paths import is_inside, open_file, read_text
 from dreamdrive.files.tensor_file import DAMAGE, HEADER_BYTES, briefly, header_problem
 from dreamdrive.files.zip_file import directory_bytes
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4
+_NAME = re.compile(r"[A-Za-z0-9][\w.-]*/[\w.-]+")
 _PICKLE_BYTES = 4_000_000
 """Most that ``torch.save`` may have written beside the tensors; 1000 tensors take 0.1 MB."""
 _WIDEST, _DEEPEST = 65_536, 1000
@@ -40,15 +43,48 @@ _READING = (RuntimeError, pickle.UnpicklingError, zipfile.BadZipFile, EOFError, 
 _REFUSED = re.compile(r"GLOBAL (\S+) (?:was not an allowed global|whose module)")
 
 
+def find_weights(given: str | Path) -> Path:
+    """The file or folder that ``--weights`` means; nothing is ever downloaded.
+
+    Args:
+        given: A path, or ``owner/name`` of a model whose snapshot lies in the hub's cache (``HF_HUB_CACHE``,
+            ``HF_HOME/hub`` or ``~/.cache/huggingface/hub``). What exists as a path is taken as one.
+
+    Raises:
+        InputError: Neither a path nor a cached model.
+    """
+    path = Path(given)
+    if path.exists():
+        return path
+    name = str(given)
+    if not _NAME.fullmatch(name) or path.suffix in (".pth", ".pt", ".safetensors"):
+        raise InputError(f"--weights {name} does not exist; expected a file of weights or its folder")
+    folder = cache() / f"models--{name.replace('/', '--')}"
+    current = folder / "refs" / "main"
+    commit = read_text(current, at_most=1000).strip() if current.is_file() else "none"
+    snapshot = folder / "snapshots" / commit
+    if not is_inside(commit) or not snapshot.is_dir():
+        raise InputError(
+            f"--weights {name} is neither a path nor a model in {cache()}; "
+            f"to download it yourself: hf download {name}"
+        )
+    return snapshot
+
+
+def cache() -> Path:
+    """Where models of the hub are kept on this machine."""
+    if given := os.environ.get("HF_HUB_CACHE"):
+        return Path(given).expanduser()
+    home = os.environ.get("HF_HOME", Path("~/.cache/huggingface"))
+    return Path(home).expanduser() / "hub"
+
+
 def load_network(
     make: Callable[[], Network], path: Path, expected: str, *, ignored: tuple[str, ...] = ()
 ) -> Network:
     """Build a network and fill it from a state dict of its own keys on disk, for inference.
 
-    Keys that begin as one of ``ignored`` are of parts that are not used. Nothing in the file is executed.
-
-    Raises:
-        InputError: The file is missing, unreadable or holds something else.
+    Keys that begin as one of ``ignored`` are of parts that are not used.
     """
     state = {k: v for k, v in read_state(path, expected).items() if not k.startswith(ignored or ("\0",))}
     return fill_network(make, state, str(path), expected)
@@ -57,11 +93,7 @@ def load_network(
 def fill_network(
     make: Callable[[], Network], state: dict[str, Tensor], source: str, expected: str
 ) -> Network:
-    """Build a network from a state dict of its keys, for inference in float32.
-
-    Raises:
-        InputError: See ``fill``; or no network is of such sizes.
-    """
+    """Build a network from a state dict of its keys, for inference in float32."""
     try:
         with torch.device("meta"):
             network = make()
@@ -76,9 +108,6 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
     """Put weights in place of those of a network that is already built, for inference in float32.
 
     Of the keys, counters of batches may be missing, and all but one name of a shared tensor.
-
-    Raises:
-        InputError: Keys are missing or left over, shapes or types differ, or numbers are not finite.
     """
     wanted = network.state_dict()
     counters = {key: torch.zeros((), dtype=torch.int64) for key in wanted if key.endswith("batches_tracked")}
@@ -93,11 +122,7 @@ def fill(network: Network, state: dict[str, Tensor], source: str, expected: str)
 
 
 def read_state(path: Path, expected: str) -> dict[str, Tensor]:
-    """The tensors of a state dict on disk, ``.safetensors`` or what ``torch.save`` wrote.
-
-    Raises:
-        InputError: The file is missing, unreadable or holds something else.
-    """
+    """The tensors of a state dict on disk, ``.safetensors`` or what ``torch.save`` wrote."""
     if path.suffix != ".safetensors":
         return as_state(read_torch(path, expected), str(path), expected)
     try:
@@ -109,11 +134,7 @@ def read_state(path: Path, expected: str) -> dict[str, Tensor]:
 
 
 def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
-    """What ``torch.save`` wrote, if it consists of tensors, plain values and the allowed classes.
-
-    Raises:
-        InputError: The file is missing or unreadable, or holds objects of other classes; none is executed.
-    """
+    """What ``torch.save`` wrote, if it consists of tensors, plain values and the allowed classes."""
     if not path.is_file():
         raise InputError(f"{path} does not exist or is no file; expected {expected}")
     try:
@@ -132,11 +153,7 @@ def read_torch(path: Path, expected: str, allowed: Sequence[type] = ()) -> Any:
 
 
 def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
-    """A state dict, if that is what was read.
-
-    Raises:
-        InputError: It is something else.
-    """
+    """A state dict, if that is what was read."""
     if not isinstance(content, dict) or not all(isinstance(value, Tensor) for value in content.values()):
         raise InputError(f"{source} holds no table of tensors; expected {expected}")
     for key, value in content.items():
@@ -146,11 +163,7 @@ def as_state(content: object, source: str, expected: str) -> dict[str, Tensor]:
 
 
 def check_sizes(values: object, where: str) -> None:
-    """Whether whole numbers in a configuration are sizes that networks have, before one is built of them.
-
-    Raises:
-        InputError: One is larger; of layers and depths there may be fewer.
-    """
+    """Whether whole numbers in a configuration are sizes that networks have, before one is built of them."""
     waiting: list[tuple[object, str, int]] = [(values, "", _WIDEST)]
     while waiting:
         value, name, limit = waiting.pop()
@@ -164,11 +177,7 @@ def check_sizes(values: object, where: str) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Digest of a file.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
+    """Digest of a file."""
     try:
         with open_file(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -26,14 +26,8 @@ def appearance(
 
     Per scale five channels (``NAMES``): mean CIE Lab colour, size of the gradient of the mean lightness, and
     standard deviation of the lightness. Neighbourhoods leave out invalid pixels. Each channel is shifted and
-    scaled to mean 0 and variance 1 over the valid pixels of the clip; a channel without variance is 0.
-
-    Args:
-        frames: RGB (F, H, W, 3), H and W even.
-        valid: Where the frames hold a picture (F, H, W).
-
-    Returns:
-        Features (F, H // 2, W // 2, 15), half precision, 0 where not valid.
+    scaled to mean 0 and variance 1 over the valid pixels of the clip; a channel without variance is 0. Of RGB
+    frames of even sides come features (F, H // 2, W // 2, 15), 0 where not valid.
     """
     count, height, width = valid.shape
     if height % STRIDE or width % STRIDE:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import make_clip, path_error, straight
 
+from dreamdrive.geometry import GateOptions
 from dreamdrive.geometry.cameras import sfm
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.sfm import Model
@@ -13,7 +14,7 @@ from dreamdrive.scene.clip import Clip
 
 
 def run(clip: Clip, seed: int = 0) -> Outcome:
-    return reconstruct(clip, evidence.look(clip), seed)
+    return reconstruct(clip, evidence.look(clip), GateOptions(), seed)
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,8 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.convert import convert
-from dreamdrive.prior.vista.encoders import SECOND, encoder_difference, notes_of
 from dreamdrive.prior.vista.kinds import VISTA
-from dreamdrive.prior.vista.stored import open_weights
+from dreamdrive.prior.vista.stored import SECOND, encoder_difference, notes_of, open_weights
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from dreamdrive.evaluate.networks.packaged import PackagedFile
-from dreamdrive.evaluate.networks.padding import pad_same
-from dreamdrive.evaluate.networks.resize import resize
+from dreamdrive.evaluate.networks.resize import pad_same, resize
 from dreamdrive.models import load_network
 
 FILE = PackagedFile(

@@ -9,8 +9,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks.padding import pad_same
-from dreamdrive.evaluate.networks.resize import resize
+from dreamdrive.evaluate.networks.resize import pad_same, resize
 from dreamdrive.models import load_network
 
 FILE = "i3d_pretrained_400.pt, the state dict (not the TorchScript archive)"

@@ -21,12 +21,7 @@ _PAIRS = 1
 
 
 class Trunk(nn.Module):
-    """Layers in sequence, of which some are tapped.
-
-    Attributes:
-        features: The layers.
-        taps: Their indices after which values are taken.
-    """
+    """Layers in sequence; behind those whose indices are ``taps``, values are taken."""
 
     def __init__(self, layers: list[nn.Module], taps: tuple[int, ...]) -> None:
         super().__init__()
@@ -64,11 +59,7 @@ class Heads(nn.Module):
 
 
 class PerceptualDistance:
-    """A trunk and heads.
-
-    Attributes:
-        kind: ``vgg`` or ``alex``.
-    """
+    """A trunk and heads of a kind, ``vgg`` or ``alex``."""
 
     def __init__(self, kind: str, trunk: Trunk, heads: Heads) -> None:
         self.kind = kind

@@ -14,13 +14,9 @@ class MissingWeightsError(InputError):
 
 @dataclass(frozen=True)
 class PackagedFile:
-    """A file of an installed package.
+    """A file inside an installed package, its digest, and how to get it.
 
-    Attributes:
-        package: Name under which it is installed.
-        path: Of the file inside.
-        sha256: Its digest: with other weights a figure would be another.
-        install: How to get it.
+    With other weights a figure would be another.
     """
 
     package: str

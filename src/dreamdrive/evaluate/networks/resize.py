@@ -1,4 +1,4 @@
-"""The ways in which programs bring images to the size of a network; each gives another FID."""
+"""The ways in which programs bring images to the size of a network; each gives another FID. And padding."""
 
 import torch
 from jaxtyping import Float, UInt8
@@ -16,10 +16,9 @@ def resize(
     size = (height, width)
     if method == "tf1":
         return _from_corner(_from_corner(planes, height, 2), width, 3)
-    if method == "torch":
-        return functional.interpolate(planes, size, mode="bilinear", align_corners=False)
-    if method == "antialias":
-        return functional.interpolate(planes, size, mode="bilinear", align_corners=False, antialias=True)
+    if method in ("torch", "antialias"):
+        smooth = method == "antialias"
+        return functional.interpolate(planes, size, mode="bilinear", align_corners=False, antialias=smooth)
     if method == "clean":
         wide = functional.interpolate(planes, size, mode="bicubic", align_corners=False, antialias=True)
         return wide.clamp(0, 255)
@@ -35,3 +34,17 @@ def _from_corner(planes: Float[Tensor, "n 3 _ _"], size: int, axis: int) -> Floa
     share = (position - below).reshape([-1 if i == axis else 1 for i in range(4)])
     first = planes.index_select(axis, below)
     return first + (planes.index_select(axis, above) - first) * share
+
+
+def pad_same(
+    x: Float[Tensor, "n c *size"], kernel: tuple[int, ...], stride: tuple[int, ...]
+) -> Float[Tensor, "n c *padded"]:
+    """TensorFlow's ``SAME``: zeros so that windows in steps of ``stride`` give ceil(size / stride) values.
+
+    The odd row of zeros goes behind.
+    """
+    pads: list[int] = []
+    for size, k, s in zip(reversed(x.shape[2:]), reversed(kernel), reversed(stride), strict=True):
+        total = max((-(-size // s) - 1) * s + k - size, 0)
+        pads += [total // 2, total - total // 2]
+    return functional.pad(x, pads) if any(pads) else torch.as_tensor(x)

@@ -20,14 +20,9 @@ FULL_SIZE = (1600, 900)
 
 @dataclass(frozen=True)
 class Mounted:
-    """A camera of the car; the car's frame is x ahead, y left, z up, on the road below the rear axle.
+    """A camera of the car, its intrinsics those of the full picture, its yaw from ahead to the left.
 
-    Attributes:
-        name: As nuScenes calls it.
-        focal_px: Focal length in the full picture.
-        centre_px: Principal point there.
-        place_m: Where it sits.
-        yaw_deg: Where it looks, from ahead to the left.
+    The car's frame is x ahead, y left, z up, on the road below the rear axle.
     """
 
     name: str

@@ -83,13 +83,9 @@ _LINE_CELLS = 2
 class Conditions:
     """What time steps shall show; b time steps, n cameras, k boxes at most.
 
-    Attributes:
-        raster: The map around the car (0 or 1), right and forward.
-        cameras: Intrinsics in pixels of the full picture, camera to LiDAR in metres.
-        corners_m: Corners of the boxes in the LiDAR frame as the networks were taught, 0 where no box is.
-        classes: Classes of the boxes, 0 where no box is.
-        present: Whether there is a box.
-        text: Tokens of the words.
+    The raster is the map around the car (0 or 1), right and forward. A camera is its intrinsics in pixels of
+    the full picture, then camera to LiDAR in metres. Corners of boxes are in the LiDAR frame as the networks
+    were taught; they and their classes are 0 where no box is present.
     """
 
     raster: Float[Tensor, "b c x y"]

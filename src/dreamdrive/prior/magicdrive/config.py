@@ -31,14 +31,10 @@ _CAMERA = {"input_dims": (3,), "num_freqs": (4,), "include_input": (True,), "log
 
 @dataclass(frozen=True)
 class Temporal:
-    """How the blocks of the temporal variant look at other frames.
+    """How the blocks of the temporal variant look at the other frames of a clip.
 
-    Attributes:
-        frames: Frames in a clip.
-        sparse: Whether the first attention is sparse causal (``_s_ff_t_last``); else each frame sees itself
-            (``t_last``).
-        connector: Whether a linear layer follows the temporal attention.
-        positions: Whether it learned positions in time.
+    The first attention is ``sparse`` causal (``_s_ff_t_last``), or each frame sees itself (``t_last``). That
+    along time has learned positions or none, and a linear layer, the connector, behind it or none.
     """
 
     frames: int
@@ -51,16 +47,8 @@ class Temporal:
 class Settings:
     """What the folders say beyond what diffusers' classes take.
 
-    Attributes:
-        size: Width and height of the pictures.
-        map_shape: Channels and cells of the raster.
-        map_widths: Widths of the map encoder.
-        map_pooled: Height and width that its result is averaged to, if it is.
-        box_classes: Classes of boxes.
-        box_class_width: Width of a class's token.
-        box_widths: Widths of the layers of the box embedder.
-        views: Cameras in the ring.
-        temporal: How the blocks look along time; None for single time steps.
+    The map's shape is channels and cells of the raster; its encoder's result is averaged to the height and
+    width ``map_pooled``, if it is. The views are a ring of cameras. None is temporal about single time steps.
     """
 
     size: tuple[int, int]

@@ -15,9 +15,8 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
 from dreamdrive.prior.running import counted
 from dreamdrive.prior.vista.configs import Shapes
-from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
-from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, open_weights
+from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, notes_of, open_weights
 from dreamdrive.progress import Progress, silent
 
 _DTYPES = {"float16": (torch.float16, "F16"), "float32": (torch.float32, "F32")}
@@ -45,17 +44,10 @@ def convert(
     replace: bool = False,
     progress: Progress = silent,
 ) -> Converted:
-    """Write the folder; it appears whole or not at all, and one tensor at a time is in memory.
+    """Write ``unet``, ``vae``, ``image_encoder``, and ``prior.json``, which says which kind, of a file.
 
-    Args:
-        file: Vista's or SVD's single ``.safetensors``. LoRA that is not merged yet is merged.
-        folder: Where ``unet``, ``vae`` and ``image_encoder`` come, and ``prior.json``, which says which kind.
-        dtype: Of UNet and image encoder. The autoencoder, which needs it, is always stored in float32.
-        replace: Whether an earlier folder of this kind may be replaced.
-        progress: Told of every tensor.
-
-    Raises:
-        InputError: The file does not hold all of such a model, or the folder cannot be written.
+    The folder appears whole or not at all, and one tensor at a time is in memory. LoRA that is not merged yet
+    is merged. ``dtype`` is that of UNet and image encoder; the autoencoder needs float32.
     """
     if file.is_dir() and (file / "unet").is_dir():
         raise InputError(f"{file} has diffusers' layout already; --weights takes it as it is")

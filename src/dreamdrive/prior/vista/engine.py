@@ -23,12 +23,9 @@ Images = Float[Tensor, "n 3 h w"]
 
 @dataclass(frozen=True)
 class Seen:
-    """The conditions of one round.
+    """The conditions of one round: its first frame described, and as the autoencoder has it, not scaled.
 
-    Attributes:
-        image: Description of its first frame.
-        latent: That frame as the autoencoder has it, not scaled.
-        action: Columns of the action; None without one, as in SVD.
+    The columns of the action are None in SVD.
     """
 
     image: Float[Tensor, " d"]

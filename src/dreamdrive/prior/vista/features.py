@@ -70,12 +70,9 @@ class VideoFeatures:
 
 @dataclass(frozen=True)
 class Window:
-    """Frames that go through the UNet at once.
+    """Frames that go through the UNet at once, with the columns of their action, None for SVD.
 
-    Attributes:
-        span: Which.
-        action: Columns of the action; None for SVD, which knows of none.
-        fixed: How many of the first frames count as known.
+    As many of the first frames as ``fixed`` says count as known.
     """
 
     span: range

@@ -29,15 +29,10 @@ IGNORED = {
 
 @dataclass(frozen=True)
 class Recipe:
-    """How one tensor of a network is made of those in the file.
+    """How one tensor of a network is made of those in the file, by their keys.
 
-    Attributes:
-        source: Key of the tensor.
-        columns: Key of another one that is put beside it, along dimension 1.
-        third: Which third of the rows it is.
-        transposed: Whether rows and columns change places.
-        flat: Whether a 1x1 convolution, of which it may be the weight, is applied as a matrix.
-        low_rank: Keys of U and D whose product is added (LoRA of rank r, scale 1).
+    The product of the ``low_rank`` tensors U and D is added (LoRA of rank r, scale 1), a third of the rows is
+    taken, the weight of a 1x1 convolution becomes the matrix that it is, and ``columns`` are put beside it.
     """
 
     source: str

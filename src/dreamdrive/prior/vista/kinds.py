@@ -12,14 +12,9 @@ ACTION_COLUMNS = 2432
 class Kind:
     """What tells one model's use from the other's.
 
-    Attributes:
-        name: For the command line.
-        title: For people.
-        rate_hz: Frame rate that it is told and whose frames it makes.
-        noise: Standard deviation of the noise on the first frame, of which it is told.
-        steps: Of the sampler, unless told.
-        overlap: Frames of one round that the next one starts from; 0 where there is one round only. As many
-            leading frames can be fixed.
+    It is told the frame rate that its frames have, and the standard deviation of the noise on the first one.
+    A round starts from the ``overlap`` last frames of the one before, and as many leading ones can be fixed;
+    0 where there is one round only.
     """
 
     name: KindName

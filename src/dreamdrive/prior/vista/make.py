@@ -17,14 +17,13 @@ from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, waypoints_by_round
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
-from dreamdrive.prior.vista.encoders import notes_of
 from dreamdrive.prior.vista.engine import Engine
 from dreamdrive.prior.vista.features import BLOCK, Window, extract
 from dreamdrive.prior.vista.kinds import SVD, Kind
 from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
 from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out, rounds_for
-from dreamdrive.prior.vista.stored import open_weights
+from dreamdrive.prior.vista.stored import notes_of, open_weights
 from dreamdrive.progress import Progress
 from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip, Known

@@ -29,14 +29,7 @@ _RESULT = 3 * _FLOAT + 2 * 3  # bytes a pixel of a decoded frame: as it comes, a
 
 @dataclass(frozen=True)
 class Job:
-    """What a run does.
-
-    Attributes:
-        size: Width and height of the frames.
-        frames: How many the decoder makes in all.
-        per_round: How many the UNet sees at once.
-        steps: The networks that work.
-    """
+    """What a run does: the decoder makes ``frames`` in all, and the UNet sees those of a round at once."""
 
     size: tuple[int, int]
     frames: int
@@ -46,12 +39,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Free:
-    """Bytes that may be taken; None where nobody knows.
+    """Bytes that may be taken where networks run, and in main memory for decoded frames; None: nobody knows.
 
-    Attributes:
-        networks: Where the networks run.
-        frames: In main memory, where decoded frames lie.
-        shared: Whether the two are the same memory; ``frames`` then does not count.
+    Where both are the same memory, which is then ``shared``, ``frames`` does not count.
     """
 
     networks: int | None
@@ -61,12 +51,7 @@ class Free:
 
 @dataclass(frozen=True)
 class Plan:
-    """Bytes that a run takes.
-
-    Attributes:
-        steps: Of each network at work, its weights included.
-        frames: Of decoded frames, in main memory.
-    """
+    """Bytes that each network takes at work, its weights included, and decoded frames in main memory."""
 
     steps: Mapping[Step, int]
     frames: int

@@ -24,13 +24,7 @@ MAX_ENLARGED = 2.0
 
 @dataclass(frozen=True)
 class Framing:
-    """Which part of a photo becomes the first frame.
-
-    Attributes:
-        corner: Column and row of the part's top left pixel.
-        part: Its width and height.
-        target: Width and height of the frame.
-    """
+    """Which part of a photo becomes the first frame: its top left pixel and size, and that of the frame."""
 
     corner: tuple[int, int]
     part: tuple[int, int]
@@ -58,13 +52,9 @@ class Framing:
 
 @dataclass(frozen=True)
 class Leading:
-    """The known frames.
+    """The known frames, a frame of the model apart in time, with their camera's calibration at their size.
 
-    Attributes:
-        frames: One or more (N, H, W, 3) of the asked size, a frame of the model apart in time.
-        calibration: Of the frames' camera, at their size.
-        framing: How they were cut.
-        notes: What the report should say, a sentence each.
+    ``notes`` are for the report, a sentence each.
     """
 
     frames: UInt8[np.ndarray, "n h w 3"]
