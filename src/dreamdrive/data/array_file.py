@@ -14,8 +14,7 @@ from jaxtyping import Shaped, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import open_file
-from dreamdrive.files.tensor_file import briefly
-from dreamdrive.files.zip_file import directory_bytes
+from dreamdrive.files.tensor_file import briefly, directory_bytes
 
 ARRAY_BYTES = 256_000_000
 """Bytes that arrays may take, a number counting as at least four: depth of 64 megapixels."""
