@@ -128,7 +128,8 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     parts = {f"{_BLOCK}-{name}.safetensors": _encode(tensors) for name, tensors in _tensors(scene).items()}
     index = {
         "format": FORMAT,
-        "version": _version(scene),
+        # Version 1 knows deformation fields alone, and does not name them.
+        "version": 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION,
         "conventions": CONVENTIONS,
         "provenance": asdict(scene.provenance),
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
@@ -165,11 +166,6 @@ def load_scene(path: Path) -> Scene:
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} is not a complete scene ({error}); generate it again") from error
     return scene
-
-
-def _version(scene: Scene) -> int:
-    """The oldest format that holds the scene: version 1 knows deformation fields alone."""
-    return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION
 
 
 def _encode(tensors: dict[str, Tensor]) -> bytes:
@@ -270,13 +266,14 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
     static, dynamic = part("static"), part("dynamic")
     if static is None or dynamic is None:
         raise KeyError("no static or no dynamic Gaussians")
+    ranges = {} if stored.sky is None else msgspec.structs.asdict(stored.sky)
     sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
     return Scene(
         static=build(Gaussians, static),
         dynamic=build(Gaussians, dynamic),
         deformation=None if motion is None else _rebuilt(stored.deformation or {}, motion),
         actors=tuple(actor.actor() for actor in stored.actors),
-        sky=None if sky is None else build(Sky, {**sky, **_asdict(stored.sky)}),
+        sky=None if sky is None else build(Sky, {**sky, **ranges}),
         exposure=None if exposure is None else _exposure(exposure),
         cameras=tuple(camera.camera() for camera in stored.cameras),
         times_s=np.array(stored.times_s, dtype=np.float64),
@@ -284,10 +281,6 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
         camera=None if stored.camera is None else np.array(stored.camera, dtype=np.int64),
         provenance=stored.provenance,
     )
-
-
-def _asdict(stored: msgspec.Struct | None) -> dict[str, Any]:
-    return {} if stored is None else msgspec.structs.asdict(stored)
 
 
 def _exposure(part: dict[str, Tensor]) -> Exposure:
