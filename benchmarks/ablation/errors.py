@@ -11,7 +11,7 @@ from dreamdrive.decompose import error_maps, score
 from dreamdrive.decompose.errors import static_picture
 from dreamdrive.options import Options
 from dreamdrive.run import stage_seed
-from dreamdrive.scene.features import OF_GEOMETRY, pixel_features
+from dreamdrive.scene.clip import OF_GEOMETRY, pixel_features
 from dreamdrive.splat import render, ssim_map
 from street.fit import Around
 

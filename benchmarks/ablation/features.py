@@ -11,7 +11,7 @@ from dreamdrive.evaluate.networks.efficientnet_lite import EfficientNetLite0, lo
 from dreamdrive.fit import initialise
 from dreamdrive.options import Options
 from dreamdrive.prior.pca import reduce
-from dreamdrive.scene.features import OF_GEOMETRY
+from dreamdrive.scene.clip import OF_GEOMETRY
 from dreamdrive.scene.gaussians import Gaussians
 
 _BLOCK = 4  # the last one of stride 8: 40 channels

@@ -204,7 +204,7 @@ def test_a_clip_without_any_picture_is_refused(make_folder):
 def test_more_frames_than_memory_holds_are_refused(make_folder, monkeypatch):
     monkeypatch.setattr(clip_reader, "MAX_FRAMES", 4)
     folder = make_folder(6)
-    with pytest.raises(InputError, match="more than 4 frames are selected"):
+    with pytest.raises(InputError, match="more than 4 frames of 64x48 are selected"):
         read_clip(folder)
     assert len(read_clip(folder, frames="0:4")) == 4
 

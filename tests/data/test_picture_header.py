@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.data.headers import bmp, exif, jpeg, png, tiff, webp
 
-from dreamdrive.data.picture_header import Header, parse_header
+from dreamdrive.data.picture_file import Header, parse_header
 
 
 @pytest.mark.parametrize(

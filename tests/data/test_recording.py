@@ -10,7 +10,7 @@ from tests.data.pictures import texture
 from tests.prior.paths import circle
 from tests.rigs import rig_clip
 
-from dreamdrive.data.recording import rate_hz, write_recording
+from dreamdrive.data.recording import write_recording
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.replay import REPLAY
@@ -49,7 +49,7 @@ def test_replay_takes_up_what_was_written(clip: Clip, tmp_path: Path) -> None:
     again = REPLAY(
         Control(
             made,
-            fps=rate_hz(clip),
+            fps=1 / clip.interval_s,
             intrinsics=made / "intrinsics.json",
             poses=made / "poses.json",
             trajectory=made / "requested.json",
@@ -110,7 +110,7 @@ def test_several_cameras_are_taken_up_as_a_rig(tmp_path: Path) -> None:
         *("camera0", "camera1", "rig.json", "poses.json", "video.mp4", "provenance.json"),
     }
     size = clip.size
-    again = REPLAY(Control(made, fps=rate_hz(clip), size=size, poses=made / "poses.json"))
+    again = REPLAY(Control(made, fps=1 / clip.interval_s, size=size, poses=made / "poses.json"))
     np.testing.assert_array_equal(again.frames, clip.frames)
     np.testing.assert_array_equal(again.camera, clip.camera)
     assert again.known.world_from_camera is not None

@@ -109,6 +109,6 @@ def test_frames_that_memory_cannot_hold_are_not_all_read(
     with pytest.raises(InputError) as caught:
         read_clip(tmp_path)
     assert str(caught.value) == (
-        f"{tmp_path}: memory holds 3 frames of 64x40 at most, and more are selected; choose some with "
+        f"{tmp_path}: more than 3 frames of 64x40 are selected, too many to hold in memory; choose some with "
         "--frames START:STOP:STEP, or give a smaller --size"
     )

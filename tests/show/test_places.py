@@ -8,8 +8,7 @@ import pytest
 from dreamdrive.drive.drives import Drive
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.show.places import places
-from dreamdrive.show.rendering import Look
+from dreamdrive.show.rendering import Look, places
 
 PATH = Trajectory(np.eye(4)[None], np.zeros(1))
 ONE, TWO = [Drive("stop", PATH)], [Drive("stop", PATH), Drive("mine", PATH)]

@@ -183,7 +183,7 @@ def test_as_many_boxes_as_asked_for() -> None:
 def test_surround_cameras_see_the_street_beside_and_behind() -> None:
     layout = draw_street(3)
     front, back = (drive(layout, 2, size=(64, 48), mount=mount) for mount in ("front", "back"))
-    towards = [d.map_from_world[:2, 2] for d in (front, back)]
+    towards = [np.linalg.inv(d.world_from_map)[:2, 2] for d in (front, back)]
     assert towards[0] @ towards[1] == pytest.approx(-1, abs=1e-3)
     assert (front.frames[0] != back.frames[0]).mean() > 0.5
 

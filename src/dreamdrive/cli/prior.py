@@ -86,7 +86,6 @@ def sample(
         force: Replace a folder that is there already.
     """
     use_all_cores()
-    from dreamdrive.data.recording import rate_hz
     from dreamdrive.device import computing_on
     from dreamdrive.run import sample as run
     from dreamdrive.scene.control import Control
@@ -119,7 +118,7 @@ def sample(
     console.print(f"{out}: {len(clip)} frames{cameras}, {width}x{height}", soft_wrap=True, markup=False)
     for note in clip.provenance.get("notes", []):
         console.print(note, soft_wrap=True, markup=False)
-    options = [f"--fps {rate_hz(clip):g}", f"--size {width}x{height}"]
+    options = [f"--fps {1 / clip.interval_s:g}", f"--size {width}x{height}"]
     options += [
         f"--{option} {out / name}"
         for option, name in (

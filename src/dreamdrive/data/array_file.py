@@ -14,8 +14,7 @@ from jaxtyping import Shaped, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import open_file
-from dreamdrive.files.tensor_file import briefly
-from dreamdrive.files.zip_file import directory_bytes
+from dreamdrive.files.tensor_file import briefly, directory_bytes
 
 ARRAY_BYTES = 256_000_000
 """Bytes that arrays may take, a number counting as at least four: depth of 64 megapixels."""
@@ -52,11 +51,11 @@ def read_npz(path: Path, names: Sequence[str], *, at_most: int = ARRAY_BYTES) ->
             raise InputError(f"{path} cannot be read as an npz ({briefly(error)})") from error
 
 
-def read_npy(path: Path, *, at_most: int = ARRAY_BYTES) -> Shaped[np.ndarray, "*d"]:
-    """The array in an NPY, which may take ``at_most`` bytes."""
+def read_npy(path: Path) -> Shaped[np.ndarray, "*d"]:
+    """The array in an NPY."""
     with open_file(path) as file:
         try:
-            return _array(file, at_most)
+            return _array(file, ARRAY_BYTES)
         except InputError as error:
             raise InputError(f"{path}: the array {error}") from None
         except _DAMAGE as error:

@@ -1,7 +1,7 @@
 """A recording on disk becomes a clip: pinhole frames of one size, with times and whatever is known."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -73,10 +73,11 @@ def read_clip(
     if fps is not None and not (isfinite(fps) and fps > 0):
         raise InputError(f"--fps {fps:g}: expected a positive number of frames a second")
     source = open_source(path)
-    picked = _gather(source, Selection.parse(frames), size, lambda of: calibration(of, intrinsics, hfov_deg))
-    index = np.array(picked.index)
-    times_s, said = _times(source, index, picked.times_s, fps)
-    notes = [*said, *picked.notes]
+    chosen = Selection.parse(frames)
+    sampler, read = _gather(source, chosen, size, lambda of: calibration(of, intrinsics, hfov_deg))
+    index, clock_s = np.array([raw.index for raw in read]), [raw.time_s for raw in read]
+    times_s, said = _times(source, index, clock_s, fps)
+    notes = [*said, *dict.fromkeys(note for raw in read for note in raw.notes), *sampler.notes]
 
     def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
         if file is None:
@@ -87,16 +88,16 @@ def read_clip(
         return found
 
     known_poses, asked = poses_in(poses, "--poses"), poses_in(trajectory, "--trajectory")
-    valid = np.stack(picked.valid)
+    valid = np.array([raw.opaque for raw in read], bool)
     if not valid.any():
         raise InputError(
             f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
         )
-    frames_rgb = np.stack(picked.frames)
+    frames_rgb = np.stack([raw.rgb for raw in read])
     _check_pictures(frames_rgb, valid, path)
     found = find_cuts(frames_rgb, valid)
-    notes += [*of_damage(picked.damaged), *_gaps(source, index, picked.times_s, fps), *of_cuts(found, index)]
-    sampler = picked.sampler
+    notes += of_damage([raw.index for raw in read if raw.damaged])
+    notes += [*_gaps(source, index, clock_s, fps), *of_cuts(found, index)]
     given = None if features is None else read_features(features).of_frames(index, source.count, features)
     return Clip(
         frames=frames_rgb,
@@ -110,7 +111,7 @@ def read_clip(
         known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
         requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
         cuts=tuple(cut.first for cut in found.cuts),
-        provenance=_provenance(source, picked, notes)
+        provenance=_provenance(source, sampler, notes)
         | ({} if given is None else {"features": given.provenance}),
     )
 
@@ -134,7 +135,12 @@ class _Sampler:
         lens = Lens(known.distortion, camera)
         return _Sampler(known, sizing, camera, lens, Undistorter.create(lens, known.camera, sizing))
 
-    def __call__(self, raw: RawFrame) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:
+    @property
+    def notes(self) -> list[str]:
+        larger = f"The frames are enlarged {1 / self.sizing.shrink:.2f} times; they hold no more detail."
+        return [*self.calibration.notes, *([larger] if self.sizing.shrink < 1 else [])]
+
+    def __call__(self, raw: RawFrame) -> RawFrame:
         apply = self.sizing.apply if self.undistorter is None else self.undistorter.apply
         width, height = self.sizing.target
         valid = np.ones((height, width), bool) if self.undistorter is None else self.undistorter.valid.copy()
@@ -142,30 +148,7 @@ class _Sampler:
             valid &= apply(raw.opaque.astype(np.uint8) * 255) == 255
         frame = apply(raw.rgb)
         frame[~valid] = 0
-        return frame, valid
-
-
-@dataclass
-class _Picked:
-    """What has been read so far."""
-
-    sampler: _Sampler
-    first: RawFrame
-    index: list[int] = field(default_factory=list)
-    times_s: list[float | None] = field(default_factory=list)
-    frames: list[UInt8[np.ndarray, "h w 3"]] = field(default_factory=list)
-    valid: list[Bool[np.ndarray, "h w"]] = field(default_factory=list)
-    damaged: list[int] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def add(self, raw: RawFrame) -> None:
-        frame, valid = self.sampler(raw)
-        self.index.append(raw.index)
-        self.times_s.append(raw.time_s)
-        self.frames.append(frame)
-        self.valid.append(valid)
-        self.damaged += [raw.index] if raw.damaged else []
-        self.notes += [note for note in raw.notes if note not in self.notes]
+        return replace(raw, rgb=frame, opaque=valid)
 
 
 def _gather(
@@ -173,54 +156,39 @@ def _gather(
     selection: Selection,
     size: tuple[int, int] | None,
     calibrated: Callable[[tuple[int, int]], Calibration],
-) -> _Picked:
-    """Read the selected frames, each brought to the clip's size as it comes."""
+) -> tuple[_Sampler, list[RawFrame]]:
+    """The selected frames, each brought to the clip's size as it comes."""
     count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
-    wanted = selection.resolve(count, str(source.path))
-    picked: _Picked | None = None
+    sampler: _Sampler | None = None
+    read: list[RawFrame] = []
     most = MAX_FRAMES
-    for raw in _limited(source, wanted):
-        if picked is None:
+    for raw in source.read(selection.resolve(count, str(source.path))):
+        if sampler is None:
             sampler = _Sampler.create(raw.size, size, calibrated(raw.size))
-            picked = _Picked(sampler, raw)
             most = _most_frames(sampler.sizing.target)
-        elif raw.size != picked.first.size:
-            (w, h), (w2, h2) = picked.first.size, raw.size
+        if raw.size != sampler.sizing.source:
+            (w, h), (w2, h2) = sampler.sizing.source, raw.size
             raise InputError(
-                f"{source.path}: {picked.first.name} is {w}x{h} but {raw.name} is {w2}x{h2}; "
+                f"{source.path}: {read[0].name} is {w}x{h} but {raw.name} is {w2}x{h2}; "
                 "expected frames of one size"
             )
-        if len(picked.index) == most:
-            width, height = picked.sampler.sizing.target
+        if len(read) == most:
+            width, height = sampler.sizing.target
+            smaller = ", or give a smaller --size" if most < MAX_FRAMES else ""
             raise InputError(
-                f"{source.path}: memory holds {most} frames of {width}x{height} at most, and more are "
-                "selected; choose some with --frames START:STOP:STEP, or give a smaller --size"
+                f"{source.path}: more than {most} frames of {width}x{height} are selected, too many to hold "
+                f"in memory; choose some with --frames START:STOP:STEP{smaller}"
             )
-        picked.add(raw)
-    if picked is None or len(picked.index) < 2:
+        read.append(sampler(raw))
+    if sampler is None or len(read) < 2:
         raise one_frame(source.path)
-    picked.notes += picked.sampler.calibration.notes
-    if picked.sampler.sizing.shrink < 1:
-        picked.notes.append(
-            f"The frames are enlarged {1 / picked.sampler.sizing.shrink:.2f} times; they hold no more detail."
-        )
-    return picked
+    return sampler, read
 
 
 def _most_frames(size: tuple[int, int]) -> int:
     """Frames that free memory holds: four bytes a pixel with its validity, twice while they are stacked."""
     free = free_bytes()
-    return MAX_FRAMES if free is None else max(1, free // (8 * size[0] * size[1]))
-
-
-def _limited(source: Source, wanted: range) -> Iterator[RawFrame]:
-    for number, raw in enumerate(source.read(wanted)):
-        if number == MAX_FRAMES:
-            raise InputError(
-                f"{source.path}: more than {MAX_FRAMES} frames are selected, too many to hold in memory; "
-                "choose some with --frames START:STOP:STEP"
-            )
-        yield raw
+    return MAX_FRAMES if free is None else min(MAX_FRAMES, max(1, free // (8 * size[0] * size[1])))
 
 
 def _times(
@@ -266,8 +234,7 @@ def _gaps(
     return of_time_jumps(index, np.array(clock_s, dtype=np.float64))
 
 
-def _provenance(source: Source, picked: _Picked, notes: list[str]) -> dict[str, Any]:
-    sampler = picked.sampler
+def _provenance(source: Source, sampler: _Sampler, notes: list[str]) -> dict[str, Any]:
     return {
         "input": str(source.path),
         "kind": "video" if isinstance(source, Video) else "images",

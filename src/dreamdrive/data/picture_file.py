@@ -1,12 +1,13 @@
 """Pictures on disk, decoded only where their header says that they fit into memory."""
 
+import struct
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 from jaxtyping import Shaped
 
-from dreamdrive.data.picture_header import Header, parse_header
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_bytes
 
@@ -17,6 +18,27 @@ PICTURE_BYTES = 200_000_000
 KINDS = "PNG, JPEG, BMP, TIFF or WebP"
 _MAX_SCANS = 50
 """Scans that a JPEG may have: decoding takes as long for each. Usual are 10."""
+_JPEG_SIZES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
+"""Markers behind which a JPEG has its size; the three left out have tables."""
+_JPEG_SCAN = 0xDA
+_JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xDA)})
+"""Markers of a JPEG without content."""
+_BYTES_OF = {1: 1, 3: 2, 4: 4, 16: 8}
+"""Bytes of a whole number in TIFF, by its type."""
+_WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274
+
+
+@dataclass(frozen=True)
+class Header:
+    """The header of a PNG, JPEG, BMP, TIFF or WebP, with its size as stored, before turning.
+
+    ``orientation`` is how to turn it, as EXIF counts, 1 to 8; 1 of a TIFF, which its decoder turns.
+    """
+
+    kind: str
+    width_px: int
+    height_px: int
+    orientation: int = 1
 
 
 def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
@@ -81,3 +103,113 @@ def _upright(picture: Shaped[np.ndarray, "h w *c"], orientation: int) -> Shaped[
     mirrored = orientation in (2, 4, 5, 7)
     quarters = {1: 0, 2: 0, 3: 2, 4: 2, 5: 1, 6: 3, 7: 3, 8: 1}[orientation]
     return np.rot90(picture[:, ::-1] if mirrored else picture, quarters)
+
+
+def parse_header(data: bytes) -> Header | None:
+    """The header of a picture, the largest size where it has several; None if it has none or is cut short."""
+    try:
+        if data[:8] == b"\x89PNG\r\n\x1a\n":
+            return _png(data)
+        if data[:2] == b"\xff\xd8":
+            return _jpeg(data)
+        if data[:2] == b"BM":
+            return _bmp(data)
+        if data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+            tags = _tags(data)
+            return Header("TIFF", max(tags.get(_WIDTH, [0])), max(tags.get(_HEIGHT, [0])))
+        if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+            return _webp(data)
+    except struct.error:
+        return None
+    return None
+
+
+def _png(data: bytes) -> Header | None:
+    if data[12:16] != b"IHDR":
+        return None
+    width, height = struct.unpack_from(">II", data, 16)
+    place, orientation, kind = 8, 1, b""
+    while kind != b"IEND":
+        length, kind = struct.unpack_from(">I4s", data, place)
+        if kind == b"eXIf":
+            orientation = _turn(data[place + 8 : place + 8 + length])
+        place += 12 + length
+        # OpenCV takes memory for what a part says that it holds.
+        if place > len(data):
+            return None
+    return Header("PNG", width, height, orientation)
+
+
+def _jpeg(data: bytes) -> Header | None:
+    width, height, orientation, place = 0, 0, 1, 2
+    while True:
+        place = data.find(b"\xff", place)
+        while data[place : place + 2] == b"\xff\xff":
+            place += 1
+        marker = data[place + 1] if 0 <= place < len(data) - 1 else _JPEG_SCAN
+        if marker == _JPEG_SCAN:
+            return Header("JPEG", width, height, orientation)
+        place += 2
+        if marker in _JPEG_ALONE:
+            continue
+        (length,) = struct.unpack_from(">H", data, place)
+        if marker in _JPEG_SIZES:
+            rows, columns = struct.unpack_from(">HH", data, place + 3)
+            width, height = max(width, columns), max(height, rows)
+        elif marker == 0xE1 and data[place + 2 : place + 8] == b"Exif\0\0" and orientation == 1:
+            orientation = _turn(data[place + 8 : place + length])
+        place += max(length, 2)
+
+
+def _bmp(data: bytes) -> Header:
+    (size,) = struct.unpack_from("<I", data, 14)
+    width, height = struct.unpack_from("<HH" if size == 12 else "<ii", data, 18)
+    return Header("BMP", abs(width), abs(height))
+
+
+def _webp(data: bytes) -> Header | None:
+    kind = data[12:16]
+    if kind == b"VP8 ":
+        width, height = struct.unpack_from("<HH", data, 26)
+        return Header("WebP", width & 0x3FFF, height & 0x3FFF)
+    if kind == b"VP8L":
+        (bits,) = struct.unpack_from("<I", data, 21)
+        return Header("WebP", (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1)
+    if kind != b"VP8X" or len(data) < 30:
+        return None
+    width, height = (int.from_bytes(data[place : place + 3], "little") + 1 for place in (24, 27))
+    place, orientation = 12, 1
+    while place + 8 <= len(data):
+        name, length = struct.unpack_from("<4sI", data, place)
+        if name == b"EXIF":
+            orientation = _turn(data[place + 8 : place + 8 + length].removeprefix(b"Exif\0\0"))
+        place += 8 + length + length % 2
+    return Header("WebP", width, height, orientation)
+
+
+def _turn(exif: bytes) -> int:
+    """Orientation in a block of EXIF; 1, upright, where it says nothing usable."""
+    try:
+        found = _tags(exif).get(_ORIENTATION, [1])[0]
+    except struct.error:
+        return 1
+    return found if 1 <= found <= 8 else 1
+
+
+def _tags(data: bytes) -> dict[int, list[int]]:
+    """Whole numbers by tag in the first directory of a TIFF, which EXIF is too; a tag may repeat."""
+    order = "<" if data[:2] == b"II" else ">"
+    big = data[2:4] in (b"+\0", b"\0+")
+    # BigTIFF has eight bytes where TIFF has four, and counts its entries with eight instead of two.
+    (place,) = struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)
+    (count,) = struct.unpack_from(order + ("Q" if big else "H"), data, place)
+    place += 8 if big else 2
+    found: dict[int, list[int]] = {}
+    for entry in range(min(count, 65535)):
+        at = place + entry * (20 if big else 12)
+        tag, kind = struct.unpack_from(order + "HH", data, at)
+        if tag in (_WIDTH, _HEIGHT, _ORIENTATION):
+            at += 12 if big else 8
+            value = data[at : at + _BYTES_OF.get(kind, 4)]
+            found.setdefault(tag, []).append(int.from_bytes(value, "little" if order == "<" else "big"))
+    return found

@@ -32,11 +32,6 @@ ABOUT = "provenance.json"
 _INTRINSICS = "intrinsics.json"
 
 
-def rate_hz(clip: Clip) -> float:
-    """Frames a second, the median where they are not even."""
-    return 1 / clip.interval_s
-
-
 def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace: bool = False) -> None:
     """Write a clip of at least two frames; the folder appears whole or not at all.
 
@@ -44,9 +39,10 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
     place of an older folder of this kind. Features of too many channels raise ``ValueError``.
     """
     first = clip.only(int(clip.camera[0]))
+    rate_hz = 1 / first.interval_s
     values = {
         **about,
-        "fps": rate_hz(first),
+        "fps": rate_hz,
         "frames": len(first),
         "cameras": len(clip.rig),
         "size": list(clip.size),
@@ -58,7 +54,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
             _write_camera(clip, made)
         else:
             _write_cameras(clip, made)
-        write_video(made / "video.mp4", iter(first.frames), rate_hz(first))
+        write_video(made / "video.mp4", iter(first.frames), rate_hz)
         _write_path(first, made)
         if clip.features and len(clip.rig) == 1:
             write_features(made / "features.safetensors", FeatureFile(clip.features, values))

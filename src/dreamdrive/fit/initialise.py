@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.features import pixel_features
+from dreamdrive.scene.clip import Clip, pixel_features
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.geometry import Geometry
 
@@ -69,7 +68,7 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         options: Density and sizes of the seeds.
 
     Returns:
-        Gaussians with features Z_ref, see ``scene.features``.
+        Gaussians with features Z_ref, see ``scene.clip.pixel_features``.
 
     Raises:
         InputError: No pixel of any frame has depth.

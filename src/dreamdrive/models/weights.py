@@ -24,8 +24,7 @@ from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import is_inside, open_file, read_text
-from dreamdrive.files.tensor_file import DAMAGE, HEADER_BYTES, briefly, header_problem
-from dreamdrive.files.zip_file import directory_bytes
+from dreamdrive.files.tensor_file import DAMAGE, HEADER_BYTES, briefly, directory_bytes, header_problem
 
 Network = TypeVar("Network", bound=nn.Module)
 _SHOWN = 4

@@ -7,7 +7,7 @@ from dreamdrive.choices import DATASETS
 from dreamdrive.data.clip_reader import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
-from dreamdrive.data.source import Source, open_source
+from dreamdrive.data.source import open_source
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.motion import REPRESENTATIONS
@@ -18,7 +18,6 @@ from dreamdrive.run.outcome import duration
 from dreamdrive.scene.control import Control
 
 
-@dataclass(frozen=True)
 class _Measured:
     """Seconds of one core and bytes, of 17 runs on two cores of an AMD EPYC (AVX2), 2026-11-23.
 
@@ -42,8 +41,6 @@ class _Measured:
     base_bytes: float = 580e6
     pixel_bytes: float = 200.0
 
-
-MEASURED = _Measured()
 
 LONG = 60
 """Frames from which on a clip is called long."""
@@ -96,19 +93,16 @@ def _of_recording(control: Control, selection: Selection) -> Planned | None:
     wanted = range(claimed)[selection.start : selection.stop : selection.step]
     if not 0 < len(wanted) <= MAX_FRAMES:
         return None  # whoever reads the frames says what is wrong, or that the file claims too much
-    size = choose_size(_first_size(source), control.size).target
+    first = next(iter(source.read(range(1))))
+    size = choose_size(first.size, control.size).target
     chosen = control.frames is not None
     rate_hz = control.fps or (source.rate_hz if isinstance(source, Video) else None)
     return Planned(len(wanted), max(1, len(rig)), size, rate_hz, wanted.start, wanted.step, chosen)
 
 
-def _first_size(source: Source) -> tuple[int, int]:
-    return next(iter(source.read(range(1)))).size
-
-
 def seconds_of(planned: Planned, options: Options, cores: int) -> float:
     """About how long a run takes, with geometry found from the frames alone."""
-    m = MEASURED
+    m = _Measured
     frames, pixels = planned.frames * planned.cameras, planned.megapixels
     more = frames / m.usual_frames
     geometry = frames * (m.frame + m.frame_megapixel * pixels) * more**m.frame_growth
@@ -122,7 +116,7 @@ def seconds_of(planned: Planned, options: Options, cores: int) -> float:
 def bytes_of(planned: Planned) -> float:
     """About how much memory a run takes at its peak."""
     pixels = planned.frames * planned.cameras * planned.megapixels * 1e6
-    return MEASURED.base_bytes + MEASURED.pixel_bytes * pixels
+    return _Measured.base_bytes + _Measured.pixel_bytes * pixels
 
 
 def check_memory(planned: Planned, free: int | None) -> None:
@@ -130,8 +124,8 @@ def check_memory(planned: Planned, free: int | None) -> None:
     needed = bytes_of(planned)
     if free is None or needed <= free:
         return
-    (width, height), room = planned.size, max(0.0, free - MEASURED.base_bytes)
-    share = room / (needed - MEASURED.base_bytes)
+    (width, height), room = planned.size, max(0.0, free - _Measured.base_bytes)
+    share = room / (needed - _Measured.base_bytes)
     advice: list[str] = []
     if (fitting := int(planned.frames * share)) >= ENOUGH_FRAMES:
         advice.append(_frames(planned.start, fitting, planned.step))

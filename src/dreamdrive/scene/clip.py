@@ -3,12 +3,16 @@
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.geometry import Ground
+from dreamdrive.scene.geometry import Geometry, Ground
 from dreamdrive.scene.trajectory import Trajectory
+
+OF_GEOMETRY = 2
+"""Leading channels that geometry gives: moving evidence and confidence. Those of the clip's frames follow."""
 
 
 @dataclass(frozen=True)
@@ -139,3 +143,14 @@ class Clip:
     def with_features(self, **features: Float[np.ndarray, "f _ _ _"]) -> "Clip":
         """The clip with more named features."""
         return replace(self, features={**self.features, **features})
+
+
+def pixel_features(clip: Clip, geometry: Geometry, frame: int) -> Float[np.ndarray, "h w c"]:
+    """Z_ref of one frame at the frame's size: what geometry gives, then all features of the clip by name."""
+    size = clip.size
+    maps = [geometry.moving[frame][..., None], geometry.confidence[frame][..., None]]
+    for name in sorted(clip.features):
+        feature = np.asarray(clip.features[name][frame], dtype=np.float32)
+        resized = cv2.resize(feature, size, interpolation=cv2.INTER_LINEAR)
+        maps.append(resized.reshape(size[1], size[0], -1))
+    return np.concatenate(maps, axis=2).astype(np.float32)

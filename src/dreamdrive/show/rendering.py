@@ -1,8 +1,9 @@
 """New drives through a scene as videos, pictures or arrays."""
 
 import json
+import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import RATES_HZ, Drive, frame_rate
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.paths import inside
 from dreamdrive.machine import free_bytes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
@@ -32,6 +34,7 @@ PER_METRE = 256
 """What a depth of one metre is in a 16-bit PNG, as in KITTI: up to 256 m in steps of 4 mm."""
 _BYTES_PER_PX = 200
 """Memory that rendering and encoding take a pixel: 190 for a video of 3840x2160, less for the others."""
+_FILES = (".mp4", ".png", ".npz")
 
 
 @dataclass(frozen=True)
@@ -165,3 +168,45 @@ def _check_replaceable(path: Path) -> None:
     foreign = [name for name in names if name != NOTE and not re.fullmatch(r"\d{4,}\.(png|npz)", name)]
     if foreign:
         raise InputError(f"{path} holds other files ({', '.join(sorted(foreign)[:3])}); choose another place")
+
+
+def places(out: Path, output: Path | None, drives: Sequence[Drive], look: Look) -> list[Path]:
+    """Where each drive goes: ``-o``, or ``video`` in the output folder, where no link leads elsewhere.
+
+    ``-o`` is the result of a single drive, or the folder for those of several. What is not all colours is
+    part of the default name.
+    """
+    if output is not None:
+        _check_place(out, output)
+        if len(drives) == 1:
+            return [_single(output, look)]
+        if output.suffix.lower() in _FILES:
+            raise InputError(
+                f"-o {output}: expected a folder for {len(drives)} trajectories, not the name of a file"
+            )
+    kind = "" if look.show == "colour" else f"_{look.show}"
+    kind += {"mp4": ".mp4", "png": "", "npz": "_npz"}[look.format]
+    names = [f"{drive.name}{kind}" for drive in drives]
+    if output is not None:
+        return [inside(output, name) for name in names]
+    return [inside(out, f"video/{name}") for name in names]
+
+
+def _single(output: Path, look: Look) -> Path:
+    if look.format == "mp4" and output.suffix.lower() != ".mp4":
+        raise InputError(f"-o {output}: expected a name that ends in .mp4")
+    if look.format != "mp4" and output.suffix.lower() in _FILES:
+        raise InputError(f"-o {output}: expected a folder for --format {look.format}, not the name of a file")
+    if output.name in ("", ".."):
+        raise InputError(f"-o {output}: expected the name of a new folder")
+    return output
+
+
+def _check_place(out: Path, output: Path) -> None:
+    """What lies among its results stops ``generate`` from working there again."""
+    place, home = (Path(os.path.realpath(path)) for path in (output, out))
+    if place.is_relative_to(home) and not place.is_relative_to(home / "video"):
+        raise InputError(
+            f"-o {output} lies in {out}, where generate would refuse to go on beside it; choose "
+            f"{out / 'video'} or another place"
+        )

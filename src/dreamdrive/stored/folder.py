@@ -5,14 +5,17 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 import safetensors.torch
 import torch
+from jaxtyping import Float
+from msgspec import Meta
 from torch import Tensor
 
+from dreamdrive.data.formats.rigid import JsonPose
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.checked import build, check_finite
@@ -20,12 +23,12 @@ from dreamdrive.files.json_file import of_type, parse_json
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
-from dreamdrive.scene.camera import FARTHEST_M
+from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.camera import FARTHEST_M, Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.scene import Scene, SceneMotion
+from dreamdrive.scene.scene import Provenance, Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
-from dreamdrive.stored.index import MAX_PIXELS, StoredIndex, increasing
 
 FORMAT = "dreamdrive scene"
 VERSION = 2
@@ -38,6 +41,77 @@ _INDEX = "scene.json"
 _BLOCK = "main"
 _FIRST_MOTION = "network"
 """The only kind of motion in format version 1, which does not name it."""
+MAX_PIXELS = 64_000_000
+"""Most pixels of a view."""
+
+_Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+_Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+_Point = tuple[_Metres, _Metres, _Metres]
+
+
+class _StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A view, as ``Camera``."""
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    width_px: int
+    height_px: int
+    world_from_camera: JsonPose
+
+    def camera(self) -> Camera:
+        """The noun; ``ValueError`` where its pose, size or focal length is none of a camera."""
+        pose = np.array(self.world_from_camera, dtype=np.float64)
+        return Camera(self.fx_px, self.fy_px, self.cx_px, self.cy_px, self.width_px, self.height_px, pose)
+
+
+class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What moves, as ``Actor``."""
+
+    id: Annotated[int, Meta(ge=0, le=10**6)]
+    name: Annotated[str, Meta(max_length=200)]
+    kind: Annotated[str, Meta(max_length=200)]
+    count: Annotated[int, Meta(ge=0, le=10**9)]
+    times_s: list[float]
+    positions_m: list[_Point]
+
+    def actor(self) -> Actor:
+        """The noun; ``ValueError`` where times and places do not belong together."""
+        times_s = _increasing(self.times_s, f"times of {self.name}")
+        if len(self.positions_m) != len(times_s):
+            raise ValueError(f"{self.name} has {len(times_s)} times and {len(self.positions_m)} places")
+        positions_m = np.array(self.positions_m, dtype=np.float64).reshape(-1, 3)
+        return Actor(self.id, self.name, self.kind, self.count, times_s, positions_m)
+
+
+class _StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The range of the panorama, as ``Sky``."""
+
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+
+
+class _StoredIndex(msgspec.Struct, frozen=True):
+    """All of ``scene.json`` that a scene is made of."""
+
+    parts: dict[str, _Digest]
+    actors: list[_StoredActor]
+    cameras: Annotated[list[_StoredCamera], Meta(min_length=1)]
+    times_s: list[float]
+    held_out: list[bool]
+    provenance: Provenance
+    camera: list[Annotated[int, Meta(ge=0, le=10**4)]] | None = None
+    deformation: dict[str, int | float | str] | None = None
+    sky: _StoredSky | None = None
+
+
+def _increasing(values: list[float], name: str) -> Float[np.ndarray, " t"]:
+    """Times as an array; ``ValueError`` where they do not increase."""
+    times_s = np.array(values, dtype=np.float64)
+    if (np.diff(times_s) <= 0).any():
+        raise ValueError(f"{name} do not increase")
+    return times_s
 
 
 def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
@@ -54,7 +128,8 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     parts = {f"{_BLOCK}-{name}.safetensors": _encode(tensors) for name, tensors in _tensors(scene).items()}
     index = {
         "format": FORMAT,
-        "version": _version(scene),
+        # Version 1 knows deformation fields alone, and does not name them.
+        "version": 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION,
         "conventions": CONVENTIONS,
         "provenance": asdict(scene.provenance),
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
@@ -79,7 +154,7 @@ def load_scene(path: Path) -> Scene:
             that no scene has, or more than the memory that is free.
     """
     index = _read_index(path)
-    stored = of_type(index, StoredIndex, str(path / _INDEX))
+    stored = of_type(index, _StoredIndex, str(path / _INDEX))
     parts = {name: _read_part(path, name, digest) for name, digest in stored.parts.items()}
 
     def part(name: str) -> dict[str, Tensor] | None:
@@ -91,11 +166,6 @@ def load_scene(path: Path) -> Scene:
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} is not a complete scene ({error}); generate it again") from error
     return scene
-
-
-def _version(scene: Scene) -> int:
-    """The oldest format that holds the scene: version 1 knows deformation fields alone."""
-    return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION
 
 
 def _encode(tensors: dict[str, Tensor]) -> bytes:
@@ -192,17 +262,18 @@ def _read_part(path: Path, name: str, digest: str) -> dict[str, Tensor]:
     return tensors
 
 
-def _rebuild(stored: StoredIndex, part: Callable[[str], dict[str, Tensor] | None]) -> Scene:
+def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | None]) -> Scene:
     static, dynamic = part("static"), part("dynamic")
     if static is None or dynamic is None:
         raise KeyError("no static or no dynamic Gaussians")
+    ranges = {} if stored.sky is None else msgspec.structs.asdict(stored.sky)
     sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
     return Scene(
         static=build(Gaussians, static),
         dynamic=build(Gaussians, dynamic),
         deformation=None if motion is None else _rebuilt(stored.deformation or {}, motion),
         actors=tuple(actor.actor() for actor in stored.actors),
-        sky=None if sky is None else build(Sky, {**sky, **_asdict(stored.sky)}),
+        sky=None if sky is None else build(Sky, {**sky, **ranges}),
         exposure=None if exposure is None else _exposure(exposure),
         cameras=tuple(camera.camera() for camera in stored.cameras),
         times_s=np.array(stored.times_s, dtype=np.float64),
@@ -210,10 +281,6 @@ def _rebuild(stored: StoredIndex, part: Callable[[str], dict[str, Tensor] | None
         camera=None if stored.camera is None else np.array(stored.camera, dtype=np.int64),
         provenance=stored.provenance,
     )
-
-
-def _asdict(stored: msgspec.Struct | None) -> dict[str, Any]:
-    return {} if stored is None else msgspec.structs.asdict(stored)
 
 
 def _exposure(part: dict[str, Tensor]) -> Exposure:
@@ -226,7 +293,7 @@ def _check(scene: Scene) -> None:
     count = len(scene.cameras)
     for camera in (0,) if scene.camera is None else np.unique(scene.camera).tolist():
         own = slice(None) if scene.camera is None else scene.camera == camera
-        increasing(scene.times_s[own].tolist(), "times of the views")
+        _increasing(scene.times_s[own].tolist(), "times of the views")
     if max(camera.width_px * camera.height_px for camera in scene.cameras) > MAX_PIXELS:
         raise ValueError(f"a view has more than {MAX_PIXELS:.0e} pixels")
     for part in (scene.static, scene.dynamic):

@@ -89,19 +89,12 @@ class Drive:
         """The street, for views from elsewhere; one that was read is built when it is first looked at."""
         return World(self.layout)
 
-    @cached_property
-    def map_from_world(self) -> Float[np.ndarray, "4 4"]:
-        """Inverse of ``world_from_map``."""
-        return np.linalg.inv(self.world_from_map)
-
     def views(self, cameras: Sequence[Camera], times_s: Sequence[float]) -> list[WorldView]:
         """What cameras elsewhere in the world see, each at its time; flow leads 0.1 s ahead."""
-        placed = [self._placed(c) for c in cameras]
+        map_from_world = np.linalg.inv(self.world_from_map)
+        placed = [camera.at(map_from_world @ camera.world_from_camera) for camera in cameras]
         later = [t + 0.1 for t in times_s]
         return list(_looks(self.world, placed, list(times_s), placed, later, antialiased=True))
-
-    def _placed(self, camera: Camera) -> Camera:
-        return camera.at(self.map_from_world @ camera.world_from_camera)
 
 
 def ego_poses(

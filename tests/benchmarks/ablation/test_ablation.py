@@ -15,7 +15,7 @@ from ablation import main as ablation
 from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
 from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
-from dreamdrive.scene.features import OF_GEOMETRY
+from dreamdrive.scene.clip import OF_GEOMETRY
 from street import methods
 
 

@@ -9,8 +9,7 @@ import pytest
 from dreamdrive.errors import InputError
 from dreamdrive.world import Drive, make_street
 from dreamdrive.world.corruption import Corruption, corrupt, parse_corruption
-from dreamdrive.world.corruption.effects import slide, wobble
-from dreamdrive.world.corruption.noise import Noise
+from dreamdrive.world.corruption.effects import Noise, slide, wobble
 from dreamdrive.world.corruption.settings import STRENGTHS
 
 

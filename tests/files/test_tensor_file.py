@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dreamdrive.files.zip_file import directory_bytes
+from dreamdrive.files.tensor_file import directory_bytes
 
 
 def archive(path: Path, count: int, comment: bytes = b"") -> int:
