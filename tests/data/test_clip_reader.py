@@ -28,7 +28,8 @@ def test_a_folder_becomes_a_clip(make_folder):
     assert clip.size == (64, 48)
     assert clip.valid.all()
     np.testing.assert_array_equal(clip.frames[1], texture(48, 64, 5))
-    assert clip.provenance["lens"] is None
+    assert clip.recorded is not None
+    assert clip.recorded.lens is None
     assert not clip.known.intrinsics
     assert clip.known.world_from_camera is None
     assert json.loads(json.dumps(clip.provenance)) == clip.provenance
@@ -51,7 +52,8 @@ def test_times_follow_the_rate_of_the_input(make_video, start, step, fps):
 def test_a_video_has_its_own_times(make_video):
     clip = read_clip(make_video(12, rate=20), frames="4:12:2")
     assert clip.times_s.tolist() == pytest.approx([0, 0.1, 0.2, 0.3])
-    assert clip.provenance["kind"] == "video"
+    assert clip.recorded is not None
+    assert clip.recorded.is_video
 
 
 def test_negative_indices_count_from_the_end_of_a_video(make_video):
@@ -108,7 +110,7 @@ def test_a_calibrated_clip_is_undistorted_once(make_folder, tmp_path):
     assert (clip.rig[0].fx_px, clip.rig[0].cx_px, clip.rig[0].cy_px) == (60, 32, 24)
     assert not clip.valid[0, 0, 0]
     assert clip.valid[0, 24, 32]
-    lens = Lens.from_json(clip.provenance["lens"])
+    lens = Lens.from_json(clip.recorded.lens)
     assert lens.camera.matrix.tolist() == clip.rig[0].matrix.tolist()
     again = lens.apply(clip.frames[0] / 255.0)
     error = np.abs(again - texture(48, 64) / 255.0)[4:-4, 4:-4]
@@ -227,7 +229,7 @@ def test_golden_a_distorted_video_survives_there_and_back(data_dir):
     options = {"frames": "0:4:2", "size": (480, 270)}
     plain = read_clip(clips / "video.mp4", **options)
     clip = read_clip(clips / "video.mp4", **options, intrinsics=clips / "meta.json")
-    lens = Lens.from_json(clip.provenance["lens"])
+    lens = Lens.from_json(clip.recorded.lens)
     again = lens.apply(clip.frames[0] / 255.0)
     seen = lens.covered()
     error = (again - plain.frames[0] / 255.0)[seen]

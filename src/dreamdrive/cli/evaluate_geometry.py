@@ -135,9 +135,9 @@ def open_estimate(out: Path) -> "tuple[Estimate, tuple[str, ...]]":
     clip = None if (out / "scene").is_dir() else _stage(inside(out, "stages/prior"), Clip)
     if geometry is not None and clip is not None:
         _check_agreement(out, clip, geometry)
-        source = clip.provenance.get("input")
-        lens = clip.provenance.get("lens") is not None
-        name = None if source is None else Path(str(source)).resolve().name
+        taken = clip.recorded
+        lens = taken is not None and taken.lens is not None
+        name = None if taken is None else Path(taken.path).resolve().name
         made = Estimate.of(
             geometry, clip.times_s, clip.held_out, clip.source_index, source=name, undistorted=lens
         )

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
@@ -24,7 +23,7 @@ from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
 from dreamdrive.machine import free_bytes
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.trajectory import Trajectory
 
 FOLDER_RATE_HZ = 10.0
@@ -51,7 +50,7 @@ def read_clip(
     """Read a video or a folder of images as a clip.
 
     The frames are undistorted to a pinhole with the source's focal length and axis, scaled and cropped, in
-    one resampling; ``provenance["lens"]`` holds what gives a render the source's distortion back
+    one resampling; ``recorded.lens`` holds what gives a render the source's distortion back
     (``Lens.from_json``), or ``None``. Time 0 and the world are those of the first selected frame. Changes to
     another scene are ``cuts``; ``provenance["notes"]`` says in words what was noticed.
 
@@ -111,8 +110,8 @@ def read_clip(
         known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
         requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
         cuts=tuple(cut.first for cut in found.cuts),
-        provenance=_provenance(source, sampler, notes)
-        | ({} if given is None else {"features": given.provenance}),
+        recorded=_recorded(source, sampler),
+        provenance={"notes": notes} | ({} if given is None else {"features": given.provenance}),
     )
 
 
@@ -234,16 +233,11 @@ def _gaps(
     return of_time_jumps(index, np.array(clock_s, dtype=np.float64))
 
 
-def _provenance(source: Source, sampler: _Sampler, notes: list[str]) -> dict[str, Any]:
-    return {
-        "input": str(source.path),
-        "kind": "video" if isinstance(source, Video) else "images",
-        "source_size": list(sampler.sizing.source),
-        "scaled_size": list(sampler.sizing.scaled),
-        "crop_offset": list(sampler.sizing.offset),
-        "lens": None if sampler.lens is None else sampler.lens.to_json(),
-        "notes": notes,
-    }
+def _recorded(source: Source, sampler: _Sampler) -> Recorded:
+    sizing = sampler.sizing
+    lens = None if sampler.lens is None else sampler.lens.to_json()
+    is_video = isinstance(source, Video)
+    return Recorded(str(source.path), is_video, sizing.source, sizing.scaled, sizing.offset, lens)
 
 
 RECORDING = DataSet(

@@ -11,6 +11,7 @@ Of several cameras each has ``frames`` and ``intrinsics.json`` in a folder ``cam
 they are mounted. Path and video are the first one's, features are left out.
 """
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
         "cameras": len(clip.rig),
         "size": list(clip.size),
         "source_index": first.source_index.tolist(),
+        "recorded": None if clip.recorded is None else asdict(clip.recorded),
         "provenance": clip.provenance,
     }
     with new_folder(folder, replace=replace, mark=ABOUT) as made:

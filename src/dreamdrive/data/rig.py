@@ -140,6 +140,7 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
         mounted = np.stack([from_first @ camera.car_from_camera for camera in cameras])
         known = replace(known, world_from_camera=first[row] @ mounted[part])
     notes = [note for each in parts for note in each.provenance["notes"]]
+    taken = parts[0].recorded
     return Clip(
         frames=np.stack([parts[p].frames[r] for p, r in zip(part, row, strict=True)]),
         times_s=times_s,
@@ -151,12 +152,8 @@ def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
         known=known,
         requested=parts[0].requested,
         cuts=tuple(sorted(step * count + p for p, each in enumerate(parts) for step in each.cuts)),
-        provenance={
-            **parts[0].provenance,
-            "input": str(path),
-            "lens": None,
-            "notes": list(dict.fromkeys(notes)),
-        },
+        recorded=None if taken is None else replace(taken, path=str(path), lens=None),
+        provenance={**parts[0].provenance, "notes": list(dict.fromkeys(notes))},
     )
 
 

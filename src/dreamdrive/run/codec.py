@@ -21,7 +21,7 @@ from dreamdrive.files.tensor_file import DAMAGE, read_own
 from dreamdrive.fit import StaticFit
 from dreamdrive.geometry import Measured, Posed
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
@@ -42,6 +42,7 @@ NOUNS: dict[str, type] = {
         Known,
         Measured,
         Posed,
+        Recorded,
         Scale,
         Sky,
         StaticFit,

@@ -118,7 +118,7 @@ def _about(path: Path | None, clip: Clip, geometry: Geometry) -> Provenance:
     return Provenance(
         input=None if path is None else path.name,
         source_index=tuple(clip.source_index.tolist()),
-        lens=clip.provenance.get("lens"),
+        lens=None if clip.recorded is None else clip.recorded.lens,
         up=None if geometry.ground is None else tuple(geometry.ground.normal_world.tolist()),
         scale=geometry.scale.source,
     )

@@ -42,6 +42,27 @@ class Known:
 
 
 @dataclass(frozen=True)
+class Recorded:
+    """How frames were taken from pictures on disk; sizes are width and height in pixels.
+
+    Attributes:
+        path: Of the recording.
+        is_video: A video; else a folder of images.
+        size: Of its pictures.
+        scaled: To which these were scaled.
+        offset: Columns and rows that were then cut away at the left and the top.
+        lens: What was taken out of the frames, as ``data.Lens.from_json`` reads it.
+    """
+
+    path: str
+    is_video: bool
+    size: tuple[int, int]
+    scaled: tuple[int, int]
+    offset: tuple[int, int]
+    lens: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True)
 class Clip:
     """Frames of one drive in the order of time; those of several cameras at one time in that of the rig.
 
@@ -59,6 +80,7 @@ class Clip:
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
         cuts: Index of each first frame of its camera after a change to another scene.
+        recorded: How the frames were taken from pictures on disk; None where they were drawn or generated.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
             of sentences for the report.
     """
@@ -75,6 +97,7 @@ class Clip:
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
     cuts: tuple[int, ...] = ()
+    recorded: Recorded | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

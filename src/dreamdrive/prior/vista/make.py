@@ -194,7 +194,6 @@ def _provenance(
         "action": None if control.action is None else _named(control.action),
         "crop_offset": list(leading.framing.corner),
         "crop_size": list(leading.framing.part),
-        "lens": None,
         "notes": notes,
     }
 

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.clip import Clip, Recorded
 
 SIZE = (40, 24)
 PICTURE = (160, 96)
@@ -26,13 +26,12 @@ def make_clip(
 ) -> Clip:
     """A clip as it is read from a folder of ``count`` pictures; the pictures themselves are empty files."""
     width, height = SIZE
-    provenance: dict = {"notes": ["The clip's own."]}
+    recorded = None
     if folder is not None:
         folder.mkdir(exist_ok=True, parents=True)
         for i in range(count):
             (folder / name.format(i)).touch()
-        provenance |= {"kind": "images", "input": str(folder), "source_size": list(picture), "lens": lens}
-        provenance |= {"scaled_size": list(scaled), "crop_offset": list(offset)}
+        recorded = Recorded(str(folder), False, picture, scaled, offset, lens)
     return Clip(
         frames=np.zeros((len(index), height, width, 3), np.uint8),
         times_s=0.1 * (np.array(index) - index[0]),
@@ -41,7 +40,8 @@ def make_clip(
         valid=np.ones((len(index), height, width), bool),
         held_out=np.zeros(len(index), bool),
         source_index=np.array(index),
-        provenance=provenance,
+        recorded=recorded,
+        provenance={"notes": ["The clip's own."]},
     )
 
 

@@ -41,14 +41,11 @@ class OntoClip:
     @staticmethod
     def of(clip: Clip) -> "OntoClip":
         """That of a clip; without a recording the frames themselves are the pictures."""
-        about = clip.provenance
-        lens = Lens.from_json(about["lens"]) if about.get("lens") else None
-        if "source_size" not in about:
-            return OntoClip(clip.size, clip.size, clip.size, (0, 0), lens)
-        source, scaled, offset = (
-            (int(about[key][0]), int(about[key][1])) for key in ("source_size", "scaled_size", "crop_offset")
-        )
-        return OntoClip(clip.size, source, scaled, offset, lens)
+        taken = clip.recorded
+        if taken is None:
+            return OntoClip(clip.size, clip.size, clip.size, (0, 0), None)
+        lens = None if taken.lens is None else Lens.from_json(taken.lens)
+        return OntoClip(clip.size, taken.size, taken.scaled, taken.offset, lens)
 
     def sizing(self, made_for: tuple[int, int], where: str) -> Sizing:
         """How a picture of the size ``made_for`` becomes a frame."""

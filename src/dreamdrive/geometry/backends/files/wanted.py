@@ -28,22 +28,21 @@ class Wanted:
     @staticmethod
     def of(clip: Clip, source: Path | None) -> "Wanted":
         """The frames of a clip, of this recording or of the one that it says that it came from."""
-        about = clip.provenance
+        taken = clip.recorded
         index = np.asarray(clip.source_index)
         period = float(np.median(np.diff(clip.times_s) / np.diff(index))) if len(index) > 1 else 0.0
-        width, height = map(int, about.get("source_size", clip.size))
         times_s = clip.times_s + period * index[0]
         # A drawn clip has no recording: its frames are all there are.
-        if about.get("kind") not in ("video", "images"):
-            return Wanted(index, times_s, None, "", (width, height), lambda: int(index.max()) + 1)
-        path = source or Path(about["input"])
+        if taken is None:
+            return Wanted(index, times_s, None, "", clip.size, lambda: int(index.max()) + 1)
+        path = source or Path(taken.path)
         names = None
-        if about["kind"] == "images":
+        if not taken.is_video:
             folder = open_source(path)
             assert isinstance(folder, ImageFolder)
             names = tuple(folder.files[int(i)].name for i in index)
         name = path.resolve().name
-        return Wanted(index, times_s, names, name, (width, height), lambda: open_source(path).count())
+        return Wanted(index, times_s, names, name, taken.size, lambda: open_source(path).count())
 
     @property
     def labels(self) -> tuple[str, ...]:
