@@ -27,9 +27,7 @@ class Model:
     world_from_camera: Float[np.ndarray, "f 4 4"]  # NaN where a frame was not registered
     points: Float[np.ndarray, "p 3"]
     seen: Bool[np.ndarray, "f p"]  # which frame sees which point
-    lens: Float[
-        np.ndarray, "5"
-    ]  # focal lengths, principal point in pixels at the working size, radial term k
+    lens: Float[np.ndarray, "5"]  # focal lengths and principal point in working pixels; radial term k
     cost: float  # mean robust (Cauchy, 1 px) cost of an observation
     reprojection_px: float  # mean
     native: Any  # pycolmap's own reconstruction

@@ -101,10 +101,9 @@ class EncoderBlock(nn.Module):
         self.norm1 = nn.LayerNorm(dim, eps=NORM_EPS)
         self.attn = Attention(dim, heads)
         self.norm2 = nn.LayerNorm(dim, eps=NORM_EPS)
-        layers: OrderedDict[str, nn.Module] = OrderedDict(
-            fc1=Linear(dim, hidden), gelu=nn.GELU(), fc2=Linear(hidden, dim)
+        self.mlp = nn.Sequential(
+            OrderedDict[str, nn.Module](fc1=Linear(dim, hidden), gelu=nn.GELU(), fc2=Linear(hidden, dim))
         )
-        self.mlp = nn.Sequential(layers)
 
     def forward(self, x: Float[Tensor, "b n d"], by: Rotation) -> Float[Tensor, "b n d"]:
         """Apply to the tokens of each image."""

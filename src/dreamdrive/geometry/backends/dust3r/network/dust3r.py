@@ -40,7 +40,7 @@ class Dust3r(nn.Module):
         self.config = config
         self.mask_token = nn.Parameter(torch.zeros(1, 1, config.dec_dim))
         squares = nn.Conv2d(3, config.enc_dim, config.patch, config.patch)
-        self.patch_embed = nn.Sequential(OrderedDict(proj=squares))
+        self.patch_embed = nn.Sequential(OrderedDict[str, nn.Module](proj=squares))
         self.enc_blocks = nn.ModuleList(
             EncoderBlock(config.enc_dim, config.enc_heads, config.hidden(config.enc_dim))
             for _ in range(config.enc_depth)
