@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.evaluate.depth_errors import depth_errors, median_scale
-from dreamdrive.evaluate.geometry import BANDS_M, STANDING_M
+from dreamdrive.evaluate.geometry import BANDS_M, STANDING_M, depth_errors, median_scale
 from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dreamdrive.evaluate.depth_errors import SHARES, depth_errors, median_scale, trust
+from dreamdrive.evaluate.geometry import SHARES, depth_errors, median_scale, trust
 
 depths = st.lists(st.tuples(st.floats(0.5, 80), st.floats(0.5, 80), st.floats(0, 1)), min_size=2, max_size=40)
 

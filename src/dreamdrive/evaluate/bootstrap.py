@@ -24,7 +24,7 @@ Distance = Callable[[Float[np.ndarray, "n d"], Float[np.ndarray, "m d"]], float]
 
 @dataclass(frozen=True)
 class DistanceFigure:
-    """A distance between two sets, with what is needed to read it.
+    """A distance between two sets, with the numbers of feature vectors and of the clips they come from.
 
     Attributes:
         value: The distance of all samples.
@@ -33,10 +33,6 @@ class DistanceFigure:
         floor: Mean distance of two random halves of the real set: what a perfect fake set of that size gets.
         half: Mean distance of a half of the fake set to a half of the real one: comparable with ``floor``,
             as ``value`` is not, because distances shrink as samples are added.
-        real_samples: Number of real feature vectors.
-        fake_samples: Number of fake ones.
-        real_clips: Number of clips they come from.
-        fake_clips: The same of the fake ones.
     """
 
     value: float

@@ -136,12 +136,8 @@ def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         u, v, depth = (stored[name].astype(np.float64) for name in ("u", "v", "depth"))
     except KeyError as error:
         raise InputError(f"{path} lacks the array {error}; expected arrays u, v and depth") from None
-    usable = u.ndim == 1 and u.shape == v.shape == depth.shape
-    if (
-        not usable
-        or not (np.abs([u, v]) <= MAX_SIDE_PX).all()
-        or not ((depth > 0) & (depth <= FARTHEST_M)).all()
-    ):
+    usable = u.ndim == 1 and u.shape == v.shape == depth.shape and (np.abs([u, v]) <= MAX_SIDE_PX).all()
+    if not (usable and ((depth > 0) & (depth <= FARTHEST_M)).all()):
         raise InputError(
             f"{path} holds u, v and depth of shapes {u.shape}, {v.shape} and {depth.shape}; expected three "
             "equally long lists of finite numbers, depths above 0"

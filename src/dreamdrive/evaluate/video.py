@@ -67,14 +67,9 @@ class VideoSettings:
 
 @dataclass(frozen=True)
 class MeanFigure:
-    """A likeness averaged over all pairs of frames.
+    """A likeness averaged over all pairs of frames, which infinite PSNR of equal frames makes infinite.
 
-    Attributes:
-        value: The mean; infinite PSNR of equal frames makes it infinite.
-        low: Lower end of its 95 % interval over clips; ``None`` where it cannot be told.
-        high: Upper end.
-        frames: Number of pairs.
-        clips: Number of clips they come from.
+    Low and high are the ends of its 95 % interval over clips; ``None`` where it cannot be told.
     """
 
     value: float

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, UInt8
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
@@ -46,8 +46,20 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
     The poses of ``requested`` are what was asked for, with the first frame at the identity. They were not
     measured in the frames and are not ``known``: how well the model keeps to them, the geometry has to find.
     """
-    path = _path(control)
-    size, (count, index) = _size(control), _wanted(control)
+    if control.trajectory is None:
+        raise InputError(
+            f"the prior cosmos needs --trajectory FILE: a path of at least {(FRAMES - 1) / RATE_HZ:g} s"
+        )
+    path, size = from_first(read_trajectory(control.trajectory)), control.size or SIZE
+    if size not in TIERS:
+        known = ", ".join(f"{width}x{height}" for width, height in TIERS)
+        raise InputError(f"--size {size[0]}x{size[1]}: Cosmos 3 makes {known}")
+    count, index = wanted_frames(control, FRAMES)
+    if not 1 < count <= FRAMES or (count - 1) % _A_LATENT:
+        raise InputError(
+            f"--frames {control.frames}: Cosmos 3 makes {_A_LATENT}n + 1 frames, at most {FRAMES}; "
+            "choose such a STOP"
+        )
     rows = relative_poses(path, count - 1, RATE_HZ)
     photo = photo_of(control, size, "cosmos")
     pipeline = _load(control)
@@ -79,32 +91,6 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
     }
     asked = Trajectory(path.at(times_s), times_s)
     return make_clip(control, (count, index), photo, made.video, RATE_HZ, provenance, asked)
-
-
-def _path(control: Control) -> Trajectory:
-    if control.trajectory is None:
-        raise InputError(
-            f"the prior cosmos needs --trajectory FILE: a path of at least {(FRAMES - 1) / RATE_HZ:g} s"
-        )
-    return from_first(read_trajectory(control.trajectory))
-
-
-def _size(control: Control) -> tuple[int, int]:
-    size = control.size or SIZE
-    if size not in TIERS:
-        known = ", ".join(f"{width}x{height}" for width, height in TIERS)
-        raise InputError(f"--size {size[0]}x{size[1]}: Cosmos 3 makes {known}")
-    return size
-
-
-def _wanted(control: Control) -> tuple[int, Int[np.ndarray, " f"]]:
-    count, index = wanted_frames(control, FRAMES)
-    if not 1 < count <= FRAMES or (count - 1) % _A_LATENT:
-        raise InputError(
-            f"--frames {control.frames}: Cosmos 3 makes {_A_LATENT}n + 1 frames, at most {FRAMES}; "
-            "choose such a STOP"
-        )
-    return count, index
 
 
 def relative_poses(path: Trajectory, steps: int, rate_hz: float) -> Float[np.ndarray, "n 9"]:

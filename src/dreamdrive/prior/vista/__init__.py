@@ -6,13 +6,13 @@ from functools import partial
 from dreamdrive.errors import InputError
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
-from dreamdrive.prior.vista.kinds import KINDS, KindName
+from dreamdrive.prior.vista.kinds import KINDS
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
 
-def _make(kind: KindName, control: Control, progress: Progress) -> Clip:
+def _make(kind: str, control: Control, progress: Progress) -> Clip:
     try:
         from dreamdrive.prior.vista.make import make_clip
     except ImportError as error:

@@ -1,9 +1,7 @@
 """The two video models that share one network: Stable Video Diffusion, and Vista, which is made from it."""
 
 from dataclasses import dataclass
-from typing import Literal
 
-KindName = Literal["svd", "vista"]
 ACTION_COLUMNS = 2432
 """Width of the context that describes the action: 19 numbers of 128 columns."""
 
@@ -17,7 +15,7 @@ class Kind:
     0 where there is one round only.
     """
 
-    name: KindName
+    name: str
     title: str
     rate_hz: float
     noise: float
