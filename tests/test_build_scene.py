@@ -8,7 +8,7 @@ from dreamdrive import Given, build_scene, options
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions
 from dreamdrive.progress import Work
-from dreamdrive.run import Run
+from dreamdrive.run import call
 from tests.streets import small_street, street_clip, true_geometry
 
 DRAFT = options.QUALITIES["draft"]
@@ -22,12 +22,10 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
     clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
     made: dict[str, object] = {}
 
-    class Noted(Run):
-        def __call__(self, name, options, compute, **chosen):
-            made[name] = super().__call__(name, options, compute, **chosen)
-            return made[name]
+    def noted(name, options, compute, **chosen):
+        made[name] = call(name, options, compute, **chosen)
+        return made[name]
 
-    noted = Noted()
     scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted)
     assert list(made) == ["geometry", "initialise", "static", "score", "group", "fit"]
     assert made["geometry"] is geometry

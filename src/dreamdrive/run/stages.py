@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_args
+from typing import Any, Protocol, TypeVar, cast, get_args, runtime_checkable
 
 import numpy as np
 import torch
@@ -51,8 +51,9 @@ def trusted(value: object) -> None:
     """No check."""
 
 
-class Run:
-    """What gives the result of a stage: this computes it and keeps nothing, ``Stages`` keeps it on disk."""
+@runtime_checkable
+class Run(Protocol):
+    """What gives the result of a stage: ``call`` computes it, ``Stages`` keeps it on disk."""
 
     def __call__(
         self,
@@ -68,14 +69,23 @@ class Run:
         It depends on the options and the results before it, nothing else; ``check`` raises ``ValueError``
         where a stored result does not belong to these.
         """
-        return compute(Work()) if given is None else given
+        ...
 
 
-call = Run()
+def call(
+    name: str,
+    options: object,
+    compute: Callable[[Work], T],
+    *,
+    check: Callable[[T], None] = trusted,
+    given: T | None = None,
+) -> T:
+    """A ``Run`` that keeps nothing."""
+    return compute(Work()) if given is None else given
 
 
 @dataclass
-class Stages(Run):
+class Stages:
     """Reads what an earlier run of the same stages left, and leaves what it computes, a folder for each.
 
     The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
