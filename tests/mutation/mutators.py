@@ -121,6 +121,8 @@ _INTS = (
     2**63,
     2**64 - 1,
 )
+_HUGE = 100_000_000
+"""Bytes from which on a file is not changed further: copies of it would not fit into the process."""
 _FLOATS = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-310, 1e7, -1.0)
 
 
@@ -131,6 +133,8 @@ def mutate(path: Path, rng: Random) -> str:
     data = path.read_bytes()
     done: list[str] = []
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        if len(data) > _HUGE:
+            break
         ways = [bytes_changed]
         if data[:2] == b"PK":
             ways = [bytes_changed, zip_changed, zip_changed]
