@@ -10,7 +10,7 @@ from tests.geometry.backends.dust3r.align.test_focal import _plane
 from tests.geometry.backends.dust3r.align.test_spanning_tree import _matrices
 from tests.geometry.backends.dust3r.network.networks import config_of, golden_network, seeded_state
 from tests.geometry.backends.dust3r.network.test_network import CASES, as_trained, decoded
-from tests.geometry.backends.dust3r.reference.test_objective import PARTS
+from tests.geometry.backends.dust3r.test_reference import PARTS
 from tests.golden.cut import write
 from torch import Tensor
 
