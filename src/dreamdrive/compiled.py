@@ -39,11 +39,11 @@ class _Compiled(torch.autograd.Function):
         outputs, gradients = compute(*plain, wanted=wanted)
         if any(wanted):
             ctx.gradients = gradients
-            ctx.save_for_backward(*inputs)  # so that torch notices what was changed in place before backward
+            ctx.save_for_backward(*inputs)
         return outputs
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *upstream: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        assert ctx.saved_tensors is not None
+        _ = ctx.saved_tensors  # raises where one of them was changed in place
         return None, *ctx.gradients(*(gradient.detach().contiguous() for gradient in upstream))

@@ -41,6 +41,14 @@ def ssim_map(image: Float[Tensor, "h w 3"], target: Float[Tensor, "h w 3"]) -> F
     return differentiable(_similarity, image, target)
 
 
+def _gradient(image: Tensor, target: Tensor, partials: Tensor | None, by_map: Tensor) -> Tensor | None:
+    if partials is None:
+        return None
+    out = torch.empty_like(image)
+    _native.ssim_backward(image, target, partials, by_map, out)
+    return out
+
+
 def _similarity(image: Tensor, target: Tensor, *, wanted: Wanted) -> tuple[Tensor, Gradients]:
     similarity = torch.empty_like(image)
     by_image, by_target = (torch.empty(3, *image.shape) if needs else None for needs in wanted)
@@ -48,14 +56,8 @@ def _similarity(image: Tensor, target: Tensor, *, wanted: Wanted) -> tuple[Tenso
         _native.ssim_forward(target, image, similarity, by_target)
     _native.ssim_forward(image, target, similarity, by_image)
 
-    def gradients(by_map: Tensor) -> list[Tensor | None]:
-        found = [None if partials is None else torch.empty_like(image) for partials in (by_image, by_target)]
-        for partials, pair, out in zip(
-            (by_image, by_target), ((image, target), (target, image)), found, strict=True
-        ):
-            if partials is not None and out is not None:
-                _native.ssim_backward(*pair, partials, by_map, out)
-        return found
+    def gradients(by_map: Tensor) -> tuple[Tensor | None, Tensor | None]:
+        return _gradient(image, target, by_image, by_map), _gradient(target, image, by_target, by_map)
 
     return similarity, gradients
 
