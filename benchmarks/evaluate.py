@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from clips import RUNS, SHORT
 from common.machine import describe_machine
 from common.markdown import replace_section
 from common.options import parser_of
@@ -22,12 +23,10 @@ PAGE = Path("docs/results/figures_of_evaluate.md")
 PANDASET = DATA / "clips/pandaset_002"
 KITTI = DATA / "clips/kitti_odom04_follow_van"
 CLIPS = {
-    "pandaset": [str(PANDASET / "front_camera"), "--frames", "20:68:2", "--fps", "10", "--size", "480x270"],
-    "kitti": [str(KITTI / "frames"), "--frames", "0:26:1", "--fps", "10", "--size", "480x144"],
+    "pandaset": [str(PANDASET / RUNS["pandaset-draft"].source), *RUNS["pandaset-draft"].options],
+    "kitti": [str(KITTI / "frames"), "--frames", "0:26:1", "--fps", "10", "--size", "480x144", *SHORT],
 }
-CLIPS["pandaset"] += ["--camera-height", "2.2"]
 CLIPS["kitti"] += ["--camera-height", "1.65", "--intrinsics", str(KITTI / "meta.json")]
-DRAFT = ["--quality", "draft", "--hold-out", "8", "--force"]
 
 
 def told(*arguments: str) -> str:
@@ -49,7 +48,7 @@ def world(runs: Path, seed: int, size: str, frames: int, *more: str) -> Path:
 def scene(runs: Path, name: str, source: list[str]) -> Path:
     """A draft of a scene."""
     out = runs / f"scene-{name}"
-    told("generate", *source, *DRAFT, "-o", str(out))
+    told("generate", *source, "--force", "-o", str(out))
     return out
 
 
@@ -60,7 +59,7 @@ def commands(runs: Path) -> dict[str, list[tuple[str, list[str]]]]:
     streets = {seed: world(runs, seed, "240x144", 16) for seed in (1, 2)}
     scenes: dict[int, Path] = {}
     for seed, made in streets.items():
-        source = [str(made / "frames"), "--intrinsics", str(made / "cameras.json")]
+        source = [str(made / "frames"), "--intrinsics", str(made / "cameras.json"), *SHORT]
         scenes[seed] = scene(runs, f"street-{seed}", source)
     clips = {name: scene(runs, name, source) for name, source in CLIPS.items()}
     truth = {"PandaSet 002": (clips["pandaset"], PANDASET), "KITTI 04": (clips["kitti"], KITTI)}
