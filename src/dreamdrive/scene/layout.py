@@ -29,13 +29,16 @@ Ring = Annotated[
 
 AreaKind = Literal["road", "sidewalk", "crossing", "parking", "grass"]
 LineKind = Literal["lane_divider", "road_divider", "road_edge", "stop_line"]
-BoxKind = Literal["car", "van", "truck", "bicycle", "pedestrian"]
-PropKind = Literal["tree", "lamp", "sign"]
+BoxKind = Literal["car", "van", "truck", "bicycle", "pedestrian", "bus", "motorcycle"]
+PropKind = Literal["tree", "lamp", "sign", "bush", "mast", "traffic_light", "bin", "cone"]
+BarrierKind = Literal["fence", "hedge", "wall", "rail"]
 
 FORMAT = 1
-EDITIONS = (1,)
+EDITIONS = (1, 2)
 """What draws streets. An edition draws the same for ever: whoever changes a picture adds one, as figures of
-different editions cannot be compared."""
+different editions cannot be compared. The first is that of the benchmarks; the second is far more various:
+what the street network is trained on."""
+BENCHMARK_EDITION = 1
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -113,6 +116,43 @@ class Prop(_Part, frozen=True):
     look: Look = 0
 
 
+class Barrier(_Part, frozen=True):
+    """Something upright that runs along a line. Drawn from edition 2 on."""
+
+    kind: BarrierKind
+    points: Annotated[list[Point], Meta(min_length=2, max_length=10_000)]
+    height_m: Size
+    look: Look = 0
+
+
+class Relief(_Part, frozen=True):
+    """Hills and dales: everything of the map is lifted by waves of these heights and lengths.
+
+    The lift is 0 with a level slope at the origin of the map. Drawn from edition 2 on.
+    """
+
+    height_m: Annotated[float, Meta(ge=0, le=50)] = 0.0
+    length_m: Annotated[float, Meta(ge=20, le=10_000)] = 200.0
+
+
+class Lens(_Part, frozen=True):
+    """How the recording camera looks. Used from edition 2 on; the first edition looks level, 64 degrees wide.
+
+    Attributes:
+        hfov_rad: Horizontal field of view.
+        pitch_rad: Positive looks down.
+        roll_rad: Positive turns the camera clockwise, seen from behind it.
+        distortion: k1 of the radial model x (1 + k1 r^2) on the image plane; negative bends like a barrel.
+        bonnet: Look of the own bonnet at the bottom of the picture; None shows none.
+    """
+
+    hfov_rad: Annotated[float, Meta(gt=0.2, lt=2.8)] = 1.117
+    pitch_rad: Angle = 0.0
+    roll_rad: Angle = 0.0
+    distortion: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0
+    bonnet: Look | None = None
+
+
 class Light(_Part, frozen=True):
     """Weather and camera.
 
@@ -123,6 +163,11 @@ class Light(_Part, frozen=True):
         haze_per_m: Light lost along each metre of sight.
         clouds: Share of the sky.
         exposure_drift: Largest relative change of brightness over the drive.
+        night: 0 by day, 1 when only lamps and headlights shine. From edition 2 on, as all below.
+        wet: Wetness of the road, which then mirrors.
+        rain: Streaks in the air and drops on the glass.
+        snow: Share of the ground that is white.
+        glare: Veil of a low sun or of headlights over the picture.
     """
 
     sun_azimuth_rad: Angle = 0.9
@@ -131,6 +176,11 @@ class Light(_Part, frozen=True):
     haze_per_m: Annotated[float, Meta(ge=0, le=1)] = 0.002
     clouds: Share = 0.4
     exposure_drift: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    night: Share = 0.0
+    wet: Share = 0.0
+    rain: Share = 0.0
+    snow: Share = 0.0
+    glare: Share = 0.0
 
 
 class Ego(_Part, frozen=True):
@@ -158,6 +208,9 @@ class Layout(_Part, frozen=True):
         buildings: Houses.
         props: Trees, lamps, signs.
         light: Weather.
+        barriers: Fences, hedges, walls, guard rails.
+        relief: Hills.
+        lens: How the camera looks.
         seed: Decides what nothing above decides, such as the grain of the asphalt.
         edition: Which of ``EDITIONS`` draws it.
         format: Version of this description.
@@ -170,6 +223,9 @@ class Layout(_Part, frozen=True):
     buildings: Annotated[list[Building], Meta(max_length=10_000)] = []
     props: Annotated[list[Prop], Meta(max_length=10_000)] = []
     light: Light = Light()
+    barriers: Annotated[list[Barrier], Meta(max_length=10_000)] = []
+    relief: Relief = Relief()
+    lens: Lens = Lens()
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     edition: int = msgspec.field(default_factory=lambda: 1)  # not a default, which is not written
     format: Literal[1] = FORMAT

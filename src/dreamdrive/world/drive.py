@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.layout import EDITIONS, Ego, Layout, track_function
+from dreamdrive.scene.layout import BENCHMARK_EDITION, Ego, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.render import WorldView, look
@@ -191,7 +191,7 @@ def make_street(
     parked: int | None = None,
     speed_m_s: float | None = None,
     camera_height_m: float = 1.5,
-    edition: int = max(EDITIONS),
+    edition: int = BENCHMARK_EDITION,
 ) -> Drive:
     """Draw a street and drive through it; None leaves a choice to the seed."""
     options = StreetOptions(frames / fps, speed_m_s, movers, parked, camera_height_m, edition)

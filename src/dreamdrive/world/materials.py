@@ -31,6 +31,10 @@ class Semantic(IntEnum):
     TRUCK = 11
     BICYCLE = 12
     PEDESTRIAN = 13
+    BUS = 14
+    MOTORCYCLE = 15
+    WALL = 16
+    OWN_CAR = 17
 
 
 @dataclass

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.layout import EDITIONS, Building, Ego, Layout, Light, Prop
+from dreamdrive.scene.layout import BENCHMARK_EDITION, Building, Ego, Layout, Light, Prop
 from dreamdrive.world.road import (
     LANE_M,
     MOST_M_S,
@@ -39,7 +39,7 @@ class StreetOptions:
     movers: int | None = None
     parked: int | None = None
     camera_height_m: float = 1.5
-    edition: int = max(EDITIONS)
+    edition: int = BENCHMARK_EDITION
 
 
 def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:

@@ -1,0 +1,1 @@
+"""The small street network: what a picture shows, without any geometry."""

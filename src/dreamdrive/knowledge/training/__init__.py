@@ -1,0 +1,1 @@
+"""How the street network is trained."""
