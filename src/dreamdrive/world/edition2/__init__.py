@@ -1,0 +1,7 @@
+"""The second edition of drawn streets: far more various than the first, on hills, through many lenses."""
+
+from dreamdrive.world.edition2.lens import bent, level_from_camera, most_barrel, pinhole, unbent
+from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED, Looks
+from dreamdrive.world.edition2.relief import Hills, hills_of
+from dreamdrive.world.edition2.streets import draw_street
+from dreamdrive.world.edition2.weather import draw_light
