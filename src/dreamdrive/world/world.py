@@ -99,7 +99,7 @@ class World:
         return Moment(t_s, Solid(mesh, owner, self._device), poses)
 
     def changed(self, light: Light, lens: Lens, ego: Ego) -> "World":
-        """The same street in another light, through another lens, from another car; what is built is shared."""
+        """The same street in another light, through another lens, from another car, built once for all."""
         other = copy(self)
         other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
         other.sky = make_sky(light, self.layout.seed)

@@ -1,4 +1,4 @@
-"""Training pictures of drawn streets: worlds of the second edition, seen from many places, with exact truth."""
+"""Training pictures of drawn streets: the second edition, seen from many places, with exact truth."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed

@@ -49,6 +49,7 @@ class Kind:
     masts: float = 0.1
     walkers: tuple[int, int] = (2, 14)
     marked: float = 0.9
+    edges: float = 0.2
 
 
 KINDS: dict[StreetKind, Kind] = {
@@ -175,6 +176,7 @@ KINDS: dict[StreetKind, Kind] = {
         masts=0.5,
         walkers=(0, 2),
         marked=0.65,
+        edges=0.6,
     ),
     "motorway": Kind(
         share=0.08,
@@ -195,6 +197,7 @@ KINDS: dict[StreetKind, Kind] = {
         lamps=0.3,
         walkers=(0, 0),
         marked=1.0,
+        edges=1.0,
     ),
     "industrial": Kind(
         share=0.05,

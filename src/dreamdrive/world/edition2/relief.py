@@ -1,7 +1,5 @@
 """Hills and dales under a street: how high the map lies, and what that does to all that stands on it."""
 
-from typing import cast
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -110,7 +108,7 @@ def _long(corners: Float[np.ndarray, "m 3 3"]) -> Bool[np.ndarray, "m 3"]:
     return length > np.maximum(_EDGE_M, _EDGE_SHARE * np.linalg.norm(middle, axis=-1))
 
 
-# The triangles of one whose first edge is halved, first and second, all three: 0-2 corners, 3-5 middles of edges.
+# By how many edges are halved, the first ones: its pieces. 0-2 are corners, 3-5 the middles of edges.
 _SPLITS: dict[int, list[tuple[int, int, int]]] = {
     1: [(0, 3, 2), (3, 1, 2)],
     2: [(0, 3, 2), (3, 1, 4), (3, 4, 2)],
@@ -138,5 +136,5 @@ def _split(
         chosen = points[count == cuts]
         found += [chosen[:, piece] for piece in pieces]
         kinds += [material[count == cuts]] * len(pieces)
-    joined = cast(np.ndarray, np.concatenate(found))
+    joined = np.concatenate(found)
     return joined[..., :3], joined[..., 3:], np.concatenate(kinds)

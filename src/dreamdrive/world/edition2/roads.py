@@ -49,7 +49,10 @@ class Side:
 
 @dataclass(frozen=True)
 class Section:
-    """What lies across a road; traffic ahead goes on the right. ``marked``: its lanes and edges are painted."""
+    """What lies across a road; traffic ahead goes on the right.
+
+    Marked ones have painted lanes, those with ``edges`` lines at their kerbs as well.
+    """
 
     right: Side
     left: Side
@@ -57,6 +60,7 @@ class Section:
     middle: Middle = "none"
     middle_m: float = 0.0
     marked: bool = True
+    edges: bool = False
 
 
 @dataclass(frozen=True)
@@ -214,15 +218,16 @@ class Net:
             "solid": [("road_divider", 0.0)],
             "double": [("road_divider", _DOUBLE_M), ("road_divider", -_DOUBLE_M)],
         }
-        wanted = painted.get(section.middle, [])
+        wanted: list[tuple[LineKind, float]] = painted.get(section.middle, [])
         if section.middle in ("grass", "paved", "rail"):
             wanted = [("road_edge", side * (section.middle_m / 2 - 0.15)) for side in (-1, 1)]
         for side in (-1, 1):
             which = way.side(side)
             for lane in range(1, which.lanes):
                 wanted.append(("lane_divider", side * (section.middle_m / 2 + lane * section.lane_m)))
-            if which.shoulder_m > 0.3 or which.parking != "none":
-                wanted.append(("road_edge", side * way.edge_m(side)))
+            if which.shoulder_m > 0.3 or which.parking != "none" or section.edges:
+                inside = 0.0 if which.shoulder_m + PARKING_DEPTH_M[which.parking] > 0.3 else 0.2
+                wanted.append(("road_edge", side * (way.edge_m(side) - inside)))
         for kind, left_m in wanted:
             found += map_lines(kind, cast(shapely.LineString, way.line(left_m).simplify(0.01)), self.crossed)
         return found
@@ -251,7 +256,7 @@ def junction(
             line_m = near + end * (_STOP_M + (wide_m if zebra else 0))
             at = np.array([end * way.section.middle_m / 2, end * way.edge_m(end)])
             stops.append(way.at(np.full(2, line_m), at)[:, :2])
-    return Junction(station_m, other, cast(shapely.Polygon, shape), zebras, stops)
+    return Junction(station_m, other, shape, zebras, stops)
 
 
 def _bays(way: Way) -> list[Line]:
