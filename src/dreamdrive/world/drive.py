@@ -13,6 +13,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.layout import BENCHMARK_EDITION, Ego, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.render import WorldView, look
 from dreamdrive.world.streets import StreetOptions, draw_street
@@ -77,7 +78,7 @@ class Drive:
     @property
     def sky(self) -> Bool[np.ndarray, "f h w"]:
         """Sky masks (F, H, W)."""
-        return self.depth_m == 0
+        return self.semantic == Semantic.SKY
 
     @property
     def trajectory(self) -> Trajectory:

@@ -38,7 +38,7 @@ class WorldView:
     @property
     def sky(self) -> Bool[np.ndarray, "h w"]:
         """Sky mask (H, W)."""
-        return self.depth_m == 0
+        return self.semantic == Semantic.SKY
 
 
 def look(
@@ -49,15 +49,16 @@ def look(
     Antialiased, pixels that differ from their neighbours take four further rays.
     """
     shape = camera.height_px, camera.width_px
-    eye = _Eye(world, moment, camera)
+    eye = _eye(world, moment, camera)
     columns, rows = (g.ravel() + 0.5 for g in np.meshgrid(np.arange(shape[1]), np.arange(shape[0])))
     rays = eye.rays(columns, rows)
     hits = eye.trace(rays, columns, rows)
     colour = eye.shade(rays, hits)
     if antialiased:
         _refine(eye, colour, columns, rows, shape)
+    colour = eye.behind_glass(colour, hits)
     frame = _encoded(colour * np.float32(world.exposure(moment.time_s)))
-    return WorldView(
+    view = WorldView(
         frame=np.rint(255 * frame).astype(np.uint8).reshape(*shape, 3),
         depth_m=np.where(hits.triangle >= 0, hits.distance, 0).astype(np.float32).reshape(shape),
         instance=eye.instances(hits).reshape(shape),
@@ -65,10 +66,20 @@ def look(
         moving=(hits.triangle >= len(world.standing)).reshape(shape),
         flow_px=eye.flow(rays, hits, columns, rows, following).astype(np.float32).reshape(*shape, 2),
     )
+    return eye.completed(view)
+
+
+def _eye(world: World, moment: Moment, camera: Camera) -> "Eye":
+    """The eye of the world's edition."""
+    if world.layout.edition == 1:
+        return Eye(world, moment, camera)
+    from dreamdrive.world.edition2.eye import Eye2  # which is made from the one below
+
+    return Eye2(world, moment, camera)
 
 
 def _refine(
-    eye: "_Eye", colour: np.ndarray, columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]
+    eye: "Eye", colour: np.ndarray, columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]
 ) -> None:
     """Give pixels that differ from a neighbour the mean over further rays, in place."""
     seen = _encoded(colour).T.mean(axis=0).reshape(shape)
@@ -93,7 +104,7 @@ def _encoded(colour: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(soft, 0))
 
 
-class _Eye:
+class Eye:
     """A camera in a world at a time."""
 
     def __init__(self, world: World, moment: Moment, camera: Camera) -> None:
@@ -132,6 +143,15 @@ class _Eye:
         hits.triangle[near[nearer]] = moving.triangle[nearer] + self.standing
         hits.distance[near[nearer]] = moving.distance[nearer]
         return hits
+
+    def behind_glass(self, colour: np.ndarray, hits: Hits) -> np.ndarray:
+        """Linear colours (N, 3) of the whole picture as they come through the windscreen: here, unchanged."""
+        del hits
+        return colour
+
+    def completed(self, view: WorldView) -> WorldView:
+        """The picture and its truth with what is fixed to the camera: here, nothing."""
+        return view
 
     def _gather(self, name: str, triangle: np.ndarray) -> np.ndarray:
         """A table's rows for triangles of both kinds."""

@@ -10,6 +10,12 @@ from jaxtyping import Float
 
 from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_function
 from dreamdrive.world.bodies import Part, body
+from dreamdrive.world.edition2.ground import paint_ground as paint_ground2
+from dreamdrive.world.edition2.lamps import Lamps
+from dreamdrive.world.edition2.scenery import scenery as scenery2
+from dreamdrive.world.edition2.sky import make_sky as make_sky2
+from dreamdrive.world.edition2.textures import TextureLibrary
+from dreamdrive.world.edition2.tiles import grain
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, upright
@@ -55,16 +61,15 @@ class Moment:
 
 
 class World:
-    """The street of a layout, in the map frame; what never moves is ``standing``."""
+    """The street of a layout, in the map frame; what never moves is ``standing``.
 
-    def __init__(self, layout: Layout) -> None:
+    From edition 2 on ``textures`` are mixed with the painted surfaces; None leaves those alone.
+    """
+
+    def __init__(self, layout: Layout, textures: TextureLibrary | None = None) -> None:
         self.layout = layout
         self.materials = Materials()
-        self.ground: GroundMap = paint_ground(layout, _bounds(layout))
-        self.sky: Sky = make_sky(layout.light, layout.seed)
-        self.ground_material = self.materials.add(self.ground.image, Semantic.ROAD)
-        self.movers = [self._mover(i + 1, box) for i, box in enumerate(layout.boxes)]
-        still = scenery(layout, self.ground, self.ground_material, self.materials)
+        still = self._still() if layout.edition == 1 else self._still2(textures)
         parked = [m for m in self.movers if not m.moving]
         meshes = [
             Mesh.joined([p.mesh.moved(pose) for p, pose in zip(m.parts, m.part_poses(0.0), strict=True)])
@@ -74,6 +79,28 @@ class World:
         owner = np.concatenate([np.zeros(len(still), dtype=np.int64), *owners])
         self._device = EmbreeDevice()
         self.standing = Solid(Mesh.joined([still, *meshes]), owner, self._device)
+
+    def _still(self) -> Mesh:
+        """Sky, ground, bodies and scenery of edition 1."""
+        self.ground: GroundMap = paint_ground(self.layout, _bounds(self.layout))
+        self.sky: Sky = make_sky(self.layout.light, self.layout.seed)
+        self.ground_material = self.materials.add(self.ground.image, Semantic.ROAD)
+        self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
+        return scenery(self.layout, self.ground, self.ground_material, self.materials)
+
+    def _still2(self, textures: TextureLibrary | None) -> Mesh:
+        """Those of edition 2, with its lamps."""
+        ground = paint_ground2(self.layout, _bounds(self.layout), textures)
+        self.ground = self.ground2 = ground
+        self.sky = make_sky2(self.layout, textures)
+        self.ground_material = self.materials.add(ground.image, Semantic.ROAD)
+        self.far_material = self.materials.add(ground.far.image, Semantic.ROAD)
+        self.detail_texture = self.materials.textures.add(grain(self.layout.seed % 8), repeats=True)
+        self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
+        both = self.ground_material, self.far_material
+        made = scenery2(self.layout, ground, both, self.materials, textures)
+        self.lamps: Lamps = made.lamps
+        return made.mesh
 
     def poses(self, t_s: float) -> Float[np.ndarray, "p 4 4"]:
         """``map_from_part`` of all parts of moving boxes at a time."""
