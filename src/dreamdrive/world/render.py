@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
+from dreamdrive.world.edition2.lens import bent, unbent
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.solid import Hits
 from dreamdrive.world.world import Moment, World
@@ -111,6 +112,7 @@ class Eye:
         self.world, self.moment, self.camera = world, moment, camera
         self.centre = camera.world_from_camera[:3, 3]
         self.standing = len(world.standing)
+        self.k1 = world.layout.lens.distortion if world.layout.edition > 1 else 0.0
         self._window = self._reach()
 
     def _reach(self) -> tuple[float, float, float, float]:
@@ -119,7 +121,7 @@ class Eye:
         local = turned(corners.reshape(-1, 3) - self.centre, c.world_from_camera[:3, :3].T)
         ahead = local[:, 2] > _NEAR_M
         part = ahead.reshape(-1, 3)
-        if (part.any(axis=1) & ~part.all(axis=1)).any():
+        if self.k1 or (part.any(axis=1) & ~part.all(axis=1)).any():
             return 0.0, float(c.width_px), 0.0, float(c.height_px)
         if not ahead.any():
             return 0.0, -1.0, 0.0, -1.0
@@ -130,8 +132,10 @@ class Eye:
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Directions (N, 3) in the map frame, of length 1 along z."""
         c = self.camera
-        local = by_columns([(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px, np.ones(len(columns))])
-        return turned(local, c.world_from_camera[:3, :3])
+        plane = [(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px]
+        if self.k1:
+            plane = list(unbent(np.stack(plane, axis=-1), self.k1).T)
+        return turned(by_columns([*plane, np.ones(len(columns))]), c.world_from_camera[:3, :3])
 
     def trace(self, rays: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> Hits:
         """The first triangle on each ray; those of movers are counted on from the standing ones."""
@@ -209,6 +213,8 @@ class Eye:
         start = by_columns([np.where(solid, a, b) for a, b in zip(there, self.centre, strict=True)])
         local = turned(points - start, camera.world_from_camera[:3, :3].T)
         z = np.maximum(local[:, 2], 1e-6)
+        if self.k1:
+            local[:, :2] = z[:, None] * bent(local[:, :2] / z[:, None], self.k1)
         across = local[:, 0] / z * camera.fx_px + camera.cx_px - columns
         return np.stack([across, local[:, 1] / z * camera.fy_px + camera.cy_px - rows], axis=-1)
 

@@ -1,17 +1,20 @@
 """A street made from a layout: to be looked at from any camera at any time, with everything known exactly."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from embreex.rtcore import EmbreeDevice
 from jaxtyping import Float
+from msgspec.structs import replace
 
-from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_function
+from dreamdrive.scene.layout import Box, Ego, Layout, Lens, Light, TrackPoint, is_moving, track_function
 from dreamdrive.world.bodies import Part, body
 from dreamdrive.world.edition2.ground import paint_ground as paint_ground2
 from dreamdrive.world.edition2.lamps import Lamps
+from dreamdrive.world.edition2.relief import Hills, hills_of
 from dreamdrive.world.edition2.scenery import scenery as scenery2
 from dreamdrive.world.edition2.sky import make_sky as make_sky2
 from dreamdrive.world.edition2.textures import TextureLibrary
@@ -40,10 +43,12 @@ class Mover:
     parts: list[Part]
     places: Callable[[np.ndarray], np.ndarray]
     way_m: Callable[[np.ndarray], np.ndarray]
+    hills: Hills
 
     def pose(self, t_s: float) -> Float[np.ndarray, "4 4"]:
-        """``map_from_body`` (4, 4)."""
-        return upright(self.places(np.array([t_s]))[0])
+        """``map_from_body`` (4, 4); only who goes on foot stays plumb on a slope."""
+        level = upright(self.places(np.array([t_s]))[0])
+        return self.hills.laid(level, plumb=self.box.kind == "pedestrian")
 
     def part_poses(self, t_s: float) -> list[Float[np.ndarray, "4 4"]]:
         """``map_from_part`` of each part."""
@@ -68,8 +73,9 @@ class World:
 
     def __init__(self, layout: Layout, textures: TextureLibrary | None = None) -> None:
         self.layout = layout
+        self.hills = hills_of(layout)
         self.materials = Materials()
-        still = self._still() if layout.edition == 1 else self._still2(textures)
+        still = self.hills.lifted(self._still() if layout.edition == 1 else self._still2(textures))
         parked = [m for m in self.movers if not m.moving]
         meshes = [
             Mesh.joined([p.mesh.moved(pose) for p, pose in zip(m.parts, m.part_poses(0.0), strict=True)])
@@ -107,13 +113,24 @@ class World:
         poses = [pose for mover in self.movers if mover.moving for pose in mover.part_poses(t_s)]
         return np.stack(poses) if poses else np.zeros((0, 4, 4))
 
-    def at(self, t_s: float) -> Moment:
-        """The world at a time."""
-        parts = [part.mesh for mover in self.movers if mover.moving for part in mover.parts]
+    def at(self, t_s: float, without: int = 0) -> Moment:
+        """The world at a time, perhaps without the moving road user of an instance."""
+        parts = [
+            (number, part.mesh)
+            for number, (mover, part) in enumerate((m, p) for m in self.movers if m.moving for p in m.parts)
+            if mover.instance != without
+        ]
         poses = self.poses(t_s)
-        owner = np.repeat(np.arange(len(parts)), [len(mesh) for mesh in parts])
-        mesh = Mesh.joined([mesh.moved(pose) for mesh, pose in zip(parts, poses, strict=True)])
+        owner = np.repeat([number for number, _ in parts], [len(mesh) for _, mesh in parts])
+        mesh = Mesh.joined([mesh.moved(poses[number]) for number, mesh in parts])
         return Moment(t_s, Solid(mesh, owner, self._device), poses)
+
+    def changed(self, light: Light, lens: Lens, ego: Ego) -> "World":
+        """The same street in another light, through another lens, from another car; what is built is shared."""
+        other = copy(self)
+        other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
+        other.sky = make_sky(light, self.layout.seed)
+        return other
 
     @cached_property
     def part_instance(self) -> np.ndarray:
@@ -128,7 +145,8 @@ class World:
     def _mover(self, instance: int, box: Box) -> Mover:
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
-        return Mover(box, instance, is_moving(box.track), parts, places, _way(box.track, places))
+        way = _way(box.track, places)
+        return Mover(box, instance, is_moving(box.track), parts, places, way, self.hills)
 
 
 def _way(
