@@ -9,7 +9,8 @@ from embreex.rtcore import EmbreeDevice
 from jaxtyping import Float
 
 from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_function
-from dreamdrive.world.bodies import Part, body
+from dreamdrive.world import bodies, edition2
+from dreamdrive.world.bodies import Part
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, upright
@@ -99,6 +100,7 @@ class World:
         return 1 + self.layout.light.exposure_drift * float(np.sin(1.1 * t_s + phase))
 
     def _mover(self, instance: int, box: Box) -> Mover:
+        body = edition2.body if self.layout.edition == 2 else bodies.body
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
         return Mover(box, instance, is_moving(box.track), parts, places, _way(box.track, places))
