@@ -239,6 +239,7 @@ class Eye:
         slope = np.maximum(np.abs(facing), _FLATTEST)
         material = self._gather("material", triangle)
         albedo = self._albedo(triangle, material, points, view, normal, slope, distance_m)
+        self._bend(triangle, points, view, normal, slope)
         light = self._light(points, normal, material)
         gloss = np.array(self.world.materials.gloss, np.float32)[material]
         mirrored = self._mirrored(view, normal, slope, gloss)
@@ -267,6 +268,30 @@ class Eye:
         width = np.maximum(short_m, short_m / slope / 6) * np.sqrt(dot(rows[:, 0, :3], rows[:, 0, :3]))
         index = np.array(self.world.materials.texture)[material]
         return (self.world.materials.textures.lookup(index, uv, reach, width) / 255) ** 2
+
+    def _bend(
+        self,
+        triangle: np.ndarray,
+        points: np.ndarray,
+        view: np.ndarray,
+        normal: np.ndarray,
+        slope: np.ndarray,
+    ) -> None:
+        """Turn the normals of curved bodies to those between the corners of their triangles, in place."""
+        for solid, first in ((self.world.standing, 0), (self.moment.moving, self.standing)):
+            if solid.curved is None or solid.to_normal is None:
+                continue
+            mine = np.flatnonzero((triangle >= first) & (triangle < first + len(solid)))
+            mine = mine[solid.curved[triangle[mine] - first]]
+            rows, at = solid.to_normal[triangle[mine] - first], picked(points, mine)
+            bent = by_columns([dot(rows[:, k, :3], at) + rows[:, k, 3] for k in range(3)])
+            bent *= np.sign(dot(bent, picked(normal, mine)))[:, None]
+            # One that leans away from the eye would mirror the inside of its body.
+            along = picked(view, mine)
+            bent -= np.maximum(dot(bent, along) + _FLATTEST, 0)[:, None] * along
+            bent /= np.maximum(np.sqrt(dot(bent, bent)), 1e-6)[:, None]
+            normal[mine] = bent
+            slope[mine] = np.maximum(-dot(bent, along), _FLATTEST)
 
     def _light(self, points: np.ndarray, normal: np.ndarray, material: np.ndarray) -> np.ndarray:
         """Light that falls on surfaces (N, 3)."""

@@ -11,7 +11,9 @@ from jaxtyping import Float
 from msgspec.structs import replace
 
 from dreamdrive.scene.layout import Box, Ego, Layout, Lens, Light, TrackPoint, is_moving, track_function
-from dreamdrive.world.bodies import Part, body
+from dreamdrive.world import bodies
+from dreamdrive.world.bodies import Part
+from dreamdrive.world.edition2.bodies import body as body2
 from dreamdrive.world.edition2.ground import paint_ground as paint_ground2
 from dreamdrive.world.edition2.lamps import Lamps
 from dreamdrive.world.edition2.relief import Hills, hills_of
@@ -72,10 +74,10 @@ class World:
     """
 
     def __init__(self, layout: Layout, textures: TextureLibrary | None = None) -> None:
-        self.layout = layout
+        self.layout, self.textures = layout, textures
         self.hills = hills_of(layout)
         self.materials = Materials()
-        still = self.hills.lifted(self._still() if layout.edition == 1 else self._still2(textures))
+        still = self.hills.lifted(self._still() if layout.edition == 1 else self._still2())
         parked = [m for m in self.movers if not m.moving]
         meshes = [
             Mesh.joined([p.mesh.moved(pose) for p, pose in zip(m.parts, m.part_poses(0.0), strict=True)])
@@ -94,17 +96,17 @@ class World:
         self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
         return scenery(self.layout, self.ground, self.ground_material, self.materials)
 
-    def _still2(self, textures: TextureLibrary | None) -> Mesh:
+    def _still2(self) -> Mesh:
         """Those of edition 2, with its lamps."""
-        ground = paint_ground2(self.layout, _bounds(self.layout), textures)
+        ground = paint_ground2(self.layout, _bounds(self.layout), self.textures)
         self.ground = self.ground2 = ground
-        self.sky = make_sky2(self.layout, textures)
+        self.sky = make_sky2(self.layout, self.textures)
         self.ground_material = self.materials.add(ground.image, Semantic.ROAD)
         self.far_material = self.materials.add(ground.far.image, Semantic.ROAD)
         self.detail_texture = self.materials.textures.add(grain(self.layout.seed % 8), repeats=True)
         self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
         both = self.ground_material, self.far_material
-        made = scenery2(self.layout, ground, both, self.materials, textures)
+        made = scenery2(self.layout, ground, both, self.materials, self.textures)
         self.lamps: Lamps = made.lamps
         return made.mesh
 
@@ -129,7 +131,8 @@ class World:
         """The same street in another light, through another lens, from another car; what is built is shared."""
         other = copy(self)
         other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
-        other.sky = make_sky(light, self.layout.seed)
+        one = self.layout.edition == 1
+        other.sky = make_sky(light, self.layout.seed) if one else make_sky2(other.layout, self.textures)
         return other
 
     @cached_property
@@ -143,6 +146,7 @@ class World:
         return 1 + self.layout.light.exposure_drift * float(np.sin(1.1 * t_s + phase))
 
     def _mover(self, instance: int, box: Box) -> Mover:
+        body = body2 if self.layout.edition == 2 else bodies.body
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
         way = _way(box.track, places)

@@ -10,6 +10,7 @@ from dreamdrive.scene.layout import track_function
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
 from dreamdrive.world.edition2.glass import Bonnet, bloom, drops, falling, haloes, screen
 from dreamdrive.world.edition2.lamps import Lamps, headlights
+from dreamdrive.world.edition2.lens import bent
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
 from dreamdrive.world.render import Eye, WorldView
@@ -33,7 +34,8 @@ class Eye2(Eye):
         if night < 0.05:
             return Lamps.street([], [])
         t_s = self.moment.time_s
-        ego = upright(track_function(self.world.layout.ego.track)(np.array([t_s]))[0])
+        place = track_function(self.world.layout.ego.track)(np.array([t_s]))[0]
+        ego = self.world.hills.laid(upright(place))
         cars = [(ego, _EGO_SIZE)]
         cars += [
             (m.pose(t_s), m.box.size_m) for m in self.world.movers if m.moving and m.box.kind in _LAMP_KINDS
@@ -81,12 +83,13 @@ class Eye2(Eye):
         shadows: bool = True,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Colours (N, 3) of surfaces, their normals, the cosines they are seen under, their materials."""
-        normal = self._normals(triangle, points)
+        normal = self._gather("normals", triangle)
         facing = dot(normal, view)
         normal *= -np.sign(facing)[:, None]  # a surface seen from behind shines as well
         slope = np.maximum(np.abs(facing), np.float32(0.03))
         material = self._gather("material", triangle)
         albedo = self._albedo(triangle, material, points, view, normal, slope, distance_m)
+        self._bend(triangle, points, view, normal, slope)
         self._detail(albedo, material, points, view, slope, distance_m)
         gloss = np.array(self.world.materials.gloss, np.float32)[material]
         lit = self._light(points, normal, material) if shadows else self._ambient(points, normal)
@@ -94,16 +97,13 @@ class Eye2(Eye):
         self._add_glow(seen, triangle, material, points, view, normal, slope, distance_m)
         return seen, normal, slope, material
 
-    def _normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Normals (N, 3) of what is seen."""
-        del points
-        return self._gather("normals", triangle)
-
     def _light(self, points: np.ndarray, normal: np.ndarray, material: np.ndarray) -> np.ndarray:
         """Light that falls on surfaces (N, 3): sun, sky and lamps; walls are darker at their foot."""
         light = super()._light(points, normal, material)
-        foot = np.exp(-np.maximum(points[:, 2], 0) / np.float32(1.2)) * (np.abs(normal[:, 2]) < 0.5)
-        light *= (1 - np.float32(0.3) * foot)[:, None]
+        upright_ = np.flatnonzero(np.abs(normal[:, 2]) < 0.5)
+        here = picked(points, upright_)
+        high = here[:, 2] - self.world.hills.height_m(here[:, :2])
+        light[upright_] *= (1 - 0.3 * np.exp(-np.maximum(high, 0) / 1.2)).astype(np.float32)[:, None]
         if len(self.lamps):
             light += self.lamps.light(points, normal)
         return light
@@ -220,8 +220,9 @@ class Eye2(Eye):
     def camera_px(self, local: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         """Column and row of points of the camera's frame; what lies behind has no sense."""
         c = self.camera
-        z = np.where(np.abs(local[:, 2]) > 1e-6, local[:, 2], 1e-6)
-        return np.stack([local[:, 0] / z * c.fx_px + c.cx_px, local[:, 1] / z * c.fy_px + c.cy_px], -1)
+        z = np.where(np.abs(local[:, 2:]) > 1e-6, local[:, 2:], 1e-6)
+        plane = bent(local[:, :2] / z, self.k1) if self.k1 else local[:, :2] / z
+        return plane * [c.fx_px, c.fy_px] + [c.cx_px, c.cy_px]
 
     def behind_glass(self, colour: np.ndarray, hits: Hits) -> np.ndarray:
         """The whole picture as it comes through haloes, rain and the windscreen."""
