@@ -15,6 +15,7 @@ from dreamdrive.scene.layout import BENCHMARK_EDITION, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world.edition2.lens import level_from_camera, pinhole
 from dreamdrive.world.edition2.relief import hills_of
+from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.options import StreetOptions
 from dreamdrive.world.render import WorldView, look
@@ -80,7 +81,7 @@ class Drive:
     @property
     def sky(self) -> Bool[np.ndarray, "f h w"]:
         """Sky masks (F, H, W)."""
-        return self.depth_m == 0
+        return self.semantic == Semantic.SKY
 
     @property
     def trajectory(self) -> Trajectory:

@@ -1,83 +1,133 @@
-"""People on foot: along sidewalks, alone and in groups, at kerbs and across the road."""
+"""Pedestrians, who walk as they move."""
 
 import numpy as np
-import shapely
-from jaxtyping import Float
 
-from dreamdrive.world.edition2.kinds import Kind
-from dreamdrive.world.edition2.looks import Looks
-from dreamdrive.world.edition2.roads import Net, Way
-from dreamdrive.world.edition2.sizes import size_of
-from dreamdrive.world.edition2.user import User
-from dreamdrive.world.road import rectangle_around
+from dreamdrive.world import paint
+from dreamdrive.world.bodies import Part, Size
+from dreamdrive.world.edition2.draw import Draw
+from dreamdrive.world.edition2.figure import Clothes, dress, head, limb, trunk
+from dreamdrive.world.edition2.loft import smooth, tube
+from dreamdrive.world.materials import Materials, Semantic
+from dreamdrive.world.mesh import Mesh, box, cylinder
 
-_ABREAST_M = 0.95
-_STATIONS_M = (-12.0, 60.0)
+_UMBRELLA_M = 0.28
 
 
-def walkers(
-    rng: np.random.Generator, kind: Kind, net: Net, times_s: Float[np.ndarray, " t"], looks: Looks
-) -> list[User]:
-    """All who go on foot, in groups of one to four."""
-    left = int(rng.integers(kind.walkers[0], kind.walkers[1] + 1))
-    found: list[User] = []
-    while left > 0:
-        together = min(left, int(rng.choice([1, 1, 1, 2, 2, 3, 4])))
-        left -= together
-        draw = rng.random()
-        zebra = net.zebras[int(rng.integers(len(net.zebras)))] if net.zebras else None
-        if zebra is not None and draw < 0.3:
-            start, along, speed = _across(rng, zebra, waiting=draw < 0.1)
-        elif draw > 0.94 and kind.speed_m_s[0] < 15:
-            start, along, speed = _over_the_road(rng, net.main)
-        else:
-            start, along, speed = _beside(rng, net)
-        first = 0.1 <= draw < 0.3 or draw > 0.94
-        for number in range(together):
-            look = looks.draw()
-            size = size_of("pedestrian", look)
-            aside = np.array([-along[1], along[0]]) * (_ABREAST_M * (number - 0.5 * (together - 1)))
-            at = start + aside + along * rng.uniform(-0.4, 0.4)
-            place = at + speed * times_s[:, None] * along
-            turn = float(np.arctan2(along[1], along[0])) + (rng.uniform(-2, 2) if speed == 0 else 0.0)
-            yaw = np.full((len(times_s), 1), turn)
-            found.append(User("pedestrian", size, look, np.hstack([place, yaw]), first))
-    return found
+def pedestrian_size(look: int) -> Size:
+    """Length, width and height of a look."""
+    height, _, umbrella = _stature(Draw("pedestrian", look))
+    wide = 0.3 * height + 0.05 if not umbrella else 0.95
+    return wide, wide, height + umbrella
 
 
-Walk = tuple[np.ndarray, np.ndarray, float]
-"""Where somebody starts, in which direction, and how fast."""
+def _stature(draw: Draw) -> tuple[float, bool, float]:
+    """Height, whether it is a child, and the height of an umbrella above."""
+    child = draw.chance(0.12)
+    height = draw.between(1.0, 1.45) if child else float(np.clip(draw.rng.normal(1.7, 0.09), 1.45, 1.98))
+    return height, child, _UMBRELLA_M if not child and draw.chance(0.06) else 0.0
 
 
-def _across(rng: np.random.Generator, zebra: shapely.Polygon, *, waiting: bool) -> Walk:
-    frame = rectangle_around(zebra)[:4]
-    a, b = (frame[0] + frame[1]) / 2, (frame[2] + frame[3]) / 2
-    if np.linalg.norm(b - a) < np.linalg.norm(frame[1] - frame[0]):
-        a, b = (frame[1] + frame[2]) / 2, (frame[3] + frame[0]) / 2
-    if rng.random() < 0.5:
-        a, b = b, a
-    long = float(np.linalg.norm(b - a))
-    along = (b - a) / long
-    if waiting:
-        return a - rng.uniform(0.6, 1.2) * along, along, 0.0
-    return a + rng.uniform(-0.1, 0.8) * long * along, along, float(rng.uniform(0.9, 1.8))
+def pedestrian(size_m: Size, look: int, materials: Materials) -> list[Part]:
+    """Somebody on foot."""
+    draw = Draw("pedestrian", look)
+    _, child, umbrella = _stature(draw)
+    height = size_m[2] - umbrella
+    clothes = dress(draw, Semantic.PEDESTRIAN, materials, child)
+    meshes = [trunk(height, clothes), head(draw, height, clothes)]
+    meshes += _carried(draw, height, umbrella, clothes, materials)
+    return [Part(Mesh.joined(meshes)), *_limbs(draw, height, clothes, umbrella > 0)]
 
 
-def _over_the_road(rng: np.random.Generator, way: Way) -> Walk:
-    side = int(rng.choice([-1, 1]))
-    x, y, heading = way.at(np.array([rng.uniform(12, 50)]), side * rng.uniform(0, way.kerb_m(side)))[0]
-    along = -side * np.array([-np.sin(heading), np.cos(heading)])
-    return np.array([x, y]), along, float(rng.uniform(1.0, 2.0))
+def _limbs(draw: Draw, height: float, clothes: Clothes, umbrella: bool) -> list[Part]:
+    stride, start = 0.82 * height, float(draw.rng.uniform(0, 2 * np.pi))
+    swing = draw.between(0.3, 0.55)
+    posed = draw.chance(0.25)  # arms that do not swing: in pockets, or with a telephone
+    parts = []
+    for side in (1.0, -1.0):
+        hip = np.array([0.0, side * 0.052 * height * clothes.girth, 0.5 * height])
+        shoulder = np.array([0.0, side * 0.115 * height * clothes.girth, 0.8 * height])
+
+        def phase(way_m: float, side: float = side) -> float:
+            return 2 * np.pi * way_m / stride + start + (np.pi if side < 0 else 0.0)
+
+        def thigh(way_m: float, phase=phase) -> float:
+            return swing * np.sin(phase(way_m)) + 0.04
+
+        def knee(way_m: float, hip=hip, thigh=thigh) -> np.ndarray:
+            return hip + 0.235 * height * _down(thigh(way_m))
+
+        def ankle(way_m: float, thigh=thigh, knee=knee, phase=phase) -> np.ndarray:
+            fold = 0.08 + 1.1 * swing * max(0.0, np.sin(phase(way_m) + 1.3))
+            return knee(way_m) + 0.225 * height * _down(thigh(way_m) - fold)
+
+        raised = (umbrella and side > 0) or (posed and side < 0)
+
+        def arm(way_m: float, phase=phase, raised=raised) -> float:
+            return 0.25 if raised else -0.8 * swing * np.sin(phase(way_m))
+
+        def elbow(way_m: float, shoulder=shoulder, arm=arm, side=side) -> np.ndarray:
+            return shoulder + 0.16 * height * (_down(arm(way_m)) + np.array([0, 0.12 * side, 0]))
+
+        def hand(way_m: float, elbow=elbow, arm=arm, raised=raised) -> np.ndarray:
+            return elbow(way_m) + 0.16 * height * _down(arm(way_m) + (1.9 if raised else 0.35))
+
+        wide = height * (0.5 + 0.5 * clothes.girth)
+        bare = clothes.outfit == "shorts"
+        parts += [
+            limb(
+                lambda _, hip=hip: hip,
+                knee,
+                (0.047 * wide, 0.034 * wide),
+                clothes.top if clothes.outfit == "robe" else clothes.legs,
+            ),
+            limb(knee, ankle, (0.034 * wide, 0.024 * wide), clothes.legs, clothes.shoes),
+            limb(lambda _, at=shoulder: at, elbow, (0.031 * wide, 0.026 * wide), clothes.top),
+            limb(elbow, hand, (0.025 * wide, 0.02 * wide), clothes.skin if bare else clothes.top),
+        ]
+    return parts
 
 
-def _beside(rng: np.random.Generator, net: Net) -> Walk:
-    """On a sidewalk, or on the road's edge where there is none; a quarter stand."""
-    way = net.main if rng.random() < 0.8 else net.ways[int(rng.integers(len(net.ways)))]
-    side, sense = (int(rng.choice([-1, 1])) for _ in range(2))
-    near, far = way.walk_m(side)
-    margin = min(0.5, 0.5 * (far - near))
-    away = rng.uniform(near + margin, far - margin) if far - near > 0.7 else near + rng.uniform(0.2, 1.5)
-    station = rng.uniform(max(way.start_m, _STATIONS_M[0]), min(way.end_m, _STATIONS_M[1]))
-    x, y, heading = way.at(np.array([station]), side * away)[0]
-    along = sense * np.array([np.cos(heading), np.sin(heading)])
-    return np.array([x, y]), along, 0.0 if rng.random() < 0.25 else float(rng.uniform(0.7, 1.8))
+def _down(angle_rad: float) -> np.ndarray:
+    """Downwards, turned ahead by an angle."""
+    return np.array([np.sin(angle_rad), 0.0, -np.cos(angle_rad)])
+
+
+def _carried(
+    draw: Draw, height: float, umbrella: float, clothes: Clothes, materials: Materials
+) -> list[Mesh]:
+    """Backpack, bag, umbrella."""
+
+    def plain() -> int:
+        return materials.add(paint.panel(draw.rng, draw.bright()), Semantic.PEDESTRIAN)
+
+    made = []
+    back = 0.075 * height * clothes.girth
+    if draw.chance(0.22):
+        z = np.array([0.56, 0.57, 0.66, 0.77, 0.8])
+        centres = np.stack([np.full(5, -back - 0.04 * height), np.zeros(5), z * height], axis=-1)
+        radii = np.array([[0, 0], [0.05, 0.075], [0.055, 0.08], [0.045, 0.07], [0, 0]]) * height
+        made.append(smooth(tube(centres, radii, plain(), 10, 3.5)))
+    elif draw.chance(0.25):
+        side = draw.any_of((-1.0, 1.0))
+        at = (0.0, side * 0.17 * height * clothes.girth, 0.4 * height)
+        made.append(box(at, (0.16 * height, 0.06 * height, 0.13 * height), plain()))
+        made.append(
+            cylinder(
+                (0, at[1], 0.46 * height),
+                (0, 0.6 * at[1], 0.8 * height),
+                (0.008, 0.008),
+                clothes.shoes,
+                None,
+                4,
+            )
+        )
+    if umbrella:
+        top = height + umbrella
+        at = np.array([0.12, 0.06, 0.0])
+        turn = np.array([[0.48, 0.48], [0.36, 0.36], [0.2, 0.2], [0.0, 0.0]])
+        centres = np.array([[0, 0, top - 0.22], [0, 0, top - 0.1], [0, 0, top - 0.03], [0, 0, top]]) + at
+        made.append(smooth(tube(centres, turn, plain(), 10)))
+        made.append(
+            cylinder((*at[:2], 0.62 * height), (*at[:2], top - 0.02), (0.012, 0.012), clothes.shoes, None, 5)
+        )
+    return made
