@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from dreamdrive.scene.layout import Area, AreaKind, Line, LineKind
 from dreamdrive.world.road import Curve, map_areas, map_lines, map_points
 
-Middle = Literal["none", "dashed", "solid", "double", "grass", "paved", "rail"]
+Middle = Literal["none", "dashed", "solid", "grass", "paved", "rail"]
 Parking = Literal["none", "parallel", "angled", "perpendicular"]
 PARKING_DEPTH_M: dict[Parking, float] = {
     "none": 0.0,
@@ -29,7 +29,6 @@ PARKING_TURN_RAD: dict[Parking, float] = {
     "angled": np.deg2rad(55),
     "perpendicular": np.pi / 2,
 }
-_DOUBLE_M = 0.13
 _STOP_M = 1.2  # from a stop line to the zebra crossing or junction behind it
 _EASE_M = 14  # over which a bend begins
 _MOST_TURN_RAD = 1.35
@@ -197,7 +196,8 @@ class Net:
     def areas(self, zebras: list[shapely.Polygon]) -> list[Area]:
         """The map's polygons."""
         raised: AreaKind = "grass" if self.main.section.middle == "grass" else "sidewalk"
-        found = [*map_areas(self.ground, self.paved), *map_areas("sidewalk", self.walks)]
+        lanes = _tidy(self.paved.difference(self.middles))
+        found = [*map_areas(self.ground, lanes), *map_areas("sidewalk", self.walks)]
         found += map_areas(raised, self.middles)
         return found + [area for zebra in zebras for area in map_areas("crossing", zebra)]
 
@@ -216,7 +216,6 @@ class Net:
         painted: dict[Middle, list[tuple[LineKind, float]]] = {
             "dashed": [("lane_divider", 0.0)],
             "solid": [("road_divider", 0.0)],
-            "double": [("road_divider", _DOUBLE_M), ("road_divider", -_DOUBLE_M)],
         }
         wanted: list[tuple[LineKind, float]] = painted.get(section.middle, [])
         if section.middle in ("grass", "paved", "rail"):

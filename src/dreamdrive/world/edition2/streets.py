@@ -83,7 +83,7 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
         barriers=sides.barriers,
         relief=draw_relief(rng),
         lens=draw_lens(rng, looks, _QUEUE_HFOV if queue else _HFOV),
-        seed=seed,
+        seed=looks.grain(seed),
         edition=options.edition,
     )
     return _mirrored(layout) if rng.random() < _ON_THE_LEFT else layout
@@ -91,7 +91,7 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
 
 def _queued(kind: Kind) -> Kind:
     """A kind of street as narrow as it takes to be full of vehicles, without junctions that would part them."""
-    middles: dict[Middle, float] = {"dashed": 0.3, "solid": 0.4, "double": 0.3}
+    middles: dict[Middle, float] = {"dashed": 0.3, "solid": 0.7}
     return replace(
         kind, lanes=(2, 3), one_way=0.0, lane_m=(2.9, 3.1), middles=middles, block_m=None, walkers=(0, 8)
     )

@@ -8,13 +8,13 @@ import shapely
 from jaxtyping import Float
 
 from dreamdrive.scene.layout import Box, BoxKind, Ego, TrackPoint, track_function
+from dreamdrive.world.edition2.bodies import size_of
 from dreamdrive.world.edition2.kinds import Kind, chosen
 from dreamdrive.world.edition2.looks import Looks
-from dreamdrive.world.edition2.walkers import walkers
 from dreamdrive.world.edition2.roads import PARKING_DEPTH_M, PARKING_PITCH_M, PARKING_TURN_RAD, Net, Way
 from dreamdrive.world.edition2.room import Room
-from dreamdrive.world.edition2.sizes import size_of
 from dreamdrive.world.edition2.user import User
+from dreamdrive.world.edition2.walkers import walkers
 from dreamdrive.world.road import travelled_m
 from dreamdrive.world.traffic import to_track
 
