@@ -15,7 +15,7 @@ from dreamdrive.world import StreetOptions, World, draw_street, look
 from dreamdrive.world.edition2 import Looks, pinhole
 
 SEEDS = (1_000_031, 7)
-OPTIONS = DrawnOptions(views=4, relit=2)
+OPTIONS = DrawnOptions(views=6, relit=2)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def picture(folder: Path, name: str | None) -> np.ndarray:
 
 
 def test_every_record_has_its_pictures_and_they_agree(folder: Path, records: list[Record]) -> None:
-    assert len(records) == 8
+    assert len(records) == 12
     for record in records:
         image, labels, depth = (picture(folder, n) for n in (record.image, record.labels, record.depth))
         assert image.dtype == labels.dtype == np.uint8
@@ -56,7 +56,7 @@ def test_every_record_has_its_pictures_and_they_agree(folder: Path, records: lis
 
 
 def test_groups_tell_streets_apart_and_test_streets_are_kept_out(records: list[Record]) -> None:
-    assert {record.group for record in records} == {"street-1000030", "street-7"}
+    assert {record.group for record in records} == {"street-1000031", "street-7"}
     assert all(record.kept_out == (record.group == "street-7") for record in records)
 
 
@@ -83,7 +83,9 @@ def test_depth_and_horizon_give_the_height_of_the_camera(folder: Path, records: 
         )
         if record.distorted or layout.relief.height_m > 0:
             continue
-        assert record.focal_px and record.horizon_px is not None and record.roll_rad is not None
+        assert record.focal_px is not None
+        assert record.horizon_px is not None
+        assert record.roll_rad is not None
         labels, depth = picture(folder, record.labels), picture(folder, record.depth)
         rows, columns = np.nonzero(np.isin(labels[..., 2], [StreetClass.ROAD]) & (depth < FAR))
         z = depth[rows, columns] / DEPTH_STEPS
@@ -96,7 +98,8 @@ def test_depth_and_horizon_give_the_height_of_the_camera(folder: Path, records: 
         near = z < 30
         if near.sum() > 500:
             checked += 1
-            np.testing.assert_allclose(below[near], record.camera_height_m, atol=0.06)
+            # Only the edge of a kerb may stand out.
+            assert np.quantile(np.abs(below[near] - record.camera_height_m), 0.95) < 0.03
     assert checked
 
 

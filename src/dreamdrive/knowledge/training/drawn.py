@@ -70,8 +70,8 @@ def draw_records(
     """Write the records of some streets and return them all; streets that are written already are kept.
 
     Each street has a folder of its name with its own ``records.jsonl``; that of the whole folder joins them.
-    Streets of seeds below a million show only looks that are kept out of training. ``textures`` is a folder of
-    pictures of surfaces, with which the painted ones are mixed.
+    Streets of seeds below a million show only looks that are kept out of training. ``textures`` is a
+    folder of pictures of surfaces, with which the painted ones are mixed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     left = [seed for seed in seeds if not (folder / str(seed) / _MARK).is_file()]
