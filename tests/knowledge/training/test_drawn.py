@@ -15,7 +15,7 @@ from dreamdrive.world import StreetOptions, World, draw_street, look
 from dreamdrive.world.edition2 import Looks, pinhole
 
 SEEDS = (1_000_031, 7)
-OPTIONS = DrawnOptions(views=6, relit=2)
+OPTIONS = DrawnOptions(moments=2)
 
 
 @pytest.fixture(scope="module")
@@ -103,20 +103,23 @@ def test_depth_and_horizon_give_the_height_of_the_camera(folder: Path, records: 
     assert checked
 
 
-def test_the_own_seat_is_free_and_depth_agrees_between_views() -> None:
+def test_the_camera_sits_in_a_car_that_is_left_out_and_sees_something() -> None:
     world = World(draw_street(1_000_031, StreetOptions(3.0, edition=2, kind="city")))
     places = Viewpoints(world, np.random.default_rng(2), Looks(np.random.default_rng(2), False), 2.0)
     taken = 0
     for _ in range(12):
-        at, moment = places.draw()
-        taken += at.without > 0
+        places.move_on()
+        at = places.draw()
         small = at.camera.resized(64, 36)
-        seen = look(world.changed(world.layout.light, Lens(), at.ego), moment, small, (at.time_s, small))
-        if at.without:
-            assert is_moving(world.layout.boxes[at.without - 1].track)
-            assert not (seen.instance == at.without).any()
+        changed = world.changed(world.layout.light, Lens(), at.ego)
+        seen = look(changed, places.moment, small, (at.time_s, small))
         assert (seen.depth_m[~seen.sky] > 0.3).all()
-    assert taken
+        assert places.seat is not None
+        assert is_moving(places.seat.box.track)
+        assert not (seen.instance == places.seat.instance).any()
+        x, y, _ = places.seat.places(np.array([at.time_s]))[0]
+        taken += np.hypot(*(at.camera.world_from_camera[:2, 3] - [x, y])) < 2.5
+    assert taken > 1
 
 
 def test_lenses_are_of_all_sorts() -> None:
@@ -141,7 +144,7 @@ def test_the_horizon_is_where_level_rays_cross_the_middle() -> None:
     world = World(draw_street(1_000_032, StreetOptions(3.0, edition=2)))
     places = Viewpoints(world, np.random.default_rng(4), Looks(np.random.default_rng(4), False), 2.0)
     for _ in range(6):
-        at, _ = places.draw()
+        at = places.draw()
         horizon, roll = horizon_of(at)
         far = 1e6
         ahead = at.camera.world_from_camera[:3, 2] * [1, 1, 0]
