@@ -19,7 +19,7 @@ from dreamdrive.world.solid import Hits
 _DETAIL_M = 2.4
 """Side of the tile that makes near ground grainy."""
 _DETAIL_REACH_M = 16.0
-_HEADLIGHT = 260.0
+_HEADLIGHT = 330.0
 _EGO_SIZE = (2.6, 1.8, 1.5)  # the camera sits behind the bonnet
 _LAMP_KINDS = ("car", "van", "truck", "bus", "motorcycle")
 

@@ -12,7 +12,14 @@ from shapely.ops import substring
 from dreamdrive.scene.layout import Area, Layout, Line
 from dreamdrive.world.edition2 import marks
 from dreamdrive.world.edition2.sheet import Sheet
-from dreamdrive.world.edition2.textures import KINDS, TextureKind, TextureLibrary, mirrored_tile, recoloured
+from dreamdrive.world.edition2.textures import (
+    KINDS,
+    TextureKind,
+    TextureLibrary,
+    levelled,
+    mirrored_tile,
+    recoloured,
+)
 from dreamdrive.world.edition2.tiles import VARIANTS, low_noise, tile
 from dreamdrive.world.ground import GroundMap
 from dreamdrive.world.materials import Semantic
@@ -112,11 +119,11 @@ class _Covers:
             cut_kind: TextureKind = _CUT_KIND[kind]
             if rng.random() < 0.06:
                 cut_kind = KINDS[int(rng.integers(len(KINDS)))]
-            found = self.textures.pick(cut_kind, self.layout.seed, rng)
+            found = self.textures.pick(cut_kind, TextureLibrary.look_of(self.layout.seed), rng)
         if found is not None:
             picture, about = found
             texel = about.width_m / picture.shape[1] * rng.uniform(0.7, 1.4)
-            return mirrored_tile(recoloured(rng, picture)), texel
+            return mirrored_tile(recoloured(rng, levelled(picture, about.kind))), texel
         names, shares = _PAINTED[kind]
         name = str(rng.choice(names, p=shares))
         return recoloured(rng, tile(name, int(rng.integers(VARIANTS))), 0.7), _TEXEL_M * rng.uniform(0.6, 1.5)

@@ -111,10 +111,11 @@ def _painted(rng: np.random.Generator, light: Light, tones: Tones) -> np.ndarray
 
 def _cut(rng: np.random.Generator, painted: np.ndarray, textures: TextureLibrary, seed: int) -> np.ndarray:
     """A strip of a real sky above the horizon, mirrored around the turn; its top colour goes on above."""
-    found = textures.pick("sky", seed, rng)
+    found = textures.pick("sky", TextureLibrary.look_of(seed), rng)
     if found is None:
         return painted
     strip = (found[0].astype(np.float32) / 255) ** 2
+    strip *= np.float32((rng.uniform(0.45, 0.95) / max(float(strip.mean()), 0.02)) ** 0.7)
     height, width = _SHAPE
     times = 2 * max(2, round(360 / found[1].width_m / 2 * rng.uniform(0.7, 1.3)))
     wide = -(-width // times)

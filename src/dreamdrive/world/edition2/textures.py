@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Meta
 
 from dreamdrive.errors import InputError
+from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED
 from dreamdrive.world.paint import Image
 
 TextureKind = Literal["facade", "road", "ground", "vegetation", "sky", "clutter"]
@@ -61,6 +62,11 @@ class TextureLibrary:
         found = msgspec.json.decode(index.read_bytes(), type=tuple[Texture, ...])
         return TextureLibrary(found, tuple((folder / t.file).read_bytes() for t in found))
 
+    @staticmethod
+    def look_of(seed: int) -> int:
+        """A look for what a street has none for: streets to train on never show what is kept out."""
+        return 0 if seed >= FIRST_TRAINING_SEED else KEPT_OUT
+
     def pick(self, kind: TextureKind, look: int, rng: np.random.Generator) -> tuple[Image, Texture] | None:
         """A texture of a kind for a look, RGB, or None where there is none of the kind."""
         kept = look % 5 == KEPT_OUT
@@ -77,6 +83,16 @@ def mirrored_tile(image: Image) -> Image:
     """The image beside and above its mirror images, which repeats without a seam."""
     twice = np.concatenate([image, image[:, ::-1]], axis=1)
     return np.concatenate([twice, twice[::-1]], axis=0)
+
+
+_LEVEL = {"facade": 132.0, "road": 96.0, "ground": 118.0, "vegetation": 92.0, "clutter": 115.0}
+"""Mean brightness of surfaces in even light, 0..255."""
+
+
+def levelled(image: Image, kind: TextureKind) -> Image:
+    """The image about as bright as surfaces of its kind are in even light; half of what differs is left."""
+    gain = (_LEVEL.get(kind, 120.0) / max(float(image.mean()), 12.0)) ** 0.6
+    return cv2.LUT(image, np.clip(np.arange(256) * gain, 0, 255).astype(np.uint8))
 
 
 def recoloured(rng: np.random.Generator, image: Image, strength: float = 1.0) -> Image:
