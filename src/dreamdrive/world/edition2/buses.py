@@ -6,7 +6,7 @@ from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.canvas import lettering
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.ends import HEADS
-from dreamdrive.world.edition2.loft import projected, smooth
+from dreamdrive.world.edition2.loft import projected
 from dreamdrive.world.edition2.shape import Shape, body_mesh
 from dreamdrive.world.edition2.skin import paint_skin
 from dreamdrive.world.edition2.trim import Letters, Trim, shaded
@@ -91,7 +91,7 @@ def bus(size_m: Size, look: int, materials: Materials) -> list[Part]:
     indices = [materials.add(image, Semantic.BUS, gloss=0.05) for image in skin]
     shell = body_mesh(shape)
     shell.corners[..., 2] *= size_m[2] / shell.corners[..., 2].max()
-    meshes = [projected(smooth(shell), size_m, indices)]
+    meshes = [projected(shell, size_m, indices)]
     half, side = 0.5 * shape.length, 0.5 * shape.width
     z = 0.7 * size_m[2] if family != "double decker" else 0.42 * size_m[2]
     for sign in (-1, 1):

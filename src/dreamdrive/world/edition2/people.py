@@ -6,7 +6,7 @@ from dreamdrive.world import paint
 from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.figure import Clothes, dress, head, limb, trunk
-from dreamdrive.world.edition2.loft import smooth, tube
+from dreamdrive.world.edition2.loft import tube
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, box, cylinder
 
@@ -106,7 +106,7 @@ def _carried(
         z = np.array([0.56, 0.57, 0.66, 0.77, 0.8])
         centres = np.stack([np.full(5, -back - 0.04 * height), np.zeros(5), z * height], axis=-1)
         radii = np.array([[0, 0], [0.05, 0.075], [0.055, 0.08], [0.045, 0.07], [0, 0]]) * height
-        made.append(smooth(tube(centres, radii, plain(), 10, 3.5)))
+        made.append(tube(centres, radii, plain(), 10, 3.5))
     elif draw.chance(0.25):
         side = draw.any_of((-1.0, 1.0))
         at = (0.0, side * 0.17 * height * clothes.girth, 0.4 * height)
@@ -126,7 +126,7 @@ def _carried(
         at = np.array([0.12, 0.06, 0.0])
         turn = np.array([[0.48, 0.48], [0.36, 0.36], [0.2, 0.2], [0.0, 0.0]])
         centres = np.array([[0, 0, top - 0.22], [0, 0, top - 0.1], [0, 0, top - 0.03], [0, 0, top]]) + at
-        made.append(smooth(tube(centres, turn, plain(), 10)))
+        made.append(tube(centres, turn, plain(), 10))
         made.append(
             cylinder((*at[:2], 0.62 * height), (*at[:2], top - 0.02), (0.012, 0.012), clothes.shoes, None, 5)
         )

@@ -10,10 +10,10 @@ from dreamdrive.world import paint
 from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.figure import Clothes, bent, dress, head, limb, trunk
-from dreamdrive.world.edition2.loft import ring_wheel, smooth, tube
+from dreamdrive.world.edition2.loft import bar, egg, ring_wheel, tube
 from dreamdrive.world.edition2.wheels import rolling
 from dreamdrive.world.materials import Materials, Semantic
-from dreamdrive.world.mesh import Mesh, ball, box, cylinder, pitched
+from dreamdrive.world.mesh import Mesh, box, cylinder, pitched
 
 BICYCLES = ("city", "city", "trekking", "mountain", "racing", "child", "cargo", "folding")
 MOTORCYCLES = ("scooter", "scooter", "naked", "sport", "tourer", "moped", "cruiser")
@@ -98,7 +98,7 @@ def bicycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
             made += [box((back, y, 0.58), (0.3, 0.12, 0.32), plain(draw.bright())) for y in (-0.13, 0.13)]
     if family == "cargo":
         made.append(box((front - 0.5, 0, 0.52), (0.6, 0.48, 0.4), plain(draw.bright())))
-    parts = [Part(smooth(Mesh.joined(made)))]
+    parts = [Part(Mesh.joined(made))]
     for x in (back, front):
         parts.append(Part(_spoked(radius, dark, steel), rolling((x, 0.0, radius), radius)))
     if has_rider(look):
@@ -117,31 +117,31 @@ def _bicycle_frame(
     wheels: tuple[float, float, float],
     saddle: tuple[float, float],
     crank: tuple[float, float],
-    bar: tuple[float, float],
+    grip: tuple[float, float],
     frame: int,
     dark: int,
     width: float,
 ) -> list[Mesh]:
     back, front, radius = wheels
-    neck = (bar[0] + 0.06, 0.0, 0.8 * bar[1])
+    neck = (grip[0] + 0.06, 0.0, 0.8 * grip[1])
     seat = (saddle[0], 0.0, saddle[1] - 0.1)
     low = (crank[0], 0.0, crank[1])
     step = (seat[0] + 0.1, 0.0, 0.5 * seat[2]) if family in ("city", "folding", "child") else seat
-    bars = [
+    tubes = [
         (low, seat, 0.02, frame),
         (low, (neck[0], 0.0, neck[2] - 0.1), 0.024, frame),
         (step, neck, 0.02, frame),
         ((seat[0], 0.0, seat[2]), (saddle[0], 0.0, saddle[1]), 0.014, dark),
-        (neck, (bar[0], 0.0, bar[1]), 0.014, dark),
-        ((bar[0], -0.45 * width, bar[1]), (bar[0], 0.45 * width, bar[1]), 0.015, dark),
+        (neck, (grip[0], 0.0, grip[1]), 0.014, dark),
+        ((grip[0], -0.45 * width, grip[1]), (grip[0], 0.45 * width, grip[1]), 0.015, dark),
     ]
     for y in (-0.05, 0.05):
-        bars += [
+        tubes += [
             ((back, y, radius), (low[0], 0.4 * y, low[2]), 0.012, frame),
             ((back, y, radius), (seat[0], 0.4 * y, seat[2] - 0.05), 0.011, frame),
             ((front, y, radius), (neck[0], 0.5 * y, neck[2] - 0.1), 0.014, frame),
         ]
-    made = [cylinder(a, b, (r, r), m, None, 6) for a, b, r, m in bars]
+    made = [bar(a, b, (r, r), m) for a, b, r, m in tubes]
     x, z = saddle
     made.append(box((x - 0.02, 0, z), (0.25, 0.12, 0.05), dark))
     made.append(
@@ -157,7 +157,7 @@ def _guard(at: tuple[float, float], radius: float, material: int) -> Mesh:
     points = [(x + radius * np.cos(a), z + radius * np.sin(a)) for a in turn]
     pieces = []
     for (x0, z0), (x1, z1) in itertools.pairwise(points):
-        pieces.append(cylinder((x0, 0, z0), (x1, 0, z1), (0.025, 0.025), material, None, 4))
+        pieces.append(bar((x0, 0, z0), (x1, 0, z1), (0.025, 0.025), material))
     return Mesh.joined(pieces)
 
 
@@ -169,8 +169,8 @@ def _spoked(radius: float, tyre: int, steel: int) -> Mesh:
     ]
     for turn in np.arange(9) * 2 * np.pi / 9:
         tip = (0.95 * radius * np.cos(turn), 0.0, 0.95 * radius * np.sin(turn))
-        made.append(cylinder((0, 0, 0), tip, (0.005, 0.005), steel, None, 3))
-    return smooth(Mesh.joined(made))
+        made.append(bar((0, 0, 0), tip, (0.005, 0.005), steel))
+    return Mesh.joined(made)
 
 
 def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
@@ -195,21 +195,14 @@ def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
     made.append(cylinder((bar_x, -grip, bar_z), (bar_x, grip, bar_z), (0.018, 0.018), dark, dark, 6))
     for side in (-1, 1):
         made.append(
-            cylinder(
-                (front, side * 0.08, radius),
-                (bar_x + 0.03, side * 0.08, 0.9 * bar_z),
-                (0.026, 0.026),
-                steel,
-                None,
-                6,
-            )
+            bar((front, side * 0.08, radius), (bar_x + 0.03, side * 0.08, 0.9 * bar_z), (0.026, 0.026), steel)
         )
         stalk = (bar_x, side * 0.32 * width, bar_z)
         mirror = (bar_x - 0.02, side * 0.42 * width, min(bar_z + 0.15, top - 0.05))
-        made.append(cylinder(stalk, mirror, (0.008, 0.008), dark, None, 4))
+        made.append(bar(stalk, mirror, (0.008, 0.008), dark))
         made.append(box(mirror, (0.02, 0.12, 0.08), dark))
     lit: Colour = (255, 252, 240) if draw.chance(0.7) else (214, 218, 222)
-    made.append(ball((bar_x + 0.16, 0, 0.86), (0.06, 0.085, 0.085), plain(lit), 5))
+    made.append(egg((bar_x + 0.16, 0, 0.86), (0.06, 0.085, 0.085), plain(lit)))
     made.append(
         box(
             (-half + 0.16, 0, 0.72),
@@ -219,13 +212,13 @@ def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
     )
     made.append(box((-half + 0.1, 0, 0.56), (0.02, 0.2, 0.16), plain((232, 232, 228))))
     made += [_guard((front, radius), radius + 0.04, body)]
-    parts = [Part(smooth(Mesh.joined(made)))]
+    parts = [Part(Mesh.joined(made))]
     for x in (back, front):
         disc = cylinder((0, -0.03, 0), (0, 0.03, 0), (0.55 * radius, 0.55 * radius), steel, steel, 10)
         wheel = Mesh.joined(
             [ring_wheel(radius, 0.13, dark, 18), disc, ring_wheel(0.75 * radius, 0.06, dark, 12)]
         )
-        parts.append(Part(smooth(wheel), rolling((x, 0.0, radius), radius)))
+        parts.append(Part(wheel, rolling((x, 0.0, radius), radius)))
     if has_rider(look):
         lean = {"sport": 0.6, "naked": 0.25}.get(family, 0.08)
         step = (saddle[0] + (0.42 if scooter or family == "cruiser" else 0.08), 0.32)
@@ -254,7 +247,7 @@ def _machine(
     draw: Draw,
     family: str,
     wheels: tuple[float, float, float],
-    bar: tuple[float, float],
+    grip: tuple[float, float],
     saddle: tuple[float, float],
     paints: tuple[int, int, int],
 ) -> list[Mesh]:
@@ -268,8 +261,8 @@ def _machine(
                 (x + 0.1, 0, z, z + 0.1),
                 (x + 0.14, 0.09, z - 0.05, z + 0.12),
                 (x + 0.35, 0.14, z, z + 0.22),
-                (bar[0] - 0.05, 0.1, z + 0.02, z + 0.18),
-                (bar[0], 0, z + 0.1, z + 0.12),
+                (grip[0] - 0.05, 0.1, z + 0.02, z + 0.18),
+                (grip[0], 0, z + 0.1, z + 0.12),
             ],
             body,
         ),
@@ -293,16 +286,16 @@ def _machine(
             steel if draw.chance(0.4) else dark,
         ),
         cylinder((x + 0.2, -0.15, 0.28), (back - 0.15, -0.19, 0.42), (0.035, 0.06), steel, steel, 8),
-        cylinder((back, 0, radius), (x + 0.1, 0, 0.45), (0.05, 0.06), dark, None, 6),
+        bar((back, 0, radius), (x + 0.1, 0, 0.45), (0.05, 0.06), dark),
     ]
     if family in ("sport", "tourer"):
         made.append(
             _loft_along(
                 [
-                    (bar[0] - 0.2, 0, 0.6, 0.8),
-                    (bar[0] - 0.15, 0.19, 0.36, 1.0),
-                    (bar[0] + 0.12, 0.17, 0.5, 1.08),
-                    (bar[0] + 0.26, 0, 0.72, 0.8),
+                    (grip[0] - 0.2, 0, 0.6, 0.8),
+                    (grip[0] - 0.15, 0.19, 0.36, 1.0),
+                    (grip[0] + 0.12, 0.17, 0.5, 1.08),
+                    (grip[0] + 0.26, 0, 0.72, 0.8),
                 ],
                 body,
             )
@@ -316,7 +309,7 @@ def _scooter(
     draw: Draw,
     family: str,
     wheels: tuple[float, float, float],
-    bar: tuple[float, float],
+    grip: tuple[float, float],
     saddle: tuple[float, float],
     paints: tuple[int, int, int],
 ) -> list[Mesh]:
@@ -324,7 +317,7 @@ def _scooter(
     back, _, _ = wheels
     body, dark, steel = paints
     x, z = saddle
-    shield = bar[0] + 0.02
+    shield = grip[0] + 0.02
     made = [
         _loft_along(
             [

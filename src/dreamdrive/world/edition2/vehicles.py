@@ -45,7 +45,7 @@ def vehicle(kind: BoxKind, size_m: Size, look: int, materials: Materials) -> lis
     indices = [materials.add(image, semantic, gloss=GLOSS) for image in skin]
     shell = body_mesh(shape)
     shell.corners[..., 2] *= bare[2] / shell.corners[..., 2].max()
-    meshes = [projected(smooth(shell), bare, indices)]
+    meshes = [projected(shell, bare, indices)]
     meshes += fittings.meshes(shape, indices, materials, semantic)
     return [Part(Mesh.joined(meshes)), *wheels(draw, shape, shape.width, materials, semantic)]
 

@@ -72,4 +72,5 @@ def wheel_pairs(
             for y in (outer - half, half - outer)
         ]
     )
-    return [Part(smooth(pair), rolling((x, 0.0, radius_m), radius_m)) for x in axles]
+    rounded = smooth(pair)
+    return [Part(rounded, rolling((x, 0.0, radius_m), radius_m)) for x in axles]
