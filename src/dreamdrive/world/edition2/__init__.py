@@ -2,4 +2,4 @@
 
 from dreamdrive.world.edition2.bodies import body, size_of
 from dreamdrive.world.edition2.draw import is_kept_out
-from dreamdrive.world.edition2.two_wheelers import has_rider
+from dreamdrive.world.edition2.rider import has_rider

@@ -69,7 +69,8 @@ class Canvas:
         mask = np.zeros(band.shape[:2], dtype=np.uint8)
         cv2.fillPoly(mask, [texels - (first << _SHIFT).astype(np.int32)], (255,), cv2.LINE_AA, _SHIFT)
         share = np.linspace(1, 0, len(band), dtype=np.float32)[:, None]
-        ink = np.float32(low) + share * (np.float32(high) - np.float32(low))
+        bottom, top = np.array(low, np.float32), np.array(high, np.float32)
+        ink = bottom + share * (top - bottom)
         inked = np.repeat(np.rint(ink).astype(np.uint8)[:, None], band.shape[1], axis=1)
         opaque = mask.astype(np.float32) * np.float32(1 / 255)
         band[:] = cv2.blendLinear(inked, np.ascontiguousarray(band), opaque, 1 - opaque)
@@ -98,7 +99,7 @@ class Canvas:
             0.75 * dirt * np.clip(1.1 - 1.6 * up / min(self.height_m, 2.0), 0.06, 1) * grain[1], 0, 0.9
         )
         kept = (1 - share) * grain[0]
-        soil = np.float32([116, 106, 94])
+        soil = np.array([116, 106, 94], np.float32)
         return cv2.convertScaleAbs(self.image * kept[..., None] + share[..., None] * soil)
 
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.world import paint
 from dreamdrive.world.bodies import Part
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.loft import capsule, egg, strip, tube
-from dreamdrive.world.materials import Materials, Semantic
+from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.mesh import Mesh
 
 Joint = Callable[[float], Float[np.ndarray, "3"]]
@@ -62,33 +61,22 @@ class Clothes:
     child: bool
 
 
-def dress(draw: Draw, kind: Semantic, materials: Materials, child: bool) -> Clothes:
+def dress(draw: Draw, paints: Paints, child: bool) -> Clothes:
     """The clothes of a look."""
     outfit = draw.option(OUTFITS)
-
-    def plain(colour: Colour) -> int:
-        return materials.add(paint.panel(draw.rng, draw.near(colour, 6)), kind)
-
-    colour = (
-        draw.any_of(_VEST)
-        if outfit == "vest"
-        else draw.any_of(_PLAIN)
-        if draw.chance(0.55)
-        else draw.bright()
-    )
-    if draw.chance(0.2) and outfit != "vest":
-        top = materials.add(paint.cloth(draw.rng, colour), kind, repeats=True)
-    else:
-        top = plain(colour)
-    skin = plain(draw.any_of(_SKIN))
-    legs = skin if outfit in ("skirt", "shorts") and draw.chance(0.6) else plain(draw.any_of(_PLAIN))
+    colour = draw.any_of(_PLAIN) if draw.chance(0.5) else draw.muted()
+    if outfit == "vest":
+        colour = draw.any_of(_VEST)
+    woven = draw.chance(0.2) and outfit != "vest"
+    skin = paints.plain(draw.near(draw.any_of(_SKIN), 6))
+    bare = outfit in ("skirt", "shorts") and draw.chance(0.6)
     return Clothes(
         outfit=outfit,
-        top=top,
-        legs=legs,
+        top=paints.cloth(colour) if woven else paints.plain(draw.near(colour, 6)),
+        legs=skin if bare else paints.plain(draw.near(draw.any_of(_PLAIN), 6)),
         skin=skin,
-        hair=plain(draw.any_of(_HAIR)),
-        shoes=plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
+        hair=paints.plain(draw.near(draw.any_of(_HAIR), 6)),
+        shoes=paints.plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
         girth=draw.between(0.85, 1.3),
         child=child,
     )
