@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dreamdrive.world.bodies import Part, Size
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.figure import dress
 from dreamdrive.world.edition2.loft import bar, ring_wheel
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.rider import Seat, has_rider, rider
 from dreamdrive.world.edition2.wheels import rolling
 from dreamdrive.world.materials import Materials, Semantic
@@ -67,11 +67,11 @@ def bicycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
     """A bicycle, perhaps with its rider."""
     draw = Draw("bicycle", look)
     family = draw.option(_FAMILIES)
-    paints = Paints(draw, Semantic.BICYCLE, materials)
+    coats = Coats(draw, Semantic.BICYCLE, materials)
     frame = _frame(family, size_m, not has_rider(look))
     colour = draw.bright() if draw.chance(0.6) else draw.any_of(((26, 27, 30), (200, 200, 202)))
-    dark, steel = paints.plain((26, 26, 28)), paints.plain((150, 152, 156), 0.1)
-    made = [*_tubes(frame, paints.plain(colour, 0.04), dark), *_fittings(draw, frame, dark, paints)]
+    dark, steel = coats.plain((26, 26, 28)), coats.plain((150, 152, 156), 0.1)
+    made = [*_tubes(frame, coats.plain(colour, 0.04), dark), *_fittings(draw, frame, dark, coats)]
     parts = [Part(Mesh.joined(made))]
     wheel = _spoked(frame.radius, dark, steel)
     parts += [Part(wheel, rolling((x, 0.0, frame.radius), frame.radius)) for x in (frame.back, frame.front)]
@@ -79,8 +79,8 @@ def bicycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
         x, z = frame.grip
         lean, crank_m = _LEAN_RAD.get(family, 0.32), 0.12 if family == "child" else 0.16
         seat = Seat(frame.saddle, (x - 0.04, z), frame.crank, 0.42 * size_m[1], lean, crank_m)
-        clothes = dress(draw, paints, family == "child")
-        helmet = paints.plain(draw.bright()) if draw.chance(0.5) else None
+        clothes = dress(draw, coats, family == "child")
+        helmet = coats.plain(draw.bright()) if draw.chance(0.5) else None
         parts += rider(draw, seat, size_m[2], clothes, helmet)
     return parts
 
@@ -113,7 +113,7 @@ def _tubes(frame: _Frame, paint: int, dark: int) -> list[Mesh]:
     return [*(bar(a, b, (r, r), m) for a, b, r, m in tubes), saddle, chain]
 
 
-def _fittings(draw: Draw, frame: _Frame, dark: int, paints: Paints) -> list[Mesh]:
+def _fittings(draw: Draw, frame: _Frame, dark: int, coats: Coats) -> list[Mesh]:
     """Mudguards, lamps, carrier, bags, box."""
     made = []
     (x, z), radius, back = frame.grip, frame.radius, frame.back
@@ -121,16 +121,16 @@ def _fittings(draw: Draw, frame: _Frame, dark: int, paints: Paints) -> list[Mesh
         for axle in (back, frame.front):
             made += guard(axle, radius, radius + 0.03, dark)
         made.append(
-            box((back - radius - 0.02, 0, 1.55 * radius), (0.04, 0.06, 0.06), paints.plain((190, 24, 26)))
+            box((back - radius - 0.02, 0, 1.55 * radius), (0.04, 0.06, 0.06), coats.plain((190, 24, 26)))
         )
-        made.append(box((x + 0.12, 0, z - 0.16), (0.06, 0.07, 0.07), paints.plain((226, 228, 230))))
+        made.append(box((x + 0.12, 0, z - 0.16), (0.06, 0.07, 0.07), coats.plain((226, 228, 230))))
     if frame.family in ("city", "trekking", "cargo") and draw.chance(0.6):
         made.append(box((back, 0, 0.76), (0.36, 0.14, 0.03), dark))
         if draw.chance(0.4):
-            bag = paints.plain(draw.bright())
+            bag = coats.plain(draw.bright())
             made += [box((back, y, 0.58), (0.3, 0.12, 0.32), bag) for y in (-0.13, 0.13)]
     if frame.family == "cargo":
-        made.append(box((frame.front - 0.5, 0, 0.52), (0.6, 0.48, 0.4), paints.plain(draw.bright())))
+        made.append(box((frame.front - 0.5, 0, 0.52), (0.6, 0.48, 0.4), coats.plain(draw.bright())))
     return made
 
 

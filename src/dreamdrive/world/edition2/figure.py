@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.world.bodies import Part
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.loft import capsule, egg, strip, tube
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.mesh import Mesh
 
 Joint = Callable[[float], Float[np.ndarray, "3"]]
@@ -61,22 +61,22 @@ class Clothes:
     child: bool
 
 
-def dress(draw: Draw, paints: Paints, child: bool) -> Clothes:
+def dress(draw: Draw, coats: Coats, child: bool) -> Clothes:
     """The clothes of a look."""
     outfit = draw.option(OUTFITS)
     colour = draw.any_of(_PLAIN) if draw.chance(0.5) else draw.muted()
     if outfit == "vest":
         colour = draw.any_of(_VEST)
     woven = draw.chance(0.2) and outfit != "vest"
-    skin = paints.plain(draw.near(draw.any_of(_SKIN), 6))
+    skin = coats.plain(draw.near(draw.any_of(_SKIN), 6))
     bare = outfit in ("skirt", "shorts") and draw.chance(0.6)
     return Clothes(
         outfit=outfit,
-        top=paints.cloth(colour) if woven else paints.plain(draw.near(colour, 6)),
-        legs=skin if bare else paints.plain(draw.near(draw.any_of(_PLAIN), 6)),
+        top=coats.cloth(colour) if woven else coats.plain(draw.near(colour, 6)),
+        legs=skin if bare else coats.plain(draw.near(draw.any_of(_PLAIN), 6)),
         skin=skin,
-        hair=paints.plain(draw.near(draw.any_of(_HAIR), 6)),
-        shoes=paints.plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
+        hair=coats.plain(draw.near(draw.any_of(_HAIR), 6)),
+        shoes=coats.plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
         girth=draw.between(0.85, 1.3),
         child=child,
     )

@@ -7,10 +7,10 @@ import numpy as np
 
 from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.bicycles import guard, spokes
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.figure import dress
 from dreamdrive.world.edition2.loft import bar, egg, ring_wheel, tube
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.rider import Seat, has_rider, rider
 from dreamdrive.world.edition2.wheels import rolling
 from dreamdrive.world.materials import Materials, Semantic
@@ -54,7 +54,7 @@ def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
     draw = Draw("motorcycle", look)
     family = draw.option(_FAMILIES)
     length, width, top = size_m
-    paints = Paints(draw, Semantic.MOTORCYCLE, materials)
+    coats = Coats(draw, Semantic.MOTORCYCLE, materials)
     radius = _RADIUS_M.get(family, 0.32)
     front, back = 0.5 * length - radius, radius - 0.5 * length
     machine = _Machine(
@@ -64,12 +64,12 @@ def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
         radius,
         saddle=(back + 0.4 * (front - back), 0.68 if family == "cruiser" else 0.76),
         grip_x=front - 0.24,
-        body=paints.plain(draw.paint(), 0.05),
-        dark=paints.plain((26, 26, 28)),
-        steel=paints.plain(draw.any_of(((150, 152, 156), (70, 72, 76))), 0.1),
+        body=coats.plain(draw.paint(), 0.05),
+        dark=coats.plain((26, 26, 28)),
+        steel=coats.plain(draw.any_of(((150, 152, 156), (70, 72, 76))), 0.1),
     )
     shell = _scooter if family in _RADIUS_M else _motor
-    parts = [Part(Mesh.joined([*shell(draw, machine), *_fittings(draw, machine, size_m, paints)]))]
+    parts = [Part(Mesh.joined([*shell(draw, machine), *_fittings(draw, machine, size_m, coats)]))]
     wheel = _wheel(machine)
     parts += [Part(wheel, rolling((x, 0.0, radius), radius)) for x in (back, front)]
     if has_rider(look):
@@ -78,7 +78,7 @@ def motorcycle(size_m: Size, look: int, materials: Materials) -> list[Part]:
         step = (x + (0.42 if family in (*_RADIUS_M, "cruiser") else 0.08), 0.32)
         seat = Seat((x, z), (machine.grip_x - 0.02, _GRIP_M), step, 0.45 * width - 0.05, lean)
         colour = draw.bright() if draw.chance(0.5) else draw.any_of(((24, 24, 26), (230, 230, 228)))
-        parts += rider(draw, seat, top, dress(draw, paints, False), paints.plain(colour, 0.05))
+        parts += rider(draw, seat, top, dress(draw, coats, False), coats.plain(colour, 0.05))
     return parts
 
 
@@ -89,7 +89,7 @@ def _wheel(machine: _Machine) -> Mesh:
     return Mesh.joined([tyre, disc, *spokes(6, 0.8 * radius, 0.02, steel)])
 
 
-def _fittings(draw: Draw, machine: _Machine, size_m: Size, paints: Paints) -> list[Mesh]:
+def _fittings(draw: Draw, machine: _Machine, size_m: Size, coats: Coats) -> list[Mesh]:
     """Bar, fork, mirrors, lamps, plate and front mudguard."""
     length, width, top = size_m
     half, x, z = 0.5 * length, machine.grip_x, _GRIP_M
@@ -102,11 +102,11 @@ def _fittings(draw: Draw, machine: _Machine, size_m: Size, paints: Paints) -> li
         mirror = (x - 0.02, side * 0.42 * width, min(z + 0.15, top - 0.05))
         made.append(bar((x, side * 0.32 * width, z), mirror, (0.008, 0.008), dark))
         made.append(box(mirror, (0.02, 0.12, 0.08), dark))
-    lamp = paints.plain((255, 252, 240) if draw.chance(0.7) else (214, 218, 222))
-    red = paints.plain((255, 50, 40) if draw.chance(0.3) else (164, 20, 22))
+    lamp = coats.plain((255, 252, 240) if draw.chance(0.7) else (214, 218, 222))
+    red = coats.plain((255, 50, 40) if draw.chance(0.3) else (164, 20, 22))
     made.append(egg((x + 0.16, 0, 0.86), (0.06, 0.085, 0.085), lamp))
     made.append(box((-half + 0.16, 0, 0.72), (0.05, 0.16, 0.07), red))
-    made.append(box((-half + 0.1, 0, 0.56), (0.02, 0.2, 0.16), paints.plain((232, 232, 228))))
+    made.append(box((-half + 0.1, 0, 0.56), (0.02, 0.2, 0.16), coats.plain((232, 232, 228))))
     return [*made, *guard(front, radius, radius + 0.04, machine.body)]
 
 

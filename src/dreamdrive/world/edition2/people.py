@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.world.bodies import Part, Size
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.figure import Clothes, dress, head, limb, trunk
 from dreamdrive.world.edition2.loft import bar, tube
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, box
 
@@ -35,10 +35,10 @@ def pedestrian(size_m: Size, look: int, materials: Materials) -> list[Part]:
     draw = Draw("pedestrian", look)
     _, child, umbrella = _stature(draw)
     height = size_m[2] - umbrella
-    paints = Paints(draw, Semantic.PEDESTRIAN, materials)
-    clothes = dress(draw, paints, child)
+    coats = Coats(draw, Semantic.PEDESTRIAN, materials)
+    clothes = dress(draw, coats, child)
     meshes = [trunk(height, clothes), head(draw, height, clothes)]
-    meshes += _carried(draw, height, umbrella, clothes, paints)
+    meshes += _carried(draw, height, umbrella, clothes, coats)
     return [Part(Mesh.joined(meshes)), *_limbs(draw, height, clothes, umbrella > 0)]
 
 
@@ -126,7 +126,7 @@ def _limbs(draw: Draw, height: float, clothes: Clothes, umbrella: bool) -> list[
     return parts
 
 
-def _carried(draw: Draw, height: float, umbrella: float, clothes: Clothes, paints: Paints) -> list[Mesh]:
+def _carried(draw: Draw, height: float, umbrella: float, clothes: Clothes, coats: Coats) -> list[Mesh]:
     """Backpack, bag, umbrella."""
     made = []
     back = 0.075 * height * clothes.girth
@@ -134,16 +134,16 @@ def _carried(draw: Draw, height: float, umbrella: float, clothes: Clothes, paint
         z = np.array([0.56, 0.57, 0.66, 0.77, 0.8])
         centres = np.stack([np.full(5, -back - 0.04 * height), np.zeros(5), z * height], axis=-1)
         radii = np.array([[0, 0], [0.05, 0.075], [0.055, 0.08], [0.045, 0.07], [0, 0]]) * height
-        made.append(tube(centres, radii, paints.plain(draw.bright()), 10, 3.5))
+        made.append(tube(centres, radii, coats.plain(draw.bright()), 10, 3.5))
     elif draw.chance(0.25):
         y = draw.any_of((-1.0, 1.0)) * 0.17 * height * clothes.girth
         size = (0.16 * height, 0.06 * height, 0.13 * height)
-        made.append(box((0.0, y, 0.4 * height), size, paints.plain(draw.bright())))
+        made.append(box((0.0, y, 0.4 * height), size, coats.plain(draw.bright())))
         made.append(bar((0, y, 0.46 * height), (0, 0.6 * y, 0.8 * height), (0.008, 0.008), clothes.shoes))
     if umbrella:
         top, at = height + umbrella, np.array([0.12, 0.06, 0.0])
         radii = np.array([[0.48, 0.48], [0.36, 0.36], [0.2, 0.2], [0.0, 0.0]])
         centres = at + np.array([[0, 0, top - 0.22], [0, 0, top - 0.1], [0, 0, top - 0.03], [0, 0, top]])
-        made.append(tube(centres, radii, paints.plain(draw.bright()), 10))
+        made.append(tube(centres, radii, coats.plain(draw.bright()), 10))
         made.append(bar((0.12, 0.06, 0.62 * height), (0.12, 0.06, top - 0.02), (0.012, 0.012), clothes.shoes))
     return made

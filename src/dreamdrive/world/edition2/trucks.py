@@ -146,7 +146,7 @@ def _cab_trim(draw: Draw, shape: Shape) -> Trim:
         tint=draw.near((36, 40, 44), 2),
         see_through=0.5,
         joined_panes=False,
-        bumper=draw.near((70, 72, 75), 8) if draw.chance(0.4) else None,
+        bumper=draw.near((70, 72, 75), 3) if draw.chance(0.4) else None,
         sill_m=0.2,
         head_m=0.12,
         handle_z=0.8 * nose,

@@ -6,12 +6,12 @@ from dreamdrive.scene.layout import BoxKind
 from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.canvas import lettering
 from dreamdrive.world.edition2.car_families import CARS, CARS_KEPT_OUT
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.ends import GRILLES, HEADS
 from dreamdrive.world.edition2.family import Family
 from dreamdrive.world.edition2.fittings import TAXI, Fittings
 from dreamdrive.world.edition2.loft import Side, projected
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.shape import Shape, body_mesh
 from dreamdrive.world.edition2.skin import paint_skin
 from dreamdrive.world.edition2.trim import Letters, Trim, shaded
@@ -62,12 +62,12 @@ def vehicle(kind: BoxKind, size_m: Size, look: int, materials: Materials) -> lis
     length, width, height = size_m
     bare = length, width, height - fittings.on_roof_m
     shape = family.shape(draw, bare)
-    paints = Paints(draw, Semantic.CAR if kind == "car" else Semantic.VAN, materials)
+    coats = Coats(draw, Semantic.CAR if kind == "car" else Semantic.VAN, materials)
     trim = _trim(draw, shape, family, _livery(draw, shape, family, fittings.role))
-    skin = [paints.picture(image, GLOSS) for image in paint_skin(draw, shape, trim)]
+    skin = [coats.picture(image, GLOSS) for image in paint_skin(draw, shape, trim)]
     meshes = [projected(body_mesh(shape), bare, skin)]
-    meshes += fittings.meshes(shape, skin[Side.TOP], skin[Side.UNDER], paints)
-    return [Part(Mesh.joined(meshes)), *wheels(draw, shape, paints)]
+    meshes += fittings.meshes(shape, skin[Side.TOP], skin[Side.UNDER], coats)
+    return [Part(Mesh.joined(meshes)), *wheels(draw, shape, coats)]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _trim(draw: Draw, shape: Shape, family: Family, livery: _Livery) -> Trim:
     return Trim(
         colour=colour,
         roof=livery.roof,
-        low=draw.near(_PLASTIC, 4) if clad or not car or draw.chance(0.4) else shaded(colour, 0.8),
+        low=draw.near(_PLASTIC, 1) if clad or not car or draw.chance(0.4) else shaded(colour, 0.8),
         panes=family.panes,
         doors=family.doors,
         head=1 if old else head,
@@ -128,11 +128,11 @@ def _trim(draw: Draw, shape: Shape, family: Family, livery: _Livery) -> Trim:
             None if draw.chance(0.06) else _WHITE_PLATE,
             _YELLOW_PLATE if draw.chance(0.12) else _WHITE_PLATE,
         ),
-        tint=draw.near((36, 40, 44), 2),
+        tint=shaded((38, 42, 46), draw.between(0.6, 1.25)),
         privacy=draw.between(0.45, 1.0),
         see_through=draw.between(0.2, 0.9),
         joined_panes=len(family.panes) > 1,
-        bumper=draw.near((52, 53, 55), 5) if draw.chance(0.05 if car else 0.55) or old else None,
+        bumper=draw.near((52, 53, 55), 2) if draw.chance(0.05 if car else 0.55) or old else None,
         sill_m=draw.between(0.04, 0.14),
         head_m=draw.between(0.2, 0.42),
         crease=draw.between(0, 1),

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 
 from dreamdrive.world.bodies import Part, Turn
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.loft import smooth
-from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.shape import Shape
 from dreamdrive.world.mesh import Mesh, cylinder, pitched
 from dreamdrive.world.paint import Image
@@ -50,10 +50,10 @@ def rim(draw: Draw, radius_share: float) -> Image:
     return image
 
 
-def wheels(draw: Draw, shape: Shape, paints: Paints, width_m: float = 0.21) -> list[Part]:
+def wheels(draw: Draw, shape: Shape, coats: Coats, width_m: float = 0.21) -> list[Part]:
     """A pair on each axle of a body."""
-    face = paints.picture(rim(draw, float(draw.rng.uniform(0.62, 0.76))), 0.03)
-    return wheel_pairs(shape.axles, shape.wheel, shape.width, (paints.even(27), face), width_m)
+    face = coats.picture(rim(draw, float(draw.rng.uniform(0.62, 0.76))), 0.03)
+    return wheel_pairs(shape.axles, shape.wheel, shape.width, (coats.even(27), face), width_m)
 
 
 def wheel_pairs(

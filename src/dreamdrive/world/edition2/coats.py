@@ -7,7 +7,7 @@ from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.materials import Materials, Semantic
 
 
-class Paints:
+class Coats:
     """Adds the materials of one body."""
 
     def __init__(self, draw: Draw, kind: Semantic, materials: Materials) -> None:
