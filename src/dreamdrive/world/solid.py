@@ -68,6 +68,22 @@ class Solid:
         distance[hit] = gap / np.where(slope == 0, 1e-300, slope)
         return Hits(triangle, distance)
 
+    def first_from(self, points: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]) -> Hits:
+        """The nearest triangle along rays that start at different points, to single precision."""
+        count = len(points)
+        if self._scene is None or not count:
+            return Hits(np.full(count, -1), np.full(count, np.inf))
+        rays = np.ascontiguousarray(directions, dtype=np.float32)
+        start = np.ascontiguousarray(points, dtype=np.float32) + rays * np.float32(_OFF_SURFACE_M)
+        triangle = np.asarray(self._scene.run(start, rays, query="INTERSECT"), dtype=np.int64)
+        hit = np.flatnonzero(triangle >= 0)
+        distance = np.full(count, np.inf)
+        across = picked(self._across, triangle[hit])
+        slope = dot(across, picked(directions, hit))
+        gap = dot(across, self.corners[triangle[hit], 0] - points[hit])
+        distance[hit] = gap / np.where(slope == 0, 1e-300, slope)
+        return Hits(triangle, distance)
+
     def hidden(
         self, points: Float[np.ndarray, "n 3"], towards: Float[np.ndarray, "3"]
     ) -> Bool[np.ndarray, " n"]:
