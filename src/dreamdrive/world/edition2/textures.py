@@ -10,7 +10,6 @@ import numpy as np
 from msgspec import Meta
 
 from dreamdrive.errors import InputError
-from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED
 from dreamdrive.world.paint import Image
 
 TextureKind = Literal["facade", "road", "ground", "vegetation", "sky", "clutter"]
@@ -61,11 +60,6 @@ class TextureLibrary:
             raise InputError(f"{folder} has no {INDEX}: textures are made by training/make_textures.py")
         found = msgspec.json.decode(index.read_bytes(), type=tuple[Texture, ...])
         return TextureLibrary(found, tuple((folder / t.file).read_bytes() for t in found))
-
-    @staticmethod
-    def look_of(seed: int) -> int:
-        """A look for what a street has none for: streets to train on never show what is kept out."""
-        return 0 if seed >= FIRST_TRAINING_SEED else KEPT_OUT
 
     def pick(self, kind: TextureKind, look: int, rng: np.random.Generator) -> tuple[Image, Texture] | None:
         """A texture of a kind for a look, RGB, or None where there is none of the kind."""
