@@ -38,9 +38,10 @@ class Solid:
         self._across = np.asfortranarray(across)
         self.normals = np.asfortranarray(across / np.maximum(length, 1e-12), dtype=np.float32)
         self.to_uv = np.asfortranarray(_affine_rows(mesh.corners, mesh.uv), dtype=np.float32)
-        self.curved, self.to_normal = None, None
+        self.curved: Bool[np.ndarray, " m"] | None = None
+        self.to_normal: Float[np.ndarray, "m 3 4"] | None = None
         if mesh.normals is not None:
-            self.curved = (np.abs(mesh.normals - mesh.normals[:, :1]) > 1e-4).any(axis=(1, 2))
+            self.curved = np.any(np.abs(mesh.normals - mesh.normals[:, :1]) > 1e-4, axis=(1, 2))
             self.to_normal = np.zeros((len(mesh), 3, 4))
             self.to_normal[self.curved] = _affine_rows(mesh.corners[self.curved], mesh.normals[self.curved])
         self._scene = None

@@ -8,8 +8,8 @@ import pytest
 from dreamdrive.scene.layout import BoxKind
 from dreamdrive.world.edition2 import body, has_rider, is_kept_out, size_of
 from dreamdrive.world.edition2.draw import Draw
-from dreamdrive.world.edition2.families import family_of
 from dreamdrive.world.edition2.shape import body_mesh
+from dreamdrive.world.edition2.vehicles import family_of
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh
 

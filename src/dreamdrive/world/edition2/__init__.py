@@ -6,7 +6,7 @@ from dreamdrive.world.edition2.lens import bent, level_from_camera, most_barrel,
 from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED, Looks
 from dreamdrive.world.edition2.photograph import photograph
 from dreamdrive.world.edition2.relief import Hills, hills_of
+from dreamdrive.world.edition2.rider import has_rider
 from dreamdrive.world.edition2.streets import draw_street
 from dreamdrive.world.edition2.textures import Texture, TextureKind, TextureLibrary
-from dreamdrive.world.edition2.two_wheelers import has_rider
 from dreamdrive.world.edition2.weather import draw_light

@@ -7,6 +7,7 @@ from dreamdrive.scene.layout import Barrier
 from dreamdrive.world import paint
 from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.plants import hedge
+from dreamdrive.world.edition2.tiles import between
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import Mesh, quads
 
@@ -127,7 +128,7 @@ def _fence(given: Barrier, paints: Paints) -> Mesh:
 def _boards(look: int, paints: Paints) -> int:
     def make() -> paint.Image:
         rng = np.random.default_rng([look, 92])
-        colour = rng.uniform((90, 66, 46), (200, 190, 176))
+        colour = between(rng, (90, 66, 46), (200, 190, 176))
         image = np.repeat(colour + rng.normal(0, 10, (1, 20, 3)), 5, axis=1) + rng.normal(0, 4, (64, 100, 3))
         image[:, ::5] *= 0.6
         return paint.finished(image)
@@ -144,7 +145,7 @@ def _wall(given: Barrier, paints: Paints) -> Mesh:
     def make() -> paint.Image:
         local = np.random.default_rng([given.look, 94])
         colour = (
-            local.uniform((96, 70, 56), (220, 210, 198))
+            between(local, (96, 70, 56), (220, 210, 198))
             if local.random() < 0.6
             else np.full(3, local.uniform(120, 200))
         )

@@ -5,10 +5,11 @@ Frame of a body: x ahead, y to the left, z up, the origin on the ground under th
 
 from dreamdrive.scene.layout import BoxKind
 from dreamdrive.world.bodies import Part, Size
+from dreamdrive.world.edition2.bicycles import bicycle, bicycle_size
 from dreamdrive.world.edition2.buses import bus, bus_size
+from dreamdrive.world.edition2.motorcycles import motorcycle, motorcycle_size
 from dreamdrive.world.edition2.people import pedestrian, pedestrian_size
 from dreamdrive.world.edition2.trucks import truck, truck_size
-from dreamdrive.world.edition2.two_wheelers import bicycle, motorcycle, two_wheeler_size
 from dreamdrive.world.edition2.vehicles import vehicle, vehicle_size
 from dreamdrive.world.materials import Materials
 
@@ -38,5 +39,7 @@ def size_of(kind: BoxKind, look: int) -> Size:
             return bus_size(look)
         case "pedestrian":
             return pedestrian_size(look)
-        case _:
-            return two_wheeler_size(kind, look)
+        case "bicycle":
+            return bicycle_size(look)
+        case "motorcycle":
+            return motorcycle_size(look)

@@ -7,6 +7,8 @@ from dreamdrive.scene.layout import Building
 from dreamdrive.world import paint
 from dreamdrive.world.edition2.facades import VARIANTS, facade
 from dreamdrive.world.edition2.paints import Paints
+from dreamdrive.world.edition2.textures import recoloured
+from dreamdrive.world.edition2.tiles import between
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import Mesh, box, plate, quads, upright, walls
 
@@ -48,8 +50,13 @@ def _front(
         return paints.get(key, Semantic.BUILDING, lambda: picture, glow=lambda: glow), width, "cut"
     made = facade(variant, floors)
     gloss = 0.12 if made.style == "glass" else 0.0
+    tint = np.random.default_rng([building.look, 78])
     material = paints.get(
-        ("front", variant, floors), Semantic.BUILDING, lambda: made.image, glow=lambda: made.glow, gloss=gloss
+        ("front", building.look, floors),
+        Semantic.BUILDING,
+        lambda: recoloured(tint, made.image, 1.2),
+        glow=lambda: made.glow,
+        gloss=gloss,
     )
     return material, made.width_m, made.style
 
@@ -122,7 +129,7 @@ def _roof(
     parts = [mesh, gables]
     if rng.random() < 0.5:
         spot = start + along * rng.uniform(0.2, 0.8)
-        brick = paints.plain(("chimney",), Semantic.BUILDING, rng.uniform((90, 60, 50), (200, 180, 170)))
+        brick = paints.plain(("chimney",), Semantic.BUILDING, between(rng, (90, 60, 50), (200, 180, 170)))
         parts.append(box((*spot, top), (0.6, 0.5, 1.8), brick))
     return Mesh.joined(parts)
 
@@ -172,7 +179,9 @@ def _attached(corners: np.ndarray, floors: int, paints: Paints, rng: np.random.G
             made.append(box((x, -0.8, 2.6), (3.0, 1.6, 0.2), paint_))
             made += [box((x + s, -1.5, 1.25), (0.15, 0.15, 2.5), paint_) for s in (-1.4, 1.4)]
         elif kind == "awning":
-            cloth = paints.plain(("cloth",), Semantic.BUILDING, rng.uniform(40, 240, 3))
+            cloth = paints.plain(
+                ("cloth",), Semantic.BUILDING, rng.uniform(40, 230) * np.array([1, 0.95, 0.88])
+            )
             x0, x1 = -0.42 * length, 0.42 * length
             slope = [[x0, -1.3, 2.35], [x1, -1.3, 2.35], [x1, 0, 3.0], [x0, 0, 3.0]]
             made.append(quads(np.array([slope]), cloth))

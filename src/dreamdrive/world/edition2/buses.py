@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 from dreamdrive.world.bodies import Part, Size
 from dreamdrive.world.edition2.canvas import lettering
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Colour, Draw
 from dreamdrive.world.edition2.ends import HEADS
-from dreamdrive.world.edition2.loft import projected, smooth
+from dreamdrive.world.edition2.loft import projected
 from dreamdrive.world.edition2.shape import Shape, body_mesh
 from dreamdrive.world.edition2.skin import paint_skin
 from dreamdrive.world.edition2.trim import Letters, Trim, shaded
@@ -88,20 +89,19 @@ def bus(size_m: Size, look: int, materials: Materials) -> list[Part]:
     shape = _shape(draw, family, size_m)
     trim = _trim(draw, family, shape)
     skin = paint_skin(draw, shape, trim)
-    indices = [materials.add(image, Semantic.BUS, gloss=0.05) for image in skin]
-    shell = body_mesh(shape)
-    shell.corners[..., 2] *= size_m[2] / shell.corners[..., 2].max()
-    meshes = [projected(smooth(shell), size_m, indices)]
+    coats = Coats(draw, Semantic.BUS, materials)
+    indices = [coats.picture(image, 0.05) for image in skin]
+    meshes = [projected(body_mesh(shape), size_m, indices)]
     half, side = 0.5 * shape.length, 0.5 * shape.width
     z = 0.7 * size_m[2] if family != "double decker" else 0.42 * size_m[2]
     for sign in (-1, 1):
-        meshes.append(box((half + 0.02, sign * (side + 0.08), z), (0.1, 0.14, 0.36), indices[-1]))
+        meshes.append(box((half + 0.02, sign * (side + 0.05), z), (0.1, 0.2, 0.36), indices[-1]))
     if family in ("city", "small") and draw.chance(0.6):
         low = (float(draw.rng.uniform(1.5, 3.0)), 0.75 * shape.width, 0.2)
         meshes.append(
             box((draw.rng.uniform(-0.2, 0.15) * shape.length, 0, size_m[2] - 0.08), low, indices[4])
         )
-    return [Part(Mesh.joined(meshes)), *wheels(draw, shape, shape.width, materials, Semantic.BUS, 0.28)]
+    return [Part(Mesh.joined(meshes)), *wheels(draw, shape, coats, 0.28)]
 
 
 def _shape(draw: Draw, family: str, size_m: Size) -> Shape:

@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from copy import copy
+from functools import lru_cache
 
 import cv2
 import numpy as np
 
 from dreamdrive.world.edition2.draw import Colour
-from dreamdrive.world.paint import Image, finished, noise
+from dreamdrive.world.paint import Image, noise
 
 Place = tuple[float, float]
 """Metres to the right of the middle and above the ground, as seen by who looks at this side."""
 
 _SHIFT = 4  # fractional bits of OpenCV's corners
+_GRAIN_PX = 640
 LETTERS = list("ABCDEFGHIKLMNOPRSTUVXYZ")
 
 
@@ -59,17 +61,19 @@ class Canvas:
 
     def fade(self, points: Sequence[Place], low: Colour, high: Colour) -> None:
         """A filled outline whose colour changes from its foot to its top."""
-        mask = np.zeros(self.image.shape[:2], dtype=np.uint8)
-        cv2.fillPoly(mask, [self._texels(points)], (255,), cv2.LINE_AA, _SHIFT)
-        rows = np.flatnonzero(mask.any(axis=1))
-        if not len(rows):
-            return
-        first, last = int(rows[0]), int(rows[-1]) + 1
-        share = np.linspace(1, 0, last - first, dtype=np.float32)[:, None, None]
-        ink = np.array(low, np.float32) * (1 - share) + np.array(high, np.float32) * share
-        band = self.image[first:last].astype(np.float32)
-        opaque = mask[first:last, :, None] / np.float32(255)
-        self.image[first:last] = np.rint(band + opaque * (ink - band)).astype(np.uint8)
+        texels = self._texels(points)
+        most = np.array(self.image.shape[1::-1]) - 1
+        first = np.clip((texels.min(axis=0) >> _SHIFT) - 1, 0, most)
+        last = np.clip((texels.max(axis=0) >> _SHIFT) + 2, 0, most) + 1
+        band = self.image[first[1] : last[1], first[0] : last[0]]
+        mask = np.zeros(band.shape[:2], dtype=np.uint8)
+        cv2.fillPoly(mask, [texels - (first << _SHIFT).astype(np.int32)], (255,), cv2.LINE_AA, _SHIFT)
+        share = np.linspace(1, 0, len(band), dtype=np.float32)[:, None]
+        bottom, top = np.array(low, np.float32), np.array(high, np.float32)
+        ink = bottom + share * (top - bottom)
+        inked = np.repeat(np.rint(ink).astype(np.uint8)[:, None], band.shape[1], axis=1)
+        opaque = mask.astype(np.float32) * np.float32(1 / 255)
+        band[:] = cv2.blendLinear(inked, np.ascontiguousarray(band), opaque, 1 - opaque)
 
     def word(self, text: str, at: Place, height_m: float, colour: Colour) -> None:
         """Letters that start at a place."""
@@ -87,14 +91,23 @@ class Canvas:
 
     def worn(self, rng: np.random.Generator, dirt: float) -> Image:
         """The picture with the unevenness of real paint, and dirt (0 to 1) from below."""
-        image = self.image.astype(np.float32)
-        shape = image.shape[:2]
-        image *= 1 + noise(rng, shape, {6: 0.012, 40: 0.035})[..., None]
+        shape = self.image.shape[:2]
+        left, top = rng.integers(0, _GRAIN_PX - np.array(shape[::-1]))
+        grain = _grain()[:, top : top + shape[0], left : left + shape[1]]
         up = np.linspace(self.height_m, 0, shape[0], dtype=np.float32)[:, None]
-        share = dirt * np.clip(1.1 - 1.6 * up / min(self.height_m, 2.0), 0.06, 1)
-        share = share * (1 + noise(rng, shape, {8: 0.12, 30: 0.25}))
-        image += np.clip(0.75 * share, 0, 0.9)[..., None] * (np.array([116, 106, 94], np.float32) - image)
-        return finished(image)
+        share = np.clip(
+            0.75 * dirt * np.clip(1.1 - 1.6 * up / min(self.height_m, 2.0), 0.06, 1) * grain[1], 0, 0.9
+        )
+        kept = (1 - share) * grain[0]
+        soil = np.array([116, 106, 94], np.float32)
+        return cv2.convertScaleAbs(self.image * kept[..., None] + share[..., None] * soil)
+
+
+@lru_cache(maxsize=1)
+def _grain() -> np.ndarray:
+    """Unevenness about 1 of paint and of dirt (2, H, W), of which each picture takes a piece."""
+    rng, shape = np.random.default_rng(0), (_GRAIN_PX, _GRAIN_PX)
+    return 1 + np.stack([noise(rng, shape, {6: 0.012, 40: 0.035}), noise(rng, shape, {8: 0.12, 30: 0.25})])
 
 
 def lettering(rng: np.random.Generator, least: int = 4, most: int = 9) -> str:

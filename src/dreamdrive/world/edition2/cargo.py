@@ -102,7 +102,7 @@ class Load:
             made.append(
                 box(
                     (x, y, top + 0.5 * size[2]),
-                    size,
+                    size.tolist(),
                     [Side.LEFT, Side.RIGHT, Side.BACK, Side.FRONT, Side.TOP, Side.UNDER],
                 )
             )

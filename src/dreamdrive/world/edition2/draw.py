@@ -84,6 +84,12 @@ class Draw:
         red, green, blue = np.clip(np.array(colour) + self.rng.normal(0, spread, 3), 4, 250)
         return float(red), float(green), float(blue)
 
+    def muted(self) -> Colour:
+        """Any colour as cloth has it: greyer."""
+        red, green, blue = self.rng.uniform(0.3, 1.0) * np.array(self.bright()) + self.rng.uniform(0, 60)
+        mean, grey = (red + green + blue) / 3, float(self.rng.uniform(0.1, 0.7))
+        return red + grey * (mean - red), green + grey * (mean - green), blue + grey * (mean - blue)
+
     def bright(self) -> Colour:
         """Any colour, of clothes or of letters."""
         red, green, blue = self.rng.uniform(10, 240, 3)

@@ -72,9 +72,11 @@ def _windscreen(canvas: Canvas, draw: Draw, shape: Shape, trim: Trim) -> None:
     for y in (-0.42 * low, 0.42 * low):
         canvas.ellipse((y, z0 + 0.42 * rise), (0.12, 0.16), shaded(trim.tint, 0.55))
         canvas.rectangle((y - 0.24, z0), (y + 0.24, z0 + 0.3 * rise), shaded(trim.tint, 0.6))
-    driver = draw.any_of((-1, 1)) * 0.42 * low
     if draw.chance(0.6):
-        canvas.ellipse((driver, z0 + 0.5 * rise), (0.1, 0.13), draw.any_of(((150, 112, 92), (96, 70, 56))))
+        driver = draw.any_of((-1, 1)) * 0.42 * low
+        skin = draw.any_of(((92, 70, 58), (58, 44, 36), (74, 66, 62)))
+        canvas.ellipse((driver, z0 + 0.46 * rise), (0.08, 0.11), skin)
+        canvas.ellipse((driver, z0 + 0.14 * rise), (0.2, min(0.17 * rise, 0.25)), shaded(draw.muted(), 0.4))
     canvas.line([(-0.75 * low, z0 + 0.03), (0.1 * low, z0 + 0.09)], _BLACK, 0.02)
     canvas.line([(0.0, z0 + 0.03), (0.8 * low, z0 + 0.08)], _BLACK, 0.02)
     if trim.sign is not None:
@@ -86,7 +88,9 @@ def _grille(canvas: Canvas, shape: Shape, trim: Trim) -> None:
     half, (low, high) = 0.5 * shape.width, trim.head_z
     if trim.grille == 0:
         canvas.rectangle((-0.55 * half, low + 0.02), (0.55 * half, high - 0.03), _BLACK)
-        canvas.line([(-0.55 * half, 0.5 * (low + high)), (0.55 * half, 0.5 * (low + high))], _CLEAR, 0.025)
+        canvas.line(
+            [(-0.55 * half, 0.5 * (low + high)), (0.55 * half, 0.5 * (low + high))], (150, 152, 156), 0.016
+        )
     elif trim.grille == 1:
         down = 0.45 * low
         canvas.polygon(
@@ -124,7 +128,7 @@ def _grille(canvas: Canvas, shape: Shape, trim: Trim) -> None:
         canvas.rectangle((-0.5 * half, 0.6 * low), (0.5 * half, high), (34, 35, 38))
         for share in (-0.4, -0.2, 0.0, 0.2, 0.4):
             canvas.line([(share * half, 0.6 * low), (share * half, high)], (150, 152, 156), 0.025)
-    canvas.ellipse((0.0, 0.5 * (low + high) + 0.01), (0.055, 0.05), (210, 212, 214))
+    canvas.ellipse((0.0, 0.5 * (low + high) + 0.01), (0.045, 0.04), (176, 178, 182))
 
 
 def _headlamp(canvas: Canvas, shape: Shape, trim: Trim, side: float) -> None:
@@ -221,7 +225,7 @@ def paint_back(canvas: Canvas, draw: Draw, shape: Shape, trim: Trim) -> None:
     at = (0.0, 0.66 * top) if draw.chance(0.65) else (0.0, 0.38 * top)
     canvas.rectangle((at[0] - 0.34, at[1] - 0.1), (at[0] + 0.34, at[1] + 0.1), shaded(trim.colour, 0.7))
     _plate(canvas, draw, at, trim.plates[1])
-    canvas.ellipse((0.0, 0.88 * top), (0.055, 0.05), (206, 208, 210))
+    canvas.ellipse((0.0, 0.88 * top), (0.04, 0.036), (170, 172, 176))
     canvas.ellipse((-0.55 * half, foot - 0.02), (0.05, 0.035), (90, 90, 92))
 
 

@@ -19,7 +19,7 @@ from dreamdrive.world.solid import Hits
 _DETAIL_M = 2.4
 """Side of the tile that makes near ground grainy."""
 _DETAIL_REACH_M = 16.0
-_HEADLIGHT = 260.0
+_HEADLIGHT = 330.0
 _EGO_SIZE = (2.6, 1.8, 1.5)  # the camera sits behind the bonnet
 _LAMP_KINDS = ("car", "van", "truck", "bus", "motorcycle")
 
@@ -185,6 +185,7 @@ class Eye2(Eye):
         ground = self._ground(material)
         here = picked(points, ground)
         wet = level * self.world.ground2.wetness(here[:, :2], level)
+        wet *= np.where(self.world.ground.labels_at(here[:, :2]) == Semantic.GRASS, 0.3, 1).astype(np.float32)
         seen[ground] *= (1 - 0.45 * wet)[:, None]
         share = wet * (0.02 + 0.98 * (1 - slope[ground]) ** 5)
         mirrors = np.flatnonzero(share > 0.03)

@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
+from dreamdrive.world.edition2.tiles import between
 from dreamdrive.world.paint import Image, finished, noise
 
 TEXEL_M = 0.05
-VARIANTS = 60
+VARIANTS = 24
 """Painted fronts of each number of floors; a process paints each once."""
 
 
@@ -25,7 +26,7 @@ class Facade:
     style: str
 
 
-@lru_cache(maxsize=160)
+@lru_cache(maxsize=200)
 def facade(variant: int, floors: int) -> Facade:
     """A painted front of so many floors."""
     rng = np.random.default_rng([variant, floors, 71])
@@ -90,6 +91,12 @@ def _plain_colour(rng: np.random.Generator) -> np.ndarray:
     return np.clip(level * tint, 20, 245)
 
 
+def _strong(rng: np.random.Generator) -> np.ndarray:
+    """A colour of signs and awnings."""
+    mixed = rng.uniform(10, 250, 3)
+    return mixed + rng.uniform(0.1, 0.9) * (mixed.mean() - mixed)
+
+
 def _window(rng: np.random.Generator, size: tuple[int, int], frame: np.ndarray, bars: int) -> np.ndarray:
     """A window (H, W, 3): glass that mirrors sky above and street below, curtains, frame and bars."""
     height, width = size
@@ -132,7 +139,7 @@ def _rows(
     wall = paper.image.mean(axis=(0, 1))
     trim = np.clip(wall * rng.uniform(0.6, 1.4), 0, 250)
     shutters = (
-        rng.uniform((20, 40, 30), (150, 110, 110)) if rng.random() < 0.15 and pitch > 1.8 * width else None
+        between(rng, (20, 40, 30), (150, 110, 110)) if rng.random() < 0.15 and pitch > 1.8 * width else None
     )
     looks = [_window(rng, (int(height), int(width)), frame, bars) for _ in range(5)]
     balcony = rng.random() < 0.25
@@ -178,7 +185,9 @@ def _plaster(paper: _Paper) -> None:
 def _brick(paper: _Paper) -> None:
     rng = paper.rng
     paper.wash(
-        rng.uniform((96, 50, 36), (200, 134, 104)) if rng.random() < 0.75 else rng.uniform(110, 220, 3)
+        between(rng, (96, 50, 36), (200, 134, 104))
+        if rng.random() < 0.75
+        else between(rng, (140, 128, 110), (225, 215, 200))
     )
     course = max(2, round(rng.uniform(0.07, 0.14) / TEXEL_M))
     tone = rng.normal(0, 9, (paper.shape[0] // course + 1, paper.shape[1] // 5 + 2)).astype(np.float32)
@@ -284,7 +293,7 @@ def _shops(paper: _Paper) -> None:
     x = 0.0
     while x < paper.shape[1] - 20:
         wide = min(rng.uniform(2.5, 7) / TEXEL_M, paper.shape[1] - x)
-        frame, board = rng.uniform(20, 220, 3), rng.uniform(10, 250, 3)
+        frame, board = between(rng, (22, 22, 24), (205, 200, 192)), _strong(rng)
         paper.rect(x, top, x + wide, height, frame)
         pane = rng.uniform(20, 110) * rng.uniform((0.8, 0.85, 0.9), 1.1)
         paper.rect(x + 4, top + 18, x + wide - 4, height - rng.uniform(2, 12), pane)
@@ -309,9 +318,9 @@ def _shops(paper: _Paper) -> None:
                 90, 230
             ) * np.array([1, 0.9, 0.7])
         door = x + rng.uniform(4, max(5, wide - 24))
-        paper.rect(door, top + 22, door + 18, height, rng.uniform(15, 160, 3))
+        paper.rect(door, top + 22, door + 18, height, between(rng, (18, 18, 20), (150, 140, 128)))
         if rng.random() < 0.3:
-            cloth, stripe = rng.uniform(60, 240, 3), rng.random() < 0.5
+            cloth, stripe = _strong(rng), rng.random() < 0.5
             paper.rect(x, top + 15, x + wide, top + 32, cloth)
             if stripe:
                 for s in np.arange(x, x + wide, 10):
@@ -326,7 +335,7 @@ def _entrance(paper: _Paper) -> None:
         wide = rng.uniform(0.9, 1.3) / TEXEL_M if rng.random() < 0.7 else rng.uniform(2.3, 3) / TEXEL_M
         high = min(2.2 / TEXEL_M, 0.85 * paper.floor_px)
         x = rng.uniform(0, max(1.0, paper.shape[1] - wide))
-        colour = rng.uniform((25, 20, 18), (190, 180, 175))
+        colour = between(rng, (25, 20, 18), (190, 180, 175))
         paper.rect(x - 2, height - high - 2, x + wide + 2, height, np.minimum(colour + 60, 240))
         paper.rect(x, height - high, x + wide, height, colour)
         for y in np.arange(height - high + 6, height, 10):

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.world import paint
 from dreamdrive.world.bodies import Part
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Colour, Draw
-from dreamdrive.world.edition2.loft import capsule, smooth, strip, tube
-from dreamdrive.world.materials import Materials, Semantic
-from dreamdrive.world.mesh import Mesh, ball
+from dreamdrive.world.edition2.loft import capsule, egg, strip, tube
+from dreamdrive.world.mesh import Mesh
 
 Joint = Callable[[float], Float[np.ndarray, "3"]]
 """From the way travelled in metres to the place of a joint in its body."""
@@ -62,33 +61,22 @@ class Clothes:
     child: bool
 
 
-def dress(draw: Draw, kind: Semantic, materials: Materials, child: bool) -> Clothes:
+def dress(draw: Draw, coats: Coats, child: bool) -> Clothes:
     """The clothes of a look."""
     outfit = draw.option(OUTFITS)
-
-    def plain(colour: Colour) -> int:
-        return materials.add(paint.panel(draw.rng, draw.near(colour, 6)), kind)
-
-    colour = (
-        draw.any_of(_VEST)
-        if outfit == "vest"
-        else draw.any_of(_PLAIN)
-        if draw.chance(0.55)
-        else draw.bright()
-    )
-    if draw.chance(0.2) and outfit != "vest":
-        top = materials.add(paint.cloth(draw.rng, colour), kind, repeats=True)
-    else:
-        top = plain(colour)
-    skin = plain(draw.any_of(_SKIN))
-    legs = skin if outfit in ("skirt", "shorts") and draw.chance(0.6) else plain(draw.any_of(_PLAIN))
+    colour = draw.any_of(_PLAIN) if draw.chance(0.5) else draw.muted()
+    if outfit == "vest":
+        colour = draw.any_of(_VEST)
+    woven = draw.chance(0.2) and outfit != "vest"
+    skin = coats.plain(draw.near(draw.any_of(_SKIN), 6))
+    bare = outfit in ("skirt", "shorts") and draw.chance(0.6)
     return Clothes(
         outfit=outfit,
-        top=top,
-        legs=legs,
+        top=coats.cloth(colour) if woven else coats.plain(draw.near(colour, 6)),
+        legs=skin if bare else coats.plain(draw.near(draw.any_of(_PLAIN), 6)),
         skin=skin,
-        hair=plain(draw.any_of(_HAIR)),
-        shoes=plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
+        hair=coats.plain(draw.near(draw.any_of(_HAIR), 6)),
+        shoes=coats.plain(draw.any_of(((24, 24, 26), (60, 46, 36), (210, 210, 208)))),
         girth=draw.between(0.85, 1.3),
         child=child,
     )
@@ -117,7 +105,7 @@ def trunk(height_m: float, clothes: Clothes) -> Mesh:
     table = np.array(rows) * height_m
     centres = np.zeros((len(table), 3))
     centres[:, 2] = table[:, 0]
-    return smooth(tube(centres, table[:, 1:] * wide, clothes.top, 12, 2.4), 1.2)
+    return tube(centres, table[:, 1:] * wide, clothes.top, 12, 2.4)
 
 
 def head(draw: Draw, height_m: float, clothes: Clothes, helmet: int | None = None) -> Mesh:
@@ -125,27 +113,27 @@ def head(draw: Draw, height_m: float, clothes: Clothes, helmet: int | None = Non
     size = height_m * (1.3 if clothes.child else 1.0)
     tall = 0.066 * size
     z = height_m - 1.06 * tall
-    made = [ball((0.012 * size, 0, z), (0.052 * size, 0.043 * size, tall), clothes.skin, 6)]
+    made = [egg((0.012 * size, 0, z), (0.052 * size, 0.043 * size, tall), clothes.skin)]
     neck = np.array([[0, 0, 0.82 * height_m], [0.004 * size, 0, z - 0.3 * tall]])
     made.append(tube(neck, np.full((2, 2), 0.031 * size), clothes.skin, 8))
     cover = helmet
     if cover is None and clothes.outfit == "hooded":
         cover = clothes.top
     if helmet is not None:
-        made.append(ball((0.0, 0, z + 0.25 * tall), (0.066 * size, 0.057 * size, 0.86 * tall), helmet, 7))
+        made.append(egg((0.0, 0, z + 0.25 * tall), (0.066 * size, 0.057 * size, 0.86 * tall), helmet))
     elif cover is not None:
         made.append(
-            ball((-0.012 * size, 0, z + 0.05 * tall), (0.055 * size, 0.054 * size, 1.05 * tall), cover, 6)
+            egg((-0.012 * size, 0, z + 0.05 * tall), (0.055 * size, 0.054 * size, 1.05 * tall), cover)
         )
     else:
         hat = draw.chance(0.2)
         colour = clothes.top if hat and draw.chance(0.4) else clothes.hair
         made.append(
-            ball((-0.006 * size, 0, z + 0.22 * tall), (0.054 * size, 0.048 * size, 0.86 * tall), colour, 6)
+            egg((-0.006 * size, 0, z + 0.22 * tall), (0.054 * size, 0.048 * size, 0.86 * tall), colour)
         )
         if hat:
             made.append(
-                ball((0.02 * size, 0, z + 0.3 * tall), (0.09 * size, 0.07 * size, 0.12 * tall), colour, 5)
+                egg((0.02 * size, 0, z + 0.3 * tall), (0.09 * size, 0.07 * size, 0.12 * tall), colour)
             )
         elif draw.chance(0.35):
             long = (
@@ -153,7 +141,7 @@ def head(draw: Draw, height_m: float, clothes: Clothes, helmet: int | None = Non
             )
             radii = np.array([[0, 0], [0.02, 0.04], [0.03, 0.044], [0, 0]]) * size
             made.append(tube(long + np.array([0, 0, z]), radii, clothes.hair, 8))
-    return smooth(Mesh.joined(made), 1.2)
+    return Mesh.joined(made)
 
 
 def limb(
@@ -161,14 +149,14 @@ def limb(
 ) -> Part:
     """A limb between two joints; with a foot or a hand at its end."""
     length = float(np.linalg.norm(end(0.0) - start(0.0)))
-    meshes = [capsule(length, radii_m, material, 8)]
+    meshes = [capsule(length, radii_m, material)]
     if foot is not None:
         sole = np.array([[0, 0, -0.055], [0.0, 0, -0.05], [0, 0, 0.02], [0, 0, 0.03]])
         grow = radii_m[1] / 0.045
         radii = np.array([[0, 0], [0.125, 0.048], [0.06, 0.045], [0, 0]]) * grow
         sole = sole * grow + np.array([0.05 * grow, 0, -length])
         meshes.append(tube(sole, radii, foot, 8, 3.0))
-    return Part(smooth(Mesh.joined(meshes), 1.2), lambda way_m: strip(start(way_m), end(way_m)))
+    return Part(Mesh.joined(meshes), lambda way_m: strip(start(way_m), end(way_m)))
 
 
 def bent(start: np.ndarray, end: np.ndarray, lengths_m: tuple[float, float], ahead: np.ndarray) -> np.ndarray:

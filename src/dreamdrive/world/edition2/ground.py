@@ -1,6 +1,7 @@
 """The map of edition 2 from above: many grounds, worn paint, repairs, snow; coarsely far away."""
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import cv2
 import numpy as np
@@ -12,7 +13,14 @@ from shapely.ops import substring
 from dreamdrive.scene.layout import Area, Layout, Line
 from dreamdrive.world.edition2 import marks
 from dreamdrive.world.edition2.sheet import Sheet
-from dreamdrive.world.edition2.textures import KINDS, TextureKind, TextureLibrary, mirrored_tile, recoloured
+from dreamdrive.world.edition2.textures import (
+    KINDS,
+    TextureKind,
+    TextureLibrary,
+    levelled,
+    mirrored_tile,
+    recoloured,
+)
 from dreamdrive.world.edition2.tiles import VARIANTS, low_noise, tile
 from dreamdrive.world.ground import GroundMap
 from dreamdrive.world.materials import Semantic
@@ -116,7 +124,7 @@ class _Covers:
         if found is not None:
             picture, about = found
             texel = about.width_m / picture.shape[1] * rng.uniform(0.7, 1.4)
-            return mirrored_tile(recoloured(rng, picture)), texel
+            return mirrored_tile(recoloured(rng, levelled(picture, about.kind))), texel
         names, shares = _PAINTED[kind]
         name = str(rng.choice(names, p=shares))
         return recoloured(rng, tile(name, int(rng.integers(VARIANTS))), 0.7), _TEXEL_M * rng.uniform(0.6, 1.5)
@@ -136,18 +144,18 @@ class _Covers:
         image = self._spread("grass", sheet)
         label = np.full(sheet.shape, Semantic.GRASS, dtype=np.uint8)
         mask = np.zeros(sheet.shape, dtype=np.uint8)
-        for kind in ("grass", "sidewalk", "parking", "road"):
-            areas = [a for a in self.layout.areas if a.kind == kind]
-            if not areas:
-                continue
-            surface = self._spread(kind, sheet)
-            if fine and kind == "road":
-                marks.repairs(rng, surface, sheet.texel_m, self.layout.ego.track)
+        surfaces: dict[str, Image] = {}
+        covers = [a for a in self.layout.areas if a.kind != "crossing"]
+        for kind, areas in groupby(covers, lambda area: area.kind):  # later areas lie on earlier ones
+            if kind not in surfaces:
+                surfaces[kind] = self._spread(kind, sheet)
+                if fine and kind == "road":
+                    marks.repairs(rng, surfaces[kind], sheet.texel_m)
             mask[:] = 0
             for area in areas:
                 sheet.fill(mask, shapely.Polygon(area.polygon, area.holes))
             label[mask > 127] = _CLASS[kind]
-            cv2.copyTo(surface, mask // 128, image)
+            cv2.copyTo(surfaces[kind], mask // 128, image)
         self._paint_lines(rng, sheet, image, label)
         self._weather(rng, sheet, image, label)
         return image, label

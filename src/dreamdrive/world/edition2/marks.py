@@ -1,18 +1,15 @@
 """What roads carry beside their lines: repairs, cracks, lids, oil, arrows and letters, tracks of wheels."""
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 
-from dreamdrive.scene.layout import Layout, TrackPoint
+from dreamdrive.scene.layout import Layout
 from dreamdrive.world.edition2.sheet import SHIFT, Sheet
 from dreamdrive.world.paint import Image
 
 
-def repairs(rng: np.random.Generator, image: Image, texel_m: float, track: Sequence[TrackPoint]) -> None:
+def repairs(rng: np.random.Generator, image: Image, texel_m: float) -> None:
     """Patches, sealed seams, lids and oil on a picture of asphalt, in place."""
-    del track
     height, width = image.shape[:2]
     area_m2 = height * width * texel_m**2
     for _ in range(rng.poisson(area_m2 / 400 * rng.exponential(1.0))):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dreamdrive.world import paint
-from dreamdrive.world.edition2.textures import TextureKind, TextureLibrary, recoloured
+from dreamdrive.world.edition2.textures import TextureKind, TextureLibrary, levelled, recoloured
 from dreamdrive.world.materials import Materials, Semantic
 
 _ANY: tuple[TextureKind, ...] = ("facade", "road", "ground", "vegetation", "clutter", "sky")
@@ -57,4 +57,4 @@ class Paints:
         if found is None:
             return None
         width = found[1].width_m if found[1].kind != "sky" else float(rng.uniform(4, 20))
-        return recoloured(rng, found[0]), width
+        return recoloured(rng, levelled(found[0], found[1].kind)), width

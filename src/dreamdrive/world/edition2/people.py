@@ -1,14 +1,17 @@
 """Pedestrians, who walk as they move."""
 
-import numpy as np
+from dataclasses import dataclass
 
-from dreamdrive.world import paint
+import numpy as np
+from jaxtyping import Float
+
 from dreamdrive.world.bodies import Part, Size
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.figure import Clothes, dress, head, limb, trunk
-from dreamdrive.world.edition2.loft import smooth, tube
+from dreamdrive.world.edition2.loft import bar, tube
 from dreamdrive.world.materials import Materials, Semantic
-from dreamdrive.world.mesh import Mesh, box, cylinder
+from dreamdrive.world.mesh import Mesh, box
 
 _UMBRELLA_M = 0.28
 
@@ -32,102 +35,115 @@ def pedestrian(size_m: Size, look: int, materials: Materials) -> list[Part]:
     draw = Draw("pedestrian", look)
     _, child, umbrella = _stature(draw)
     height = size_m[2] - umbrella
-    clothes = dress(draw, Semantic.PEDESTRIAN, materials, child)
+    coats = Coats(draw, Semantic.PEDESTRIAN, materials)
+    clothes = dress(draw, coats, child)
     meshes = [trunk(height, clothes), head(draw, height, clothes)]
-    meshes += _carried(draw, height, umbrella, clothes, materials)
+    meshes += _carried(draw, height, umbrella, clothes, coats)
     return [Part(Mesh.joined(meshes)), *_limbs(draw, height, clothes, umbrella > 0)]
 
 
-def _limbs(draw: Draw, height: float, clothes: Clothes, umbrella: bool) -> list[Part]:
-    stride, start = 0.82 * height, float(draw.rng.uniform(0, 2 * np.pi))
-    swing = draw.between(0.3, 0.55)
-    posed = draw.chance(0.25)  # arms that do not swing: in pockets, or with a telephone
-    parts = []
-    for side in (1.0, -1.0):
-        hip = np.array([0.0, side * 0.052 * height * clothes.girth, 0.5 * height])
-        shoulder = np.array([0.0, side * 0.115 * height * clothes.girth, 0.8 * height])
+@dataclass(frozen=True)
+class _Gait:
+    """How the limbs of one side move.
 
-        def phase(way_m: float, side: float = side) -> float:
-            return 2 * np.pi * way_m / stride + start + (np.pi if side < 0 else 0.0)
+    Attributes:
+        height_m: Of the person.
+        girth: Of the trunk, 1 on average.
+        side: 1 on the left, -1 on the right.
+        swing_rad: Of the thighs.
+        start_rad: Phase of the left side at the start.
+        raised: Whether the arm is bent and still: with a telephone, an umbrella, in a pocket.
+    """
 
-        def thigh(way_m: float, phase=phase) -> float:
-            return swing * np.sin(phase(way_m)) + 0.04
+    height_m: float
+    girth: float
+    side: float
+    swing_rad: float
+    start_rad: float
+    raised: bool
 
-        def knee(way_m: float, hip=hip, thigh=thigh) -> np.ndarray:
-            return hip + 0.235 * height * _down(thigh(way_m))
+    def _phase(self, way_m: float) -> float:
+        turn = 2 * np.pi * way_m / (0.82 * self.height_m)
+        return turn + self.start_rad + (np.pi if self.side < 0 else 0.0)
 
-        def ankle(way_m: float, thigh=thigh, knee=knee, phase=phase) -> np.ndarray:
-            fold = 0.08 + 1.1 * swing * max(0.0, np.sin(phase(way_m) + 1.3))
-            return knee(way_m) + 0.225 * height * _down(thigh(way_m) - fold)
+    def _thigh(self, way_m: float) -> float:
+        return self.swing_rad * np.sin(self._phase(way_m)) + 0.04
 
-        raised = (umbrella and side > 0) or (posed and side < 0)
+    def hip(self, _: float) -> Float[np.ndarray, "3"]:
+        """Place of the hip."""
+        return np.array([0.0, self.side * 0.052 * self.height_m * self.girth, 0.5 * self.height_m])
 
-        def arm(way_m: float, phase=phase, raised=raised) -> float:
-            return 0.25 if raised else -0.8 * swing * np.sin(phase(way_m))
+    def knee(self, way_m: float) -> Float[np.ndarray, "3"]:
+        """Place of the knee."""
+        return self.hip(way_m) + 0.235 * self.height_m * _down(self._thigh(way_m))
 
-        def elbow(way_m: float, shoulder=shoulder, arm=arm, side=side) -> np.ndarray:
-            return shoulder + 0.16 * height * (_down(arm(way_m)) + np.array([0, 0.12 * side, 0]))
+    def ankle(self, way_m: float) -> Float[np.ndarray, "3"]:
+        """Place of the ankle; the leg that swings ahead is bent."""
+        fold = 0.08 + 1.1 * self.swing_rad * max(0.0, np.sin(self._phase(way_m) + 1.3))
+        return self.knee(way_m) + 0.225 * self.height_m * _down(self._thigh(way_m) - fold)
 
-        def hand(way_m: float, elbow=elbow, arm=arm, raised=raised) -> np.ndarray:
-            return elbow(way_m) + 0.16 * height * _down(arm(way_m) + (1.9 if raised else 0.35))
+    def shoulder(self, _: float) -> Float[np.ndarray, "3"]:
+        """Place of the shoulder."""
+        return np.array([0.0, self.side * 0.115 * self.height_m * self.girth, 0.8 * self.height_m])
 
-        wide = height * (0.5 + 0.5 * clothes.girth)
-        bare = clothes.outfit == "shorts"
-        parts += [
-            limb(
-                lambda _, hip=hip: hip,
-                knee,
-                (0.047 * wide, 0.034 * wide),
-                clothes.top if clothes.outfit == "robe" else clothes.legs,
-            ),
-            limb(knee, ankle, (0.034 * wide, 0.024 * wide), clothes.legs, clothes.shoes),
-            limb(lambda _, at=shoulder: at, elbow, (0.031 * wide, 0.026 * wide), clothes.top),
-            limb(elbow, hand, (0.025 * wide, 0.02 * wide), clothes.skin if bare else clothes.top),
-        ]
-    return parts
+    def _arm(self, way_m: float) -> float:
+        return 0.25 if self.raised else -0.8 * self.swing_rad * np.sin(self._phase(way_m))
+
+    def elbow(self, way_m: float) -> Float[np.ndarray, "3"]:
+        """Place of the elbow."""
+        out = np.array([0, 0.12 * self.side, 0])
+        return self.shoulder(way_m) + 0.16 * self.height_m * (_down(self._arm(way_m)) + out)
+
+    def hand(self, way_m: float) -> Float[np.ndarray, "3"]:
+        """Place of the hand."""
+        return self.elbow(way_m) + 0.16 * self.height_m * _down(
+            self._arm(way_m) + (1.9 if self.raised else 0.35)
+        )
 
 
-def _down(angle_rad: float) -> np.ndarray:
+def _down(angle_rad: float) -> Float[np.ndarray, "3"]:
     """Downwards, turned ahead by an angle."""
     return np.array([np.sin(angle_rad), 0.0, -np.cos(angle_rad)])
 
 
-def _carried(
-    draw: Draw, height: float, umbrella: float, clothes: Clothes, materials: Materials
-) -> list[Mesh]:
+def _limbs(draw: Draw, height: float, clothes: Clothes, umbrella: bool) -> list[Part]:
+    start, swing = float(draw.rng.uniform(0, 2 * np.pi)), draw.between(0.3, 0.55)
+    swing *= {"robe": 0.5, "skirt": 0.75, "coat": 0.8}.get(clothes.outfit, 1.0)
+    posed = draw.chance(0.25)
+    wide = height * (0.5 + 0.5 * clothes.girth)
+    thigh = clothes.top if clothes.outfit == "robe" else clothes.legs
+    lower_arm = clothes.skin if clothes.outfit == "shorts" else clothes.top
+    parts = []
+    for side in (1.0, -1.0):
+        raised = (umbrella and side > 0) or (posed and side < 0)
+        gait = _Gait(height, clothes.girth, side, swing, start, raised)
+        parts += [
+            limb(gait.hip, gait.knee, (0.047 * wide, 0.034 * wide), thigh),
+            limb(gait.knee, gait.ankle, (0.034 * wide, 0.024 * wide), clothes.legs, clothes.shoes),
+            limb(gait.shoulder, gait.elbow, (0.031 * wide, 0.026 * wide), clothes.top),
+            limb(gait.elbow, gait.hand, (0.025 * wide, 0.02 * wide), lower_arm),
+        ]
+    return parts
+
+
+def _carried(draw: Draw, height: float, umbrella: float, clothes: Clothes, coats: Coats) -> list[Mesh]:
     """Backpack, bag, umbrella."""
-
-    def plain() -> int:
-        return materials.add(paint.panel(draw.rng, draw.bright()), Semantic.PEDESTRIAN)
-
     made = []
     back = 0.075 * height * clothes.girth
     if draw.chance(0.22):
         z = np.array([0.56, 0.57, 0.66, 0.77, 0.8])
         centres = np.stack([np.full(5, -back - 0.04 * height), np.zeros(5), z * height], axis=-1)
         radii = np.array([[0, 0], [0.05, 0.075], [0.055, 0.08], [0.045, 0.07], [0, 0]]) * height
-        made.append(smooth(tube(centres, radii, plain(), 10, 3.5)))
+        made.append(tube(centres, radii, coats.plain(draw.bright()), 10, 3.5))
     elif draw.chance(0.25):
-        side = draw.any_of((-1.0, 1.0))
-        at = (0.0, side * 0.17 * height * clothes.girth, 0.4 * height)
-        made.append(box(at, (0.16 * height, 0.06 * height, 0.13 * height), plain()))
-        made.append(
-            cylinder(
-                (0, at[1], 0.46 * height),
-                (0, 0.6 * at[1], 0.8 * height),
-                (0.008, 0.008),
-                clothes.shoes,
-                None,
-                4,
-            )
-        )
+        y = draw.any_of((-1.0, 1.0)) * 0.17 * height * clothes.girth
+        size = (0.16 * height, 0.06 * height, 0.13 * height)
+        made.append(box((0.0, y, 0.4 * height), size, coats.plain(draw.bright())))
+        made.append(bar((0, y, 0.46 * height), (0, 0.6 * y, 0.8 * height), (0.008, 0.008), clothes.shoes))
     if umbrella:
-        top = height + umbrella
-        at = np.array([0.12, 0.06, 0.0])
-        turn = np.array([[0.48, 0.48], [0.36, 0.36], [0.2, 0.2], [0.0, 0.0]])
-        centres = np.array([[0, 0, top - 0.22], [0, 0, top - 0.1], [0, 0, top - 0.03], [0, 0, top]]) + at
-        made.append(smooth(tube(centres, turn, plain(), 10)))
-        made.append(
-            cylinder((*at[:2], 0.62 * height), (*at[:2], top - 0.02), (0.012, 0.012), clothes.shoes, None, 5)
-        )
+        top, at = height + umbrella, np.array([0.12, 0.06, 0.0])
+        radii = np.array([[0.48, 0.48], [0.36, 0.36], [0.2, 0.2], [0.0, 0.0]])
+        centres = at + np.array([[0, 0, top - 0.22], [0, 0, top - 0.1], [0, 0, top - 0.03], [0, 0, top]])
+        made.append(tube(centres, radii, coats.plain(draw.bright()), 10))
+        made.append(bar((0.12, 0.06, 0.62 * height), (0.12, 0.06, top - 0.02), (0.012, 0.012), clothes.shoes))
     return made

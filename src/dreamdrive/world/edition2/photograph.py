@@ -38,7 +38,7 @@ def _blurred(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
     width = image.shape[1]
     sigma = rng.exponential(0.0007) * width
     if sigma > 0.25:
-        image = cv2.GaussianBlur(image, (0, 0), min(sigma, 0.005 * width))
+        image = cv2.GaussianBlur(image, (0, 0), min(sigma, 0.003 * width))
     if rng.random() < 0.2:
         long = max(3, int(rng.uniform(0.003, 0.014) * width) | 1)
         kernel = np.zeros((long, long), np.float32)

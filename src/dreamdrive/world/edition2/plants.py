@@ -9,6 +9,7 @@ from jaxtyping import Float
 from dreamdrive.scene.layout import Barrier, Prop
 from dreamdrive.world import paint
 from dreamdrive.world.edition2.paints import Paints
+from dreamdrive.world.edition2.tiles import between
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import Mesh, cylinder
 
@@ -17,16 +18,16 @@ _SORTS = ("broad", "round", "conifer", "column", "palm", "bare", "weeping")
 _SHARES = (0.36, 0.18, 0.13, 0.08, 0.07, 0.13, 0.05)
 
 
-def tree(prop: Prop, paints: Paints, snow: float) -> Mesh:
-    """A tree with its foot at the origin."""
+def tree(prop: Prop, paints: Paints, snow: float, detail: float = 1.0) -> Mesh:
+    """A tree with its foot at the origin; ``detail`` is the share of its facets that are drawn."""
     rng = np.random.default_rng([prop.look, 74])
     sort = str(rng.choice(_SORTS, p=_SHARES))
     if snow > 0.3 and sort != "conifer":
         sort = "bare"
-    return _BUILD[sort](rng, prop.height_m, prop.look, paints)
+    return _BUILD[sort](rng, prop.height_m, prop.look, paints, detail)
 
 
-def bush(prop: Prop, paints: Paints, snow: float) -> Mesh:
+def bush(prop: Prop, paints: Paints, snow: float, detail: float = 1.0) -> Mesh:
     """A shrub."""
     del snow
     rng = np.random.default_rng([prop.look, 75])
@@ -38,7 +39,10 @@ def bush(prop: Prop, paints: Paints, snow: float) -> Mesh:
         high,
     ]
     return Mesh.joined(
-        [_clump(rng, c, (0.5 * wide, 0.5 * wide, 0.4 * high), 90, 0.2 * high, leaves) for c in centres]
+        [
+            _clump(rng, c, (0.5 * wide, 0.5 * wide, 0.4 * high), 130, 0.16 * high, leaves, detail)
+            for c in centres
+        ]
     )
 
 
@@ -83,11 +87,11 @@ def _leaves(rng: np.random.Generator, look: int, paints: Paints) -> int:
         return paints.get(("leaves", look), Semantic.VEGETATION, lambda: cut[0])
     season = rng.random()
     if season < 0.75:
-        colour = rng.uniform((38, 58, 20), (112, 132, 62))
+        colour = between(rng, (38, 58, 20), (112, 132, 62))
     elif season < 0.9:
-        colour = rng.uniform((120, 90, 30), (196, 150, 60))
+        colour = between(rng, (120, 90, 30), (196, 150, 60))
     else:
-        colour = rng.uniform((90, 40, 30), (150, 80, 60))
+        colour = between(rng, (90, 40, 30), (150, 80, 60))
     local = np.random.default_rng([look, 77])
     return paints.get(
         ("painted leaves", look),
@@ -113,7 +117,7 @@ def _facets(
     material: int,
     outward: Float[np.ndarray, "n 3"] | None = None,
 ) -> Mesh:
-    """Small quadrilaterals of random directions about some places, leaning outward."""
+    """Small triangles of random directions about some places, leaning outward."""
     count = len(centre)
     normal = rng.standard_normal((count, 3))
     if outward is not None:
@@ -122,23 +126,25 @@ def _facets(
     across = np.cross(normal, rng.standard_normal((count, 3)))
     across /= np.linalg.norm(across, axis=1, keepdims=True) + 1e-9
     other = np.cross(normal, across)
-    turns = rng.uniform(0.55, 1.25, (count, 4, 1)) * size[:, None, None]
-    corners = np.stack(
-        [-across - 0.6 * other, across - 0.5 * other, 0.8 * across + other, -0.7 * across + 0.8 * other], 1
-    )
-    corners = centre[:, None] + corners * turns
-    place = rng.uniform(0, 1, (count, 1, 2))
-    uv = place + np.array([[0, 0], [0.22, 0], [0.22, 0.22], [0, 0.22]])
-    pick = np.array([[0, 1, 2], [0, 2, 3]])
-    return Mesh(
-        corners[:, pick].reshape(-1, 3, 3), uv[:, pick].reshape(-1, 3, 2), np.full(2 * count, material)
-    )
+    turn = rng.uniform(0, 2 * np.pi, (count, 1)) + np.array([0, 2.1, 4.2]) + rng.normal(0, 0.3, (count, 3))
+    reach = rng.uniform(0.6, 1.5, (count, 3)) * size[:, None]
+    out = np.cos(turn)[..., None] * across[:, None] + np.sin(turn)[..., None] * other[:, None]
+    corners = centre[:, None] + reach[..., None] * out
+    uv = rng.uniform(0, 1, (count, 1, 2)) + np.array([[0, 0], [0.2, 0.05], [0.08, 0.2]])
+    return Mesh(corners, uv, np.full(count, material))
 
 
 def _clump(
-    rng: np.random.Generator, centre: object, radii: object, count: int, size: float, material: int
+    rng: np.random.Generator,
+    centre: object,
+    radii: object,
+    count: int,
+    size: float,
+    material: int,
+    detail: float,
 ) -> Mesh:
-    """A cloud of facets near the surface of an ellipsoid, fewer inside."""
+    """A cloud of facets near the surface of an ellipsoid, fewer inside; with less detail fewer, larger ones."""
+    count, size = max(12, round(detail * count)), size / np.sqrt(detail)
     way = rng.standard_normal((count, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     away = rng.uniform(0.55, 1.05, (count, 1)) ** 0.7
@@ -152,7 +158,7 @@ def _trunk(rng: np.random.Generator, top: float, radius: float, paints: Paints) 
     return cylinder((0, 0, -0.2), (*lean, top), (radius, 0.5 * radius), bark, None, 7), bark
 
 
-def _broad(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _broad(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """A crown of several clumps on branches."""
     leaves = _leaves(rng, look, paints)
     bare = rng.uniform(0.18, 0.42)
@@ -164,46 +170,56 @@ def _broad(rng: np.random.Generator, height: float, look: int, paints: Paints) -
         z = height * rng.uniform(bare + 0.15, 0.88)
         centre = np.array([away * np.cos(turn), away * np.sin(turn), z])
         radius = wide * rng.uniform(0.35, 0.65)
-        size = rng.uniform(0.05, 0.09) * height**0.7
-        parts.append(_clump(rng, centre, (radius, radius, 0.75 * radius), 90, size, leaves))
+        size = rng.uniform(0.04, 0.075) * height**0.7
+        parts.append(_clump(rng, centre, (radius, radius, 0.75 * radius), 150, size, leaves, detail))
         start = (0, 0, height * rng.uniform(0.5 * bare, 0.5))
         parts.append(cylinder(start, centre.tolist(), (0.012 * height, 0.004 * height), bark, None, 4))
     return Mesh.joined(parts)
 
 
-def _round(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _round(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """A clipped or young tree: one ball on a stem."""
     leaves, radius = _leaves(rng, look, paints), height * rng.uniform(0.18, 0.3)
     trunk, _ = _trunk(rng, 0.6 * height, height * 0.015, paints)
     radii = (radius, radius, radius * rng.uniform(0.8, 1.4))
     centre = (0, 0, height - radii[2])
-    return Mesh.joined([trunk, _clump(rng, centre, radii, 420, 0.2 * radius, leaves)])
+    return Mesh.joined([trunk, _clump(rng, centre, radii, 620, 0.17 * radius, leaves, detail)])
 
 
-def _conifer(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _conifer(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """Whorls of drooping branches, narrower towards the top."""
     leaves, wide = _leaves(rng, look, paints), height * rng.uniform(0.12, 0.24)
     trunk, _ = _trunk(rng, 0.9 * height, height * 0.018, paints)
-    count = 620
+    count = max(60, round(900 * detail))
     rise = rng.uniform(0.1, 1, count) ** 1.2
     turn, share = rng.uniform(0, 2 * np.pi, count), np.sqrt(rng.uniform(0.2, 1, count))
     radius = wide * (1 - rise) * share * (1 + 0.25 * np.sin(rise * 60))
     z = height * (0.1 + 0.9 * rise) - 0.25 * radius
     way = np.column_stack([np.cos(turn), np.sin(turn), np.full(count, 0.3)])
     centre = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
-    return Mesh.joined([trunk, _facets(rng, centre, (0.2 + 0.8 * (1 - rise)) * 0.045 * height, leaves, way)])
+    return Mesh.joined(
+        [
+            trunk,
+            _facets(rng, centre, (0.2 + 0.8 * (1 - rise)) * 0.042 * height / np.sqrt(detail), leaves, way),
+        ]
+    )
 
 
-def _column(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _column(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """A cypress or poplar."""
     leaves, wide = _leaves(rng, look, paints), height * rng.uniform(0.07, 0.13)
     trunk, _ = _trunk(rng, 0.5 * height, height * 0.015, paints)
     return Mesh.joined(
-        [trunk, _clump(rng, (0, 0, 0.55 * height), (wide, wide, 0.47 * height), 460, 0.03 * height, leaves)]
+        [
+            trunk,
+            _clump(
+                rng, (0, 0, 0.55 * height), (wide, wide, 0.47 * height), 700, 0.027 * height, leaves, detail
+            ),
+        ]
     )
 
 
-def _palm(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _palm(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """A bare stem with fronds that hang."""
     leaves = _leaves(rng, look, paints)
     trunk, _ = _trunk(rng, height, 0.02 * height, paints)
@@ -229,13 +245,14 @@ def _palm(rng: np.random.Generator, height: float, look: int, paints: Paints) ->
     return Mesh.joined(parts)
 
 
-def _bare(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _bare(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """Branches without leaves, as three-sided bars that fork."""
     del look
+    levels = 5 if detail > 0.5 else 4 if detail > 0.2 else 3
     bark = _bark(rng, paints)
     starts, ends, radii = [], [], []
     tips = [(np.array([0.0, 0, -0.2]), np.array([0, 0, 1.0]), 0.3 * height, 0.02 * height)]
-    for level in range(5):
+    for level in range(levels):
         grown: list[tuple[np.ndarray, np.ndarray, float, float]] = []
         for at, way, length, radius in tips:
             end = at + way * length
@@ -274,20 +291,22 @@ def bars(
     )
 
 
-def _weeping(rng: np.random.Generator, height: float, look: int, paints: Paints) -> Mesh:
+def _weeping(rng: np.random.Generator, height: float, look: int, paints: Paints, detail: float) -> Mesh:
     """Leaves that hang in curtains."""
     leaves, wide = _leaves(rng, look, paints), height * rng.uniform(0.25, 0.36)
     trunk, _ = _trunk(rng, 0.7 * height, 0.03 * height, paints)
-    count = 640
+    count = max(60, round(900 * detail))
     turn, share = rng.uniform(0, 2 * np.pi, count), np.sqrt(rng.uniform(0.05, 1, count))
     top = height * (1 - 0.35 * share**2)
     z = top - rng.uniform(0, 0.55, count) * height * share
     centre = np.column_stack([wide * share * np.cos(turn), wide * share * np.sin(turn), np.maximum(z, 0.6)])
     way = np.column_stack([np.cos(turn), np.sin(turn), np.full(count, 0.2)])
-    return Mesh.joined([trunk, _facets(rng, centre, np.full(count, 0.035 * height), leaves, way)])
+    return Mesh.joined(
+        [trunk, _facets(rng, centre, np.full(count, 0.032 * height / np.sqrt(detail)), leaves, way)]
+    )
 
 
-_BUILD: dict[str, Callable[[np.random.Generator, float, int, Paints], Mesh]] = {
+_BUILD: dict[str, Callable[[np.random.Generator, float, int, Paints, float], Mesh]] = {
     "broad": _broad,
     "round": _round,
     "conifer": _conifer,

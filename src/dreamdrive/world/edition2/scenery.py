@@ -15,12 +15,15 @@ from dreamdrive.world.edition2.lamps import Lamps
 from dreamdrive.world.edition2.paints import Paints
 from dreamdrive.world.edition2.plants import bush, tree
 from dreamdrive.world.edition2.textures import TextureLibrary
+from dreamdrive.world.edition2.tiles import between
 from dreamdrive.world.ground import GroundMap
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, plate, quads, upright
 
 _REACH_M = 900.0
-_LAMP = 55.0
+_DETAIL = ((35.0, 1.0), (80.0, 0.35), (np.inf, 0.12))
+"""Share of the leaves that are drawn up to some distances from the way of the car."""
+_LAMP = 80.0
 """Linear intensity of a street lamp at a metre."""
 
 
@@ -61,19 +64,22 @@ def scenery(
 
 def _props(layout: Layout, paints: Paints) -> list[Mesh]:
     """Props at their places; equal ones are made once."""
-    made: dict[tuple[str, float, int], Mesh] = {}
+    made: dict[tuple[str, float, int, float], Mesh] = {}
+    way = shapely.LineString([(p.x_m, p.y_m) for p in layout.ego.track] * 2)
     found: list[Mesh] = []
     for prop in layout.props:
-        key = (prop.kind, prop.height_m, prop.look)
+        away = way.distance(shapely.Point(prop.at_m))
+        detail = next(share for reach, share in _DETAIL if away < reach)
+        key = (prop.kind, prop.height_m, prop.look, detail)
         if key not in made:
-            made[key] = _prop(prop, paints, layout.light.snow)
+            made[key] = _prop(prop, paints, layout.light.snow, detail)
         found.append(made[key].moved(upright((*prop.at_m, prop.yaw_rad))))
     return found
 
 
-def _prop(prop: Prop, paints: Paints, snow: float) -> Mesh:
+def _prop(prop: Prop, paints: Paints, snow: float, detail: float) -> Mesh:
     if prop.kind in ("tree", "bush"):
-        return (tree if prop.kind == "tree" else bush)(prop, paints, snow)
+        return (tree if prop.kind == "tree" else bush)(prop, paints, snow, detail)
     build = {
         "lamp": furniture.lamp,
         "sign": furniture.sign,
@@ -157,9 +163,9 @@ def _skyline(layout: Layout, paints: Paints, rng: np.random.Generator) -> Mesh:
         }[kind]
         high = high * rng.uniform(0.5, 1.5)
         if kind == "town":
-            colour, semantic = rng.uniform((90, 90, 96), (200, 190, 180)), Semantic.BUILDING
+            colour, semantic = between(rng, (90, 90, 96), (200, 190, 180)), Semantic.BUILDING
         else:
-            colour, semantic = rng.uniform((46, 58, 34), (110, 116, 76)), Semantic.VEGETATION
+            colour, semantic = between(rng, (46, 58, 34), (110, 116, 76)), Semantic.VEGETATION
         material = paints.plain(("far", kind), semantic, colour)
         flat = middle + distance * np.stack([np.cos(turn), np.sin(turn)], -1)
         shape = np.append(high, high[0])

@@ -65,7 +65,8 @@ class Shape:
             (max(middle, self.cowl + 1e-3), bonnet),
             (half, self.nose_z),
         ]
-        return np.interp(x, *zip(*knots, strict=True))
+        places, heights = np.array(knots).T
+        return np.interp(x, places, heights)
 
     def rail(self, x: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """Height of the upper edge of the windows along x."""
@@ -75,7 +76,8 @@ class Shape:
             (0.6 * self.roof + 0.4 * self.screen, top),
             (self.screen, top - 0.35 * self.roof_drop - 0.02),
         ]
-        return np.interp(x, *zip(*knots, strict=True))
+        places, heights = np.array(knots).T
+        return np.interp(x, places, heights)
 
     def edge_at(self, x: float) -> float:
         """Height of the shoulder at one place."""
@@ -174,4 +176,6 @@ def body_mesh(shape: Shape) -> Mesh:
     dark, upper = np.full(len(faces), Side.UNDER), np.full(len(faces), Side.TOP)
     rings = [bottom, floor, inner, sill, bumper, waist, edge, rim, foot, pane, top, crown, ridge, spine]
     kinds = [dark, dark, dark, faces, faces, faces, upper, upper, faces, faces, upper, upper, upper]
-    return loft(np.stack(rings), np.stack(kinds))
+    points = np.stack(rings)
+    points[..., 2] *= shape.height / points[..., 2].max()
+    return loft(points, np.stack(kinds))

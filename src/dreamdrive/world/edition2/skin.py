@@ -73,8 +73,8 @@ def _side(canvas: Canvas, draw: Draw, shape: Shape, trim: Trim) -> None:
     _windows(canvas, draw, shape, trim)
     _doors(canvas, shape, trim)
     for axle in shape.axles:
-        canvas.ellipse((axle, shape.wheel), (1.17 * shape.wheel,) * 2, shaded(colour, 0.55))
-        canvas.ellipse((axle, shape.wheel), (1.12 * shape.wheel,) * 2, _BLACK)
+        canvas.ellipse((axle, shape.wheel), (1.17 * shape.wheel, 1.17 * shape.wheel), shaded(colour, 0.55))
+        canvas.ellipse((axle, shape.wheel), (1.12 * shape.wheel, 1.12 * shape.wheel), _BLACK)
     low, high = trim.head_z
     lamp = [(half, low), (half, high), (half - trim.head_m, high), (half - 0.6 * trim.head_m, low)]
     canvas.polygon(lamp, (196, 200, 204))
@@ -93,7 +93,7 @@ def _foot(canvas: Canvas, shape: Shape, trim: Trim, xs: np.ndarray) -> None:
     canvas.rectangle((-half, 0), (half, sill), trim.low)
     if trim.clad:
         for axle in shape.axles:
-            canvas.ellipse((axle, shape.wheel), (1.34 * shape.wheel,) * 2, trim.low)
+            canvas.ellipse((axle, shape.wheel), (1.34 * shape.wheel, 1.34 * shape.wheel), trim.low)
     if trim.bumper is not None:
         for x in (-half, half):
             inside = x - np.sign(x) * 0.12 * shape.length

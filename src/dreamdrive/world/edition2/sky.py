@@ -13,6 +13,9 @@ from dreamdrive.world.sky import Sky
 
 _SHAPE = (160, 768)
 _SHARE_CUT = 0.55  # of the skies by day that are cut from pictures, where there are any
+_TRIES, _GREY, _DULL = 8, 0.22, 0.25
+"""How often a cut sky is drawn until it fits: with less sun than the last number one whose colours differ by less
+than the second."""
 _EVEN = 1.25
 """Light on level ground that the camera exposes for."""
 _ADAPTED = 0.75
@@ -69,7 +72,7 @@ def make_sky(layout: Layout, textures: TextureLibrary | None) -> Sky:
     gain = np.float32((_EVEN / max(level, 0.3)) ** (_ADAPTED * (1 - light.night)) * rng.uniform(0.75, 1.25))
     panorama = _painted(rng, light, tones)
     if textures is not None and light.night < 0.3 and rng.random() < _SHARE_CUT:
-        panorama = _cut(rng, panorama, textures, layout.seed)
+        panorama = _cut(rng, panorama, textures, layout.seed, light.sun)
     panorama = panorama + _sun(light, tones, panorama.shape[:2])
     if light.haze_per_m > 0.006:
         veil = np.linspace(0, 1, len(panorama), dtype=np.float32)[:, None, None] ** 2
@@ -109,16 +112,25 @@ def _painted(rng: np.random.Generator, light: Light, tones: Tones) -> np.ndarray
     return (image + 0.92 * cover * (tones.cloud * shade - image)).astype(np.float32)
 
 
-def _cut(rng: np.random.Generator, painted: np.ndarray, textures: TextureLibrary, seed: int) -> np.ndarray:
+def _cut(
+    rng: np.random.Generator, painted: np.ndarray, textures: TextureLibrary, seed: int, sun: float
+) -> np.ndarray:
     """A strip of a real sky above the horizon, mirrored around the turn; its top colour goes on above."""
-    found = textures.pick("sky", seed, rng)
-    if found is None:
+    for _ in range(_TRIES):
+        found = textures.pick("sky", seed, rng)
+        if found is None:
+            return painted
+        mean = found[0].mean(axis=(0, 1))
+        if (mean.max() - mean.min() < _GREY * mean.max()) == (sun < _DULL):
+            break
+    else:
         return painted
     strip = (found[0].astype(np.float32) / 255) ** 2
+    strip *= np.float32((rng.uniform(0.45, 0.95) / max(float(strip.mean()), 0.02)) ** 0.7)
     height, width = _SHAPE
     times = 2 * max(2, round(360 / found[1].width_m / 2 * rng.uniform(0.7, 1.3)))
     wide = -(-width // times)
-    rise = int(height * rng.uniform(0.3, 0.6))
+    rise = int(height * rng.uniform(0.25, 0.45))
     one = cv2.resize(strip, (wide, rise), interpolation=cv2.INTER_AREA)
     if rng.random() < 0.5:
         one = one[:, ::-1]

@@ -1,6 +1,6 @@
 """Repeating pictures of ground: asphalt, concrete, slabs, stones, grass, earth, sand."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import cv2
@@ -11,6 +11,12 @@ from dreamdrive.world.paint import Image, finished, noise
 TILE_PX = 512
 VARIANTS = 12
 """Painted tiles of each kind; a process paints each once."""
+
+
+def between(rng: np.random.Generator, low: Sequence[float], high: Sequence[float]) -> np.ndarray:
+    """A colour (3,) between two, all channels by about the same share."""
+    share = rng.uniform(0, 1) + rng.normal(0, 0.06, 3)
+    return np.asarray(low) + share * (np.asarray(high) - np.asarray(low))
 
 
 def _seamless(rng: np.random.Generator, octaves: dict[float, float]) -> np.ndarray:
@@ -75,7 +81,7 @@ def _slabs(rng: np.random.Generator) -> np.ndarray:
 
 def _stones(rng: np.random.Generator) -> np.ndarray:
     """Cobbles in rows."""
-    colour = rng.uniform((70, 68, 66), (150, 142, 136))
+    colour = between(rng, (70, 68, 66), (150, 142, 136))
     image = _seamless(rng, {1: 6, 4: 8, 60: 6})[..., None] + colour
     side = TILE_PX // int(rng.choice([32, 42, 51]))
     _joints(rng, image, side, int(side * rng.choice([1, 1.6])), float(colour.mean()) * 0.5, side // 2)
@@ -97,9 +103,9 @@ def _joints(
 
 def _grass(rng: np.random.Generator) -> np.ndarray:
     """Green to dry, with earth between."""
-    green = rng.uniform((44, 66, 22), (132, 142, 78))
-    dry = rng.uniform((120, 108, 66), (182, 164, 116))
-    earth = rng.uniform((86, 70, 50), (150, 126, 98))
+    green = between(rng, (44, 66, 22), (132, 142, 78))
+    dry = between(rng, (120, 108, 66), (182, 164, 116))
+    earth = between(rng, (86, 70, 50), (150, 126, 98))
     share = np.clip(0.5 + rng.normal(0, 0.5) + _seamless(rng, {6: 0.15, 24: 0.25, 90: 0.4}), 0, 1)[..., None]
     bare = np.clip(4 * (_seamless(rng, {8: 0.2, 40: 0.3, 150: 0.4}) - rng.uniform(0.1, 1.4)), 0, 1)[..., None]
     image = green * share + dry * (1 - share)
@@ -109,7 +115,7 @@ def _grass(rng: np.random.Generator) -> np.ndarray:
 
 def _earth(rng: np.random.Generator) -> np.ndarray:
     """Sand, gravel or earth."""
-    colour = rng.uniform((92, 70, 46), (206, 188, 156))
+    colour = between(rng, (92, 70, 46), (206, 188, 156))
     field = _seamless(rng, {1: rng.uniform(0.04, 0.16), 3: 0.08, 20: 0.06, 90: 0.08, 200: 0.06})
     return colour * (1 + field[..., None])
 

@@ -69,7 +69,7 @@ def truck(size_m: Size, look: int, materials: Materials) -> list[Part]:
     shell = body_mesh(cab)
     shell.corners[..., 2] *= cab_high / shell.corners[..., 2].max()
     seat = pitched((half - 0.5 * cab_m, 0, 0), 0.0)
-    meshes = [projected(smooth(shell), (cab_m, width - 0.04, cab_high), paints).moved(seat)]
+    meshes = [projected(shell, (cab_m, width - 0.04, cab_high), paints).moved(seat)]
     for side in (-1, 1):
         at = (half - 0.18 - bonnet, side * (0.5 * width + 0.06), 0.72 * cab_high)
         meshes.append(box(at, (0.12, 0.18, 0.42), paints[-1]))
@@ -146,7 +146,7 @@ def _cab_trim(draw: Draw, shape: Shape) -> Trim:
         tint=draw.near((36, 40, 44), 2),
         see_through=0.5,
         joined_panes=False,
-        bumper=draw.near((70, 72, 75), 8) if draw.chance(0.4) else None,
+        bumper=draw.near((70, 72, 75), 3) if draw.chance(0.4) else None,
         sill_m=0.2,
         head_m=0.12,
         handle_z=0.8 * nose,

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 
 from dreamdrive.world.bodies import Part, Turn
+from dreamdrive.world.edition2.coats import Coats
 from dreamdrive.world.edition2.draw import Draw
 from dreamdrive.world.edition2.loft import smooth
 from dreamdrive.world.edition2.shape import Shape
-from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, cylinder, pitched
 from dreamdrive.world.paint import Image
 
@@ -50,14 +50,10 @@ def rim(draw: Draw, radius_share: float) -> Image:
     return image
 
 
-def wheels(
-    draw: Draw, shape: Shape, track_m: float, materials: Materials, semantic: Semantic, width_m: float = 0.21
-) -> list[Part]:
-    """A pair on each axle."""
-    share = float(draw.rng.uniform(0.62, 0.76))
-    face = materials.add(rim(draw, share), semantic, gloss=0.03)
-    tyre = materials.add(np.full((8, 8, 3), 27, dtype=np.uint8), semantic)
-    return wheel_pairs(shape.axles, shape.wheel, track_m, (tyre, face), width_m)
+def wheels(draw: Draw, shape: Shape, coats: Coats, width_m: float = 0.21) -> list[Part]:
+    """A pair on each axle of a body."""
+    face = coats.picture(rim(draw, float(draw.rng.uniform(0.62, 0.76))), 0.03)
+    return wheel_pairs(shape.axles, shape.wheel, shape.width, (coats.even(27), face), width_m)
 
 
 def wheel_pairs(
@@ -72,4 +68,5 @@ def wheel_pairs(
             for y in (outer - half, half - outer)
         ]
     )
-    return [Part(smooth(pair), rolling((x, 0.0, radius_m), radius_m)) for x in axles]
+    rounded = smooth(pair)
+    return [Part(rounded, rolling((x, 0.0, radius_m), radius_m)) for x in axles]

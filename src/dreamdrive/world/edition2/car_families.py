@@ -1,103 +1,8 @@
-"""Families of cars and vans by their side profiles: what of a body is where."""
+"""Families of cars, with their shares of the traffic."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from dreamdrive.world.edition2.draw import Draw
-from dreamdrive.world.edition2.shape import Shape
-
-Range = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Family:
-    """Bodies alike. Places are shares of the length from the front, heights shares of the height.
-
-    Attributes:
-        name: What people call it.
-        length_m, width_m, height_m: Ranges of its size.
-        cowl, screen, roof, deck: Lower and upper end of the windscreen, upper and lower of the rear window.
-        axles: Front and rear.
-        nose_z, cowl_z, deck_z, tail_z: Of the bonnet's front edge, the feet of both windows, the rear edge.
-        panes: Side windows as shares of the band of windows.
-        doors: Hinged from and to, as ``panes``, and whether it slides.
-        wheel_m, clearance_m: Radius of the wheels, height of the sills.
-        tumble, round_plan, round_roof_m, roof_drop_m, bulge: See ``Shape``.
-        clad: How often the lower edge is of dark plastic.
-        tails: Which tail lamps fit.
-    """
-
-    name: str
-    length_m: Range
-    width_m: Range
-    height_m: Range
-    cowl: float
-    screen: float
-    roof: float
-    deck: float
-    axles: tuple[float, ...]
-    nose_z: float
-    cowl_z: float
-    deck_z: float
-    tail_z: float
-    panes: tuple[Range, ...]
-    doors: tuple[tuple[float, float, bool], ...]
-    wheel_m: Range = (0.30, 0.34)
-    clearance_m: Range = (0.16, 0.21)
-    tumble: float = 0.76
-    round_plan: float = 5.5
-    round_roof_m: float = 0.07
-    roof_drop_m: float = 0.05
-    bulge: float = 0.07
-    clad: float = 0.1
-    tails: tuple[int, ...] = (0, 1, 3, 4, 6)
-
-    def size(self, draw: Draw) -> tuple[float, float, float]:
-        """Length, width and height of one."""
-        share = draw.between(0, 1)
-        low, high = self.length_m
-        length = low + share * (high - low)
-        width = self.width_m[0] + (0.6 * share + 0.4 * draw.rng.random()) * (
-            self.width_m[1] - self.width_m[0]
-        )
-        return length, width, float(draw.rng.uniform(*self.height_m))
-
-    def shape(self, draw: Draw, size_m: tuple[float, float, float]) -> Shape:
-        """One of the family, as large as a box."""
-        length, width, height = size_m
-        rng = draw.rng
-        wheel = min(float(rng.uniform(*self.wheel_m)), 0.27 * height)
-
-        def along(share: float, spread: float = 0.012) -> float:
-            return (0.5 - share + float(rng.normal(0, spread))) * length
-
-        def up(share: float) -> float:
-            return (share + float(rng.normal(0, 0.012))) * height
-
-        cowl, screen, roof = along(self.cowl), along(self.screen), along(self.roof)
-        deck = max(along(self.deck, 0.006), -0.492 * length)
-        lift = float(rng.normal(0, 0.01)) * height
-        return Shape(
-            length=length,
-            width=width,
-            height=height,
-            cowl=cowl,
-            screen=min(screen, cowl - 0.02 * length),
-            roof=max(roof, deck + 0.01 * length),
-            deck=deck,
-            nose_z=up(self.nose_z),
-            cowl_z=self.cowl_z * height + lift,
-            deck_z=self.deck_z * height + lift,
-            tail_z=min(up(self.tail_z), self.deck_z * height + lift),
-            roof_drop=self.roof_drop_m * float(rng.uniform(0.5, 1.4)),
-            clearance=float(rng.uniform(*self.clearance_m)),
-            wheel=wheel,
-            axles=tuple(along(a, 0.004) for a in self.axles),
-            tumble=min(0.985, self.tumble + float(rng.normal(0, 0.012))),
-            round_plan=self.round_plan * float(rng.uniform(0.85, 1.2)),
-            round_roof=self.round_roof_m * float(rng.uniform(0.8, 1.25)),
-            bulge=self.bulge * float(rng.uniform(0.6, 1.4)),
-        )
-
+from dreamdrive.world.edition2.family import Families, Family
 
 _FOUR = ((0.0, 0.46, False), (0.5, 0.86, False))
 _TWO = ((0.0, 0.6, False),)
@@ -171,7 +76,7 @@ _SUV = replace(
     tumble=0.79,
     clad=0.6,
 )
-_CARS = (
+CARS: Families = (
     (0.16, _SALOON),
     (0.19, _HATCH),
     (0.1, _ESTATE),
@@ -334,7 +239,7 @@ _CARS = (
         ),
     ),
 )
-_CARS_KEPT_OUT = (
+CARS_KEPT_OUT: Families = (
     (
         0.4,
         replace(
@@ -392,116 +297,4 @@ _CARS_KEPT_OUT = (
         ),
     ),
 )
-_PANEL = Family(
-    "panel van",
-    (5.0, 6.9),
-    (1.93, 2.08),
-    (2.2, 2.75),
-    cowl=0.12,
-    screen=0.25,
-    roof=0.985,
-    deck=0.993,
-    axles=(0.165, 0.79),
-    nose_z=0.42,
-    cowl_z=0.48,
-    deck_z=0.48,
-    tail_z=0.47,
-    panes=((0.015, 0.23),),
-    doors=((0.01, 0.23, False), (0.27, 0.5, True)),
-    wheel_m=(0.33, 0.37),
-    clearance_m=(0.2, 0.28),
-    tumble=0.9,
-    round_plan=11.0,
-    round_roof_m=0.12,
-    roof_drop_m=0.02,
-    bulge=0.03,
-    clad=0.5,
-    tails=(1, 5),
-)
-_SMALL_VAN = replace(
-    _PANEL,
-    name="small van",
-    length_m=(4.15, 4.75),
-    width_m=(1.75, 1.9),
-    height_m=(1.78, 1.95),
-    cowl=0.22,
-    screen=0.37,
-    axles=(0.195, 0.8),
-    nose_z=0.48,
-    cowl_z=0.57,
-    deck_z=0.57,
-    tail_z=0.55,
-    panes=((0.03, 0.36),),
-    doors=((0.0, 0.36, False), (0.4, 0.7, True)),
-    wheel_m=(0.3, 0.33),
-    tumble=0.87,
-    tails=(1, 2, 5),
-)
-_WINDOWED = ((0.015, 0.23), (0.26, 0.48), (0.51, 0.73), (0.76, 0.96))
-_VANS = (
-    (0.3, _PANEL),
-    (0.25, _SMALL_VAN),
-    (0.15, replace(_SMALL_VAN, name="family van", panes=((0.03, 0.36), (0.39, 0.67), (0.7, 0.94)))),
-    (0.12, replace(_PANEL, name="minibus", panes=_WINDOWED)),
-    (
-        0.18,
-        replace(
-            _PANEL,
-            name="people carrier",
-            length_m=(4.85, 5.35),
-            width_m=(1.88, 2.0),
-            height_m=(1.88, 2.02),
-            cowl=0.185,
-            screen=0.3,
-            roof=0.965,
-            deck=0.985,
-            axles=(0.185, 0.79),
-            nose_z=0.48,
-            cowl_z=0.56,
-            deck_z=0.56,
-            tail_z=0.54,
-            panes=((0.02, 0.3), (0.33, 0.62), (0.65, 0.94)),
-            doors=((0.0, 0.3, False), (0.34, 0.62, True)),
-            tumble=0.86,
-            tails=(1, 2),
-        ),
-    ),
-)
-_VANS_KEPT_OUT = (
-    (
-        1.0,
-        replace(
-            _PANEL,
-            name="step van",
-            length_m=(5.6, 7.2),
-            width_m=(2.05, 2.2),
-            height_m=(2.6, 3.0),
-            cowl=0.07,
-            screen=0.12,
-            nose_z=0.36,
-            cowl_z=0.42,
-            deck_z=0.42,
-            tail_z=0.41,
-            panes=((0.02, 0.14),),
-            doors=((0.02, 0.15, True),),
-            tumble=0.97,
-            round_plan=18.0,
-            round_roof_m=0.07,
-            tails=(3, 5),
-        ),
-    ),
-)
-
-
-def family_of(draw: Draw) -> Family:
-    """The family of a car's or van's look; those of looks kept out are others than those of the rest."""
-    table = (_CARS_KEPT_OUT if draw.kept_out else _CARS) if draw.kind == "car" else None
-    if table is None:
-        table = _VANS_KEPT_OUT if draw.kept_out else _VANS
-    total = sum(share for share, _ in table)
-    at = draw.rng.random() * total
-    for share, family in table:
-        at -= share
-        if at <= 0:
-            return family
-    return table[-1][1]
+"""Those of looks kept out."""
