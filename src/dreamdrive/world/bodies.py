@@ -41,7 +41,6 @@ class Part:
 
 def body(kind: BoxKind, size_m: Size, look: int, materials: Materials) -> list[Part]:
     """Parts of a road user; equal looks give equal bodies."""
-    kind = {"bus": "truck", "motorcycle": "bicycle"}.get(kind, kind)
     rng = np.random.default_rng([look, list(_CLASS).index(kind)])
     build = {"car": _car, "van": _van, "truck": _truck, "bicycle": _bicycle, "pedestrian": _pedestrian}
     return build[kind](rng, size_m, materials)

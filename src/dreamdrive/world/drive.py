@@ -17,8 +17,8 @@ from dreamdrive.world.edition2.lens import level_from_camera, pinhole
 from dreamdrive.world.edition2.relief import hills_of
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
-from dreamdrive.world.render import WorldView, look
 from dreamdrive.world.options import StreetOptions
+from dreamdrive.world.render import WorldView, look
 from dreamdrive.world.streets import draw_street
 from dreamdrive.world.world import World
 
@@ -131,7 +131,7 @@ def front_from_mount(layout: Layout, mount: Mount) -> Float[np.ndarray, "4 4"]:
 
 
 def _axes(layout: Layout) -> Float[np.ndarray, "3 3"]:
-    """Axes of the car's cameras in the frame of their mounts: x right, y down, z ahead, tilted as the lens is."""
+    """Axes (right, down, ahead) of the car's cameras in the frame of their mounts, tilted as the lens is."""
     return _LEVEL if layout.edition == 1 else level_from_camera(layout.lens)
 
 
@@ -163,8 +163,9 @@ def drive(
 ) -> Drive:
     """Drive through the street of a layout, or of its world if that is made already.
 
-    The size is width and height in pixels; the horizontal field of view is 64 degrees in the first edition and
-    that of the layout's lens in later ones. ``progress`` is called with frames done and frames in all.
+    The size is width and height in pixels; the horizontal field of view is 64 degrees in the first
+    edition and that of the layout's lens in later ones. ``progress`` is called with frames done and frames
+    in all.
     """
     if frames < 1 or fps <= 0 or min(size) < 2:
         raise ValueError(f"world: cannot drive {frames} frames of {size} at {fps}/s")

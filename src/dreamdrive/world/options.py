@@ -19,8 +19,8 @@ class StreetOptions:
     """What a drawn street has to be like; None leaves a choice to the seed.
 
     Speed is that of the recording car; movers and parked are numbers of road users; editions see
-    ``scene.layout``. From edition 2 on a kind of street can be asked for, and a queue: the recording car moves
-    slowly among large vehicles, in all lanes and oncoming, that fill most of its picture.
+    ``scene.layout``. From edition 2 on a kind of street can be asked for, and a queue: the recording car
+    moves slowly among large vehicles, in all lanes and oncoming, that fill most of its picture.
     """
 
     seconds: float = 2.4

@@ -35,9 +35,7 @@ def scenery(layout: Layout, ground: GroundMap, ground_material: int, materials: 
     paints = _Paints(materials)
     build = {"tree": _tree, "lamp": _lamp, "sign": _sign}
     meshes += [_house(house, paints) for house in layout.buildings]
-    meshes += [
-        build[p.kind](p, paints).moved(upright((*p.at_m, p.yaw_rad))) for p in layout.props if p.kind in build
-    ]
+    meshes += [build[p.kind](p, paints).moved(upright((*p.at_m, p.yaw_rad))) for p in layout.props]
     return Mesh.joined(meshes)
 
 

@@ -107,7 +107,7 @@ class World:
         self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
         both = self.ground_material, self.far_material
         made = scenery2(self.layout, ground, both, self.materials, self.textures)
-        self.lamps: Lamps = made.lamps
+        self.lamps: Lamps = Lamps(self.hills.raised(made.lamps.at_m), made.lamps.colour, made.lamps.ahead)
         return made.mesh
 
     def poses(self, t_s: float) -> Float[np.ndarray, "p 4 4"]:
@@ -128,7 +128,7 @@ class World:
         return Moment(t_s, Solid(mesh, owner, self._device), poses)
 
     def changed(self, light: Light, lens: Lens, ego: Ego) -> "World":
-        """The same street in another light, through another lens, from another car; what is built is shared."""
+        """The same street in another light, through another lens, from another car, built once for all."""
         other = copy(self)
         other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
         one = self.layout.edition == 1

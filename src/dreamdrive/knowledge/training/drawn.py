@@ -1,8 +1,9 @@
-"""Training pictures of drawn streets: worlds of the second edition, seen from many places, with exact truth."""
+"""Training pictures of drawn streets: the second edition, seen from many places, with exact truth."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from dreamdrive.knowledge.training.records import Record, depth_steps, read_reco
 from dreamdrive.knowledge.training.viewpoints import Viewpoint, Viewpoints
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Semantic, StreetOptions, World, WorldView, draw_street, look
-from dreamdrive.world.edition2 import FIRST_TRAINING_SEED, Looks, bent, draw_light
+from dreamdrive.world.edition2 import FIRST_TRAINING_SEED, Looks, TextureLibrary, bent, draw_light, photograph
 
 EDITION = 2
 _AFTER_S = 1.0
@@ -62,31 +63,37 @@ def draw_records(
     folder: Path,
     options: DrawnOptions = DrawnOptions(),
     *,
+    textures: Path | None = None,
     processes: int = 2,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Record]:
     """Write the records of some streets and return them all; streets that are written already are kept.
 
     Each street has a folder of its name with its own ``records.jsonl``; that of the whole folder joins them.
-    Streets of seeds below a million show only looks that are kept out of training.
+    Streets of seeds below a million show only looks that are kept out of training. ``textures`` is a folder of
+    pictures of surfaces, with which the painted ones are mixed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     left = [seed for seed in seeds if not (folder / str(seed) / _MARK).is_file()]
     progress(len(seeds) - len(left), len(seeds))
-    for number, _ in enumerate(_drawn(left, folder, options, processes)):
+    for number, _ in enumerate(_drawn(left, folder, options, textures, processes)):
         progress(len(seeds) - len(left) + number + 1, len(seeds))
     joined = [record for seed in seeds for record in _within(folder, str(seed))]
     write_records(joined, folder)
     return joined
 
 
-def _drawn(seeds: list[int], folder: Path, options: DrawnOptions, processes: int) -> Iterator[None]:
+def _drawn(
+    seeds: list[int], folder: Path, options: DrawnOptions, textures: Path | None, processes: int
+) -> Iterator[None]:
     if processes < 2 or len(seeds) < 2:
         for seed in seeds:
-            yield draw_street_records(seed, folder / str(seed), options)
+            yield draw_street_records(seed, folder / str(seed), options, textures)
         return
     with ProcessPoolExecutor(processes, get_context("spawn"), cv2.setNumThreads, (1,)) as pool:
-        jobs = [pool.submit(draw_street_records, seed, folder / str(seed), options) for seed in seeds]
+        jobs = [
+            pool.submit(draw_street_records, seed, folder / str(seed), options, textures) for seed in seeds
+        ]
         for job in as_completed(jobs):
             yield job.result()
 
@@ -97,10 +104,18 @@ def _within(folder: Path, name: str) -> Iterator[Record]:
         yield msgspec.structs.replace(record, **paths)
 
 
-def draw_street_records(seed: int, folder: Path, options: DrawnOptions = DrawnOptions()) -> None:
+@lru_cache(1)
+def _library(folder: Path | None) -> TextureLibrary | None:
+    return None if folder is None else TextureLibrary.read(folder)
+
+
+def draw_street_records(
+    seed: int, folder: Path, options: DrawnOptions = DrawnOptions(), textures: Path | None = None
+) -> None:
     """Write the pictures and records of one street; the folder appears whole or not at all."""
     rng = np.random.default_rng([seed, 30])
-    world = World(draw_street(seed, StreetOptions(options.seconds + _AFTER_S, edition=EDITION)))
+    layout = draw_street(seed, StreetOptions(options.seconds + _AFTER_S, edition=EDITION))
+    world = World(layout, _library(textures))
     looks = Looks(rng, kept_out=seed < FIRST_TRAINING_SEED)
     places = Viewpoints(world, rng, looks, options.seconds)
     light = world.layout.light
@@ -109,9 +124,11 @@ def draw_street_records(seed: int, folder: Path, options: DrawnOptions = DrawnOp
         for number in range(options.views):
             at, moment = places.draw()
             if number % options.relit == options.relit - 1:
-                light = draw_light(rng)
+                # Snow lies on the painted ground and stays.
+                light = msgspec.structs.replace(draw_light(rng), snow=world.layout.light.snow)
             seen = world.changed(light, at.lens, at.ego)
             view = look(seen, moment, at.camera, (at.time_s, at.camera))
+            view = replace(view, frame=photograph(view.frame, int(rng.integers(2**31))))
             quality = int(rng.integers(options.quality[0], options.quality[1] + 1))
             records.append(_write(view, at, made, f"{number:02d}", f"street-{seed}", quality))
         write_records(records, made)

@@ -25,7 +25,10 @@ _COARSE = (32, 18)
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A camera in the map frame at a time, its lens, its place as that of a car, and whose seat it took, or 0."""
+    """A camera in the map frame at a time.
+
+    ``ego`` is its place as that of a car; ``without`` is the instance of whose seat it took, or 0.
+    """
 
     time_s: float
     camera: Camera

@@ -49,6 +49,7 @@ class Kind:
     masts: float = 0.1
     walkers: tuple[int, int] = (2, 14)
     marked: float = 0.9
+    edges: float = 0.2
 
 
 KINDS: dict[StreetKind, Kind] = {
@@ -57,7 +58,7 @@ KINDS: dict[StreetKind, Kind] = {
         lanes=(1, 4),
         lane_m=(2.9, 3.5),
         speed_m_s=(6, 13),
-        middles={"dashed": 0.2, "solid": 0.3, "double": 0.3, "paved": 0.2},
+        middles={"dashed": 0.2, "solid": 0.6, "paved": 0.2},
         one_way=0.25,
         parkings={"none": 0.4, "parallel": 0.5, "angled": 0.1},
         walk_m=(2.0, 6.0),
@@ -111,7 +112,7 @@ KINDS: dict[StreetKind, Kind] = {
         lanes=(2, 4),
         lane_m=(3.0, 3.6),
         speed_m_s=(9, 17),
-        middles={"grass": 0.4, "paved": 0.35, "rail": 0.15, "double": 0.1},
+        middles={"grass": 0.4, "paved": 0.35, "rail": 0.15, "solid": 0.1},
         shoulder_m=(0.2, 1.2),
         parkings={"none": 0.7, "parallel": 0.3},
         walk_m=(2.0, 5.0),
@@ -156,7 +157,7 @@ KINDS: dict[StreetKind, Kind] = {
         lanes=(1, 1),
         lane_m=(2.3, 3.7),
         speed_m_s=(10, 24),
-        middles={"none": 0.3, "dashed": 0.4, "solid": 0.15, "double": 0.15},
+        middles={"none": 0.3, "dashed": 0.4, "solid": 0.3},
         shoulder_m=(0.0, 1.5),
         walk=0.0,
         radius_m=(35.0, 500.0),
@@ -175,6 +176,7 @@ KINDS: dict[StreetKind, Kind] = {
         masts=0.5,
         walkers=(0, 2),
         marked=0.65,
+        edges=0.6,
     ),
     "motorway": Kind(
         share=0.08,
@@ -195,6 +197,7 @@ KINDS: dict[StreetKind, Kind] = {
         lamps=0.3,
         walkers=(0, 0),
         marked=1.0,
+        edges=1.0,
     ),
     "industrial": Kind(
         share=0.05,

@@ -18,6 +18,10 @@ class Looks:
     rng: np.random.Generator
     kept_out: bool
 
+    def grain(self, seed: int) -> int:
+        """A number of the street's own share that stands for a seed: what decides grounds and skies."""
+        return _FIFTH * seed + (_KEPT if self.kept_out else seed % _KEPT)
+
     def draw(self) -> int:
         """A look of the street's own share."""
         group = _FIFTH * int(self.rng.integers(LOOKS // _FIFTH))

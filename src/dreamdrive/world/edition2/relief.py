@@ -1,7 +1,5 @@
 """Hills and dales under a street: how high the map lies, and what that does to all that stands on it."""
 
-from typing import cast
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -64,9 +62,14 @@ class Hills:
         if self.level:
             return mesh
         fine = _halved(mesh)
-        corners = fine.corners.copy()
-        corners[..., 2] += self.height_m(corners[..., :2].reshape(-1, 2)).reshape(-1, 3)
-        return Mesh(corners, fine.uv, fine.material)
+        raised = self.raised(fine.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+        return Mesh(raised, fine.uv, fine.material, fine.normals)
+
+    def raised(self, points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Points over the level map as far over the hills."""
+        raised = points_m.copy()
+        raised[:, 2] += self.height_m(points_m[:, :2])
+        return raised
 
 
 def hills_of(layout: Layout) -> Hills:
@@ -88,18 +91,18 @@ def _tilt(slope: Float[np.ndarray, "2"]) -> Float[np.ndarray, "3 3"]:
 
 def _halved(mesh: Mesh) -> Mesh:
     """Halve long edges until all are short. An edge is halved for its own length: neighbours do the same."""
-    corners, uv, material = mesh.corners, mesh.uv, mesh.material
-    done: list[Mesh] = []
+    # What is known at every corner: its place, its place on the texture, its normal.
+    normals = [] if mesh.normals is None else [mesh.normals]
+    values, material = np.concatenate([mesh.corners, mesh.uv, *normals], axis=-1), mesh.material
+    done: list[tuple[np.ndarray, np.ndarray]] = []
     for _ in range(_MOST_HALVINGS):
-        long = _long(corners)
-        whole = ~long.any(axis=1)
-        done.append(Mesh(corners[whole], uv[whole], material[whole]))
-        if whole.all():
-            break
-        corners, uv, material = _split(corners[~whole], uv[~whole], material[~whole], long[~whole])
-    else:
-        done.append(Mesh(corners, uv, material))
-    return Mesh.joined(done)
+        long = _long(values[..., :3])
+        split = long.any(axis=1)
+        done.append((values[~split], material[~split]))
+        values, material = _split(values[split], material[split], long[split])
+    done.append((values, material))
+    values, material = (np.concatenate(parts) for parts in zip(*done, strict=True))
+    return Mesh(values[..., :3], values[..., 3:5], material, values[..., 5:] if normals else None)
 
 
 def _long(corners: Float[np.ndarray, "m 3 3"]) -> Bool[np.ndarray, "m 3"]:
@@ -110,7 +113,7 @@ def _long(corners: Float[np.ndarray, "m 3 3"]) -> Bool[np.ndarray, "m 3"]:
     return length > np.maximum(_EDGE_M, _EDGE_SHARE * np.linalg.norm(middle, axis=-1))
 
 
-# The triangles of one whose first edge is halved, first and second, all three: 0-2 corners, 3-5 middles of edges.
+# By how many edges are halved, the first ones: its pieces. 0-2 are corners, 3-5 the middles of edges.
 _SPLITS: dict[int, list[tuple[int, int, int]]] = {
     1: [(0, 3, 2), (3, 1, 2)],
     2: [(0, 3, 2), (3, 1, 4), (3, 4, 2)],
@@ -119,24 +122,15 @@ _SPLITS: dict[int, list[tuple[int, int, int]]] = {
 
 
 def _split(
-    corners: Float[np.ndarray, "m 3 3"],
-    uv: Float[np.ndarray, "m 3 2"],
-    material: Int[np.ndarray, " m"],
-    long: Bool[np.ndarray, "m 3"],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    values: Float[np.ndarray, "m 3 k"], material: Int[np.ndarray, " m"], long: Bool[np.ndarray, "m 3"]
+) -> tuple[Float[np.ndarray, "n 3 k"], Int[np.ndarray, " n"]]:
     """Triangles cut at the middles of their long edges."""
-    values = np.concatenate([corners, uv], axis=-1)
     count = long.sum(axis=1)
     # Turn each so that its long edges come first.
     first = np.where(count == 2, (np.argmin(long, axis=1) + 1) % 3, np.argmax(long, axis=1))
     order = (first[:, None] + np.arange(3)) % 3
     values = np.take_along_axis(values, order[..., None], axis=1)
     points = np.concatenate([values, (values + np.roll(values, -1, axis=1)) / 2], axis=1)
-    found: list[np.ndarray] = []
-    kinds: list[np.ndarray] = []
-    for cuts, pieces in _SPLITS.items():
-        chosen = points[count == cuts]
-        found += [chosen[:, piece] for piece in pieces]
-        kinds += [material[count == cuts]] * len(pieces)
-    joined = cast(np.ndarray, np.concatenate(found))
-    return joined[..., :3], joined[..., 3:], np.concatenate(kinds)
+    found = [points[count == cuts][:, piece] for cuts, pieces in _SPLITS.items() for piece in pieces]
+    kinds = [material[count == cuts] for cuts, pieces in _SPLITS.items() for _ in pieces]
+    return np.concatenate(found), np.concatenate(kinds)

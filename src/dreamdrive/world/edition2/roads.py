@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from dreamdrive.scene.layout import Area, AreaKind, Line, LineKind
 from dreamdrive.world.road import Curve, map_areas, map_lines, map_points
 
-Middle = Literal["none", "dashed", "solid", "double", "grass", "paved", "rail"]
+Middle = Literal["none", "dashed", "solid", "grass", "paved", "rail"]
 Parking = Literal["none", "parallel", "angled", "perpendicular"]
 PARKING_DEPTH_M: dict[Parking, float] = {
     "none": 0.0,
@@ -29,7 +29,6 @@ PARKING_TURN_RAD: dict[Parking, float] = {
     "angled": np.deg2rad(55),
     "perpendicular": np.pi / 2,
 }
-_DOUBLE_M = 0.13
 _STOP_M = 1.2  # from a stop line to the zebra crossing or junction behind it
 _EASE_M = 14  # over which a bend begins
 _MOST_TURN_RAD = 1.35
@@ -49,7 +48,10 @@ class Side:
 
 @dataclass(frozen=True)
 class Section:
-    """What lies across a road; traffic ahead goes on the right. ``marked``: its lanes and edges are painted."""
+    """What lies across a road; traffic ahead goes on the right.
+
+    Marked ones have painted lanes, those with ``edges`` lines at their kerbs as well.
+    """
 
     right: Side
     left: Side
@@ -57,6 +59,7 @@ class Section:
     middle: Middle = "none"
     middle_m: float = 0.0
     marked: bool = True
+    edges: bool = False
 
 
 @dataclass(frozen=True)
@@ -193,7 +196,8 @@ class Net:
     def areas(self, zebras: list[shapely.Polygon]) -> list[Area]:
         """The map's polygons."""
         raised: AreaKind = "grass" if self.main.section.middle == "grass" else "sidewalk"
-        found = [*map_areas(self.ground, self.paved), *map_areas("sidewalk", self.walks)]
+        lanes = _tidy(self.paved.difference(self.middles))
+        found = [*map_areas(self.ground, lanes), *map_areas("sidewalk", self.walks)]
         found += map_areas(raised, self.middles)
         return found + [area for zebra in zebras for area in map_areas("crossing", zebra)]
 
@@ -212,17 +216,17 @@ class Net:
         painted: dict[Middle, list[tuple[LineKind, float]]] = {
             "dashed": [("lane_divider", 0.0)],
             "solid": [("road_divider", 0.0)],
-            "double": [("road_divider", _DOUBLE_M), ("road_divider", -_DOUBLE_M)],
         }
-        wanted = painted.get(section.middle, [])
+        wanted: list[tuple[LineKind, float]] = painted.get(section.middle, [])
         if section.middle in ("grass", "paved", "rail"):
             wanted = [("road_edge", side * (section.middle_m / 2 - 0.15)) for side in (-1, 1)]
         for side in (-1, 1):
             which = way.side(side)
             for lane in range(1, which.lanes):
                 wanted.append(("lane_divider", side * (section.middle_m / 2 + lane * section.lane_m)))
-            if which.shoulder_m > 0.3 or which.parking != "none":
-                wanted.append(("road_edge", side * way.edge_m(side)))
+            if which.shoulder_m > 0.3 or which.parking != "none" or section.edges:
+                inside = 0.0 if which.shoulder_m + PARKING_DEPTH_M[which.parking] > 0.3 else 0.2
+                wanted.append(("road_edge", side * (way.edge_m(side) - inside)))
         for kind, left_m in wanted:
             found += map_lines(kind, cast(shapely.LineString, way.line(left_m).simplify(0.01)), self.crossed)
         return found
@@ -251,7 +255,7 @@ def junction(
             line_m = near + end * (_STOP_M + (wide_m if zebra else 0))
             at = np.array([end * way.section.middle_m / 2, end * way.edge_m(end)])
             stops.append(way.at(np.full(2, line_m), at)[:, :2])
-    return Junction(station_m, other, cast(shapely.Polygon, shape), zebras, stops)
+    return Junction(station_m, other, shape, zebras, stops)
 
 
 def _bays(way: Way) -> list[Line]:

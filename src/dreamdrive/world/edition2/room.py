@@ -35,7 +35,7 @@ class Room:
         found: list[shapely.Polygon] = []
         for places, size in zip(self._places, self._sizes, strict=True):
             still = np.ptp(places[:, :2], axis=0).max() < 0.05
-            found += shapely.polygons(_corners(places[:1] if still else places, size)).tolist()
+            found += [shapely.Polygon(ring) for ring in _corners(places[:1] if still else places, size)]
         return found
 
     def _meets(self, places: np.ndarray, size_m: tuple[float, float]) -> bool:

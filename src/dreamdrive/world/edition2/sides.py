@@ -1,10 +1,12 @@
 """What stands beside a road of the second edition: houses, bounds of estates, trees, posts."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
 
 from dreamdrive.scene.layout import Barrier, BarrierKind, Building, Prop, PropKind
 from dreamdrive.world.edition2.kinds import Kind, chosen
@@ -110,19 +112,20 @@ class Sides:
             while gaps and starts[-1] < piece.length:
                 starts.append(starts[-1] + float(rng.uniform(6, 40)))
             starts = starts if gaps else [0.0, piece.length]
-            for start, end in zip(starts[:-1], starts[1:], strict=True):
+            for start, end in pairwise(starts):
                 last = min(end - 3.0 * gaps, piece.length)
-                part = shapely.ops.substring(piece, start, last)
+                part = substring(piece, start, last)
                 if part.geom_type == "LineString" and part.length > 1.5:
                     points = map_points(np.array(part.simplify(0.03).coords))
                     self.barriers.append(Barrier(kind, points, height, look))
 
-    def place_props(self, occupied: "BaseGeometry") -> None:
+    def place_props(self, occupied: BaseGeometry) -> None:
         """Trees, posts and the like where nothing else stands; ``occupied`` is what road users ever cover."""
         net = self.net
         standing = [net.paved.difference(net.middles), occupied, *self.outlines]
         standing += [shapely.LineString(b.points).buffer(0.25) for b in self.barriers]
         standing += net.zebras
+        self._road_users = occupied
         self._blocked = shapely.union_all(standing).buffer(0.2)
         shapely.prepare(self._blocked)
         for way in net.ways:

@@ -1,6 +1,6 @@
-"""Layouts of the second edition, drawn at random: many kinds of streets, traffic, weather, hills and lenses."""
+"""Layouts of the second edition, drawn at random: kinds of streets, traffic, weather, hills, lenses."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -23,6 +23,7 @@ from dreamdrive.world.edition2.kinds import KINDS, Kind, chosen
 from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED, Looks
 from dreamdrive.world.edition2.roads import (
     Junction,
+    Middle,
     Net,
     Parking,
     Section,
@@ -36,7 +37,6 @@ from dreamdrive.world.edition2.sides import Sides
 from dreamdrive.world.edition2.traffic import STEP_S, Pace, Traffic
 from dreamdrive.world.edition2.weather import draw_light, draw_relief
 from dreamdrive.world.options import StreetKind, StreetOptions
-from dreamdrive.world.road import travelled_m
 from dreamdrive.world.traffic import to_track
 
 _AFTER_S = 1.2  # for which traffic goes on behind the end
@@ -47,6 +47,7 @@ _ON_THE_LEFT = 0.2
 """Share of streets on which traffic keeps to the left: they are drawn as mirror images."""
 _QUEUE_KINDS: dict[StreetKind, float] = {"city": 0.5, "avenue": 0.5}
 _QUEUE_M_S = (3.5, 5.5)
+_HFOV, _QUEUE_HFOV = (50.0, 95.0), (56.0, 72.0)
 
 
 def draw_street(seed: int, options: StreetOptions) -> Layout:
@@ -55,7 +56,7 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
     looks = Looks(rng, kept_out=seed < FIRST_TRAINING_SEED)
     queue = options.traffic == "queue"
     name = options.kind or chosen(rng, _QUEUE_KINDS if queue else {k: v.share for k, v in KINDS.items()})
-    kind = replace(KINDS[name], lanes=(2, 3), one_way=0.0) if queue else KINDS[name]
+    kind = _queued(KINDS[name]) if queue else KINDS[name]
     most_m_s = max(options.speed_m_s or 0.0, kind.speed_m_s[1] * 1.2)
     net = _draw_net(rng, name, kind, most_m_s * (options.seconds + _AFTER_S))
     pace = _ego_pace(rng, kind, options, queue=queue)
@@ -81,17 +82,25 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
         light=draw_light(rng),
         barriers=sides.barriers,
         relief=draw_relief(rng),
-        lens=draw_lens(rng, looks),
-        seed=seed,
+        lens=draw_lens(rng, looks, _QUEUE_HFOV if queue else _HFOV),
+        seed=looks.grain(seed),
         edition=options.edition,
     )
     return _mirrored(layout) if rng.random() < _ON_THE_LEFT else layout
 
 
-def draw_lens(rng: np.random.Generator, looks: Looks) -> Lens:
+def _queued(kind: Kind) -> Kind:
+    """A kind of street as narrow as it takes to be full of vehicles, without junctions that would part them."""
+    middles: dict[Middle, float] = {"dashed": 0.3, "solid": 0.7}
+    return replace(
+        kind, lanes=(2, 3), one_way=0.0, lane_m=(2.9, 3.1), middles=middles, block_m=None, walkers=(0, 8)
+    )
+
+
+def draw_lens(rng: np.random.Generator, looks: Looks, hfov_deg: tuple[float, float]) -> Lens:
     """A dashcam behind the glass: without distortion, as a street is driven through with a known camera."""
     return Lens(
-        hfov_rad=round(float(np.deg2rad(rng.uniform(50, 95))), 4),
+        hfov_rad=round(float(np.deg2rad(rng.uniform(*hfov_deg))), 4),
         pitch_rad=round(float(rng.normal(0, np.deg2rad(2))), 4),
         roll_rad=round(float(rng.normal(0, np.deg2rad(0.5))), 4),
         bonnet=looks.draw() if rng.random() < 1 / 3 else None,
@@ -140,7 +149,8 @@ def _draw_section(rng: np.random.Generator, kind: Kind, most_lanes: int = 9) -> 
         for count, parking in zip([lanes[0], 0 if one_way else lanes[1]], parkings, strict=True)
     ]
     lane_m = float(rng.uniform(*kind.lane_m))
-    return Section(sides[0], sides[1], lane_m, middle, middle_m, marked=rng.random() < kind.marked)
+    marked, edges = rng.random() < kind.marked, rng.random() < kind.edges
+    return Section(sides[0], sides[1], lane_m, middle, middle_m, marked, edges)
 
 
 def _draw_junction(rng: np.random.Generator, kind: Kind, main: Way, station_m: float) -> Junction:

@@ -8,13 +8,13 @@ import shapely
 from jaxtyping import Float
 
 from dreamdrive.scene.layout import Box, BoxKind, Ego, TrackPoint, track_function
+from dreamdrive.world.edition2.bodies import size_of
 from dreamdrive.world.edition2.kinds import Kind, chosen
 from dreamdrive.world.edition2.looks import Looks
-from dreamdrive.world.edition2.walkers import walkers
 from dreamdrive.world.edition2.roads import PARKING_DEPTH_M, PARKING_PITCH_M, PARKING_TURN_RAD, Net, Way
 from dreamdrive.world.edition2.room import Room
-from dreamdrive.world.edition2.sizes import size_of
 from dreamdrive.world.edition2.user import User
+from dreamdrive.world.edition2.walkers import walkers
 from dreamdrive.world.road import travelled_m
 from dreamdrive.world.traffic import to_track
 
@@ -31,7 +31,7 @@ FlowName = Literal["none", "light", "medium", "dense", "queue", "big queue"]
 
 @dataclass(frozen=True)
 class Flow:
-    """Traffic of a lane: gaps from bumper to bumper, speed as a share of free speed, and share of large ones."""
+    """Traffic of a lane: gaps between bumpers, speed as a share of free speed, share of large vehicles."""
 
     gap_m: tuple[float, float]
     speed: tuple[float, float]
@@ -43,7 +43,7 @@ FLOWS: dict[FlowName, Flow] = {
     "medium": Flow((7.0, 40.0), (0.6, 1.0)),
     "dense": Flow((3.0, 14.0), (0.1, 0.5)),
     "queue": Flow((1.8, 7.0), (0.0, 0.3)),
-    "big queue": Flow((1.6, 3.2), (0.0, 0.0), 0.85),
+    "big queue": Flow((1.2, 2.2), (0.0, 0.0), 0.9),
 }
 _USUAL: dict[FlowName, float] = {"none": 0.1, "light": 0.27, "medium": 0.3, "dense": 0.18, "queue": 0.15}
 _QUEUE_M_S = (3.0, 6.0)
@@ -148,10 +148,10 @@ class Traffic:
         rng = self.rng
         large = max(large, flow.large) if self.queue else large
         if way is self.net.main and side < 0 and lane == self.ego_lane:
-            front = 0.5 * EGO_SIZE_M[0] - CAMERA_AHEAD_M
+            front = 0.5 * EGO_SIZE_M[0] - CAMERA_AHEAD_M + (1.1 if self.queue else 0.0)
             pace = self.ego_pace
             ahead = self._chain(way, side, lane, flow, large, pace, (front, _AHEAD_M))
-            return ahead + self._chain(way, side, lane, flow, large, pace, (front - EGO_SIZE_M[0], _BEHIND_M))
+            return ahead + self._chain(way, side, lane, flow, large, pace, (-EGO_SIZE_M[0], _BEHIND_M))
         reach = max(way.start_m + 3, _BEHIND_M), min(way.end_m - 3, _AHEAD_M)
         start = reach[0] + float(rng.uniform(0, flow.gap_m[1]))
         return self._chain(way, side, lane, flow, large, self._pace(way, side, flow), (start, reach[1]))

@@ -10,7 +10,7 @@ from dreamdrive.scene.layout import BoxKind
 
 @dataclass(frozen=True)
 class User:
-    """Who would be where: x, y and yaw at each of the street's times; ``first`` takes its room before others."""
+    """Who would be where: x, y and yaw at each of the street's times; ``first`` are served first."""
 
     kind: BoxKind
     size_m: tuple[float, float, float]

@@ -4,10 +4,10 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
+from dreamdrive.world.edition2.bodies import size_of
 from dreamdrive.world.edition2.kinds import Kind
 from dreamdrive.world.edition2.looks import Looks
 from dreamdrive.world.edition2.roads import Net, Way
-from dreamdrive.world.edition2.sizes import size_of
 from dreamdrive.world.edition2.user import User
 from dreamdrive.world.road import rectangle_around
 
