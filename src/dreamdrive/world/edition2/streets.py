@@ -79,7 +79,7 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
         boxes=traffic.boxes,
         buildings=sides.houses,
         props=sides.props,
-        light=draw_light(rng),
+        light=draw_light(rng, fair=queue),
         barriers=sides.barriers,
         relief=draw_relief(rng),
         lens=draw_lens(rng, looks, _QUEUE_HFOV if queue else _HFOV),
@@ -155,7 +155,7 @@ def _draw_section(rng: np.random.Generator, kind: Kind, most_lanes: int = 9) -> 
 
 def _draw_junction(rng: np.random.Generator, kind: Kind, main: Way, station_m: float) -> Junction:
     """A crossing or a road that leads away to one side."""
-    section = _draw_section(rng, kind, most_lanes=2)
+    section = _draw_section(rng, kind, most_lanes=3 if kind.lanes[1] > 2 else 2)
     section = replace(section, middle_m=0.0, middle="none" if section.middle_m else section.middle)
     angle = np.pi / 2 + float(rng.normal(0, 0.15))
     reach = [_CROSSING_M, _CROSSING_M]

@@ -16,19 +16,21 @@ _WEATHER = {
     "fog": 0.04,
     "snow": 0.05,
 }
-_SLOPE = (0.01, 0.08)
+_FAIR = {"clear": 0.6, "overcast": 0.4}
+_SLOPE = (0.015, 0.1)  # where all waves rise together, which is rare: half of it is common
 _LENGTH_M = (70.0, 500.0)
 
 
-def draw_light(rng: np.random.Generator) -> Light:
-    """Day and night, sun, rain, snow and fog."""
-    weather = chosen(rng, _WEATHER)
+def draw_light(rng: np.random.Generator, *, fair: bool = False) -> Light:
+    """Day and night, sun, rain, snow and fog; if fair, a dry day."""
+    weather = chosen(rng, _FAIR if fair else _WEATHER)
     dark = float(rng.uniform(0.3, 0.75) if weather == "dusk" else 1.0 if weather == "night" else 0.0)
     dull = weather in ("overcast", "rain", "fog", "snow")
     high = (0.03, 0.25) if weather in ("low sun", "dusk") else (0.25, 1.4)
     snow = float(rng.uniform(0.2, 1.0)) if weather == "snow" else 0.0
     rain = float(rng.uniform(0.1, 1.0)) if weather == "rain" else 0.0
-    wet = max(rain, float(rng.uniform(0, 1)) if rng.random() < (0.3 if dull or dark else 0.08) else 0.0)
+    damp = 0.0 if fair else 0.3 if dull or dark else 0.08
+    wet = max(rain, float(rng.uniform(0, 1)) if rng.random() < damp else 0.0)
     thick = float(np.exp(rng.uniform(np.log(0.008), np.log(0.04)))) if weather == "fog" else 0.0
     glare = weather == "low sun" or (dark and rng.random() < 0.5)
     return Light(
@@ -47,7 +49,7 @@ def draw_light(rng: np.random.Generator) -> Light:
 
 
 def draw_relief(rng: np.random.Generator) -> Relief:
-    """Every second street is level; the others rise by 1 to 8 in a hundred where they are steepest."""
+    """Every second street is level; the others rise by up to 8 in a hundred, hardly any by more."""
     if rng.random() < 0.5:
         return Relief()
     length = float(np.exp(rng.uniform(*np.log(_LENGTH_M))))
