@@ -65,7 +65,7 @@ def test_each_kind_has_its_class_and_few_triangles(kind: BoxKind) -> None:
     materials = Materials()
     meshes = [whole(kind, look, materials) for look in LOOKS]
     assert set(materials.semantic) == {Semantic[kind.upper()]}
-    assert np.mean([len(m) for m in meshes]) < 1900
+    assert np.mean([len(m) for m in meshes]) < 1700
     assert max(max(image.shape) for image, _ in materials.textures.images) <= 400
 
 

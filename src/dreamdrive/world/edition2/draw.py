@@ -77,7 +77,8 @@ class Draw:
         """Colour of a car's body."""
         shares = np.array([share for share, _ in _PAINTS])
         colour = _PAINTS[int(self.rng.choice(len(_PAINTS), p=shares / shares.sum()))][1]
-        return self.near(colour, 9)
+        red, green, blue = self.rng.uniform(0.85, 1.1) * np.array(colour)
+        return self.near((red, green, blue), 3)
 
     def near(self, colour: Colour, spread: float) -> Colour:
         """A colour like another."""

@@ -147,9 +147,7 @@ def body_mesh(shape: Shape) -> Mesh:
     sill = ring(_SILL_M - half, half - _SILL_M, side * (1 - 0.5 * shape.bulge))
     sill[:, 2] = shape.arch(sill[:, 0])
     inner = sill * [1, 1 - _TUNNEL_M / side, 1]
-    floor = inner.copy()
-    floor[:, 2] = shape.clearance
-    bottom = floor * [1, 0, 1]
+    bottom = inner * [1, 0, 0] + [0, 0, shape.clearance]
     bumper = ring(-half, half, side)
     shoulder = shape.edge(bumper[:, 0])
     bumper[:, 2] = np.maximum(0.42 * shoulder + 0.1, sill[:, 2] + 0.01)
@@ -174,8 +172,8 @@ def body_mesh(shape: Shape) -> Mesh:
     ridge[:, 2] = shape.rail(ridge[:, 0]) + round_
     spine = ridge * [1, 0, 1]
     dark, upper = np.full(len(faces), Side.UNDER), np.full(len(faces), Side.TOP)
-    rings = [bottom, floor, inner, sill, bumper, waist, edge, rim, foot, pane, top, crown, ridge, spine]
-    kinds = [dark, dark, dark, faces, faces, faces, upper, upper, faces, faces, upper, upper, upper]
+    rings = [bottom, inner, sill, bumper, waist, edge, rim, foot, pane, top, crown, ridge, spine]
+    kinds = [dark, dark, faces, faces, faces, upper, upper, faces, faces, upper, upper, upper]
     points = np.stack(rings)
     points[..., 2] *= shape.height / points[..., 2].max()
     return loft(points, np.stack(kinds))

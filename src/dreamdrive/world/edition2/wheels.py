@@ -64,7 +64,7 @@ def wheel_pairs(
     outer = 0.5 * track_m - 0.025
     pair = Mesh.joined(
         [
-            cylinder((0, y - half, 0), (0, y + half, 0), (radius_m, radius_m), *materials, 14)
+            cylinder((0, y - half, 0), (0, y + half, 0), (radius_m, radius_m), *materials, 12)
             for y in (outer - half, half - outer)
         ]
     )
