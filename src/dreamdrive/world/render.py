@@ -18,6 +18,7 @@ _CONTRAST = 0.07  # of encoded brightness, from which on a pixel takes further r
 _SHOULDER = 0.75
 _FLATTEST = 0.03
 _NEAR_M = 0.05
+_WIDEST = 10.0
 _GROUND_MIRRORED = np.array([0.12, 0.12, 0.12], np.float32)
 
 
@@ -214,7 +215,8 @@ class Eye:
         local = turned(points - start, camera.world_from_camera[:3, :3].T)
         z = np.maximum(local[:, 2], 1e-6)
         if self.k1:
-            local[:, :2] = z[:, None] * bent(local[:, :2] / z[:, None], self.k1)
+            # What lies beside or behind the camera would be bent beyond all numbers.
+            local[:, :2] = z[:, None] * bent(np.clip(local[:, :2] / z[:, None], -_WIDEST, _WIDEST), self.k1)
         across = local[:, 0] / z * camera.fx_px + camera.cx_px - columns
         return np.stack([across, local[:, 1] / z * camera.fy_px + camera.cy_px - rows], axis=-1)
 

@@ -15,7 +15,7 @@ from dreamdrive.world import StreetOptions, World, draw_street, look
 from dreamdrive.world.edition2 import Looks, pinhole
 
 SEEDS = (1_000_031, 7)
-OPTIONS = DrawnOptions(views=4, relit=2)
+OPTIONS = DrawnOptions(moments=2)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def picture(folder: Path, name: str | None) -> np.ndarray:
 
 
 def test_every_record_has_its_pictures_and_they_agree(folder: Path, records: list[Record]) -> None:
-    assert len(records) == 8
+    assert len(records) == 12
     for record in records:
         image, labels, depth = (picture(folder, n) for n in (record.image, record.labels, record.depth))
         assert image.dtype == labels.dtype == np.uint8
@@ -56,7 +56,7 @@ def test_every_record_has_its_pictures_and_they_agree(folder: Path, records: lis
 
 
 def test_groups_tell_streets_apart_and_test_streets_are_kept_out(records: list[Record]) -> None:
-    assert {record.group for record in records} == {"street-1000030", "street-7"}
+    assert {record.group for record in records} == {"street-1000031", "street-7"}
     assert all(record.kept_out == (record.group == "street-7") for record in records)
 
 
@@ -83,7 +83,9 @@ def test_depth_and_horizon_give_the_height_of_the_camera(folder: Path, records: 
         )
         if record.distorted or layout.relief.height_m > 0:
             continue
-        assert record.focal_px and record.horizon_px is not None and record.roll_rad is not None
+        assert record.focal_px is not None
+        assert record.horizon_px is not None
+        assert record.roll_rad is not None
         labels, depth = picture(folder, record.labels), picture(folder, record.depth)
         rows, columns = np.nonzero(np.isin(labels[..., 2], [StreetClass.ROAD]) & (depth < FAR))
         z = depth[rows, columns] / DEPTH_STEPS
@@ -96,24 +98,28 @@ def test_depth_and_horizon_give_the_height_of_the_camera(folder: Path, records: 
         near = z < 30
         if near.sum() > 500:
             checked += 1
-            np.testing.assert_allclose(below[near], record.camera_height_m, atol=0.06)
+            # Only the edge of a kerb may stand out.
+            assert np.quantile(np.abs(below[near] - record.camera_height_m), 0.95) < 0.03
     assert checked
 
 
-def test_the_own_seat_is_free_and_depth_agrees_between_views() -> None:
+def test_the_camera_sits_in_a_car_that_is_left_out_and_sees_something() -> None:
     world = World(draw_street(1_000_031, StreetOptions(3.0, edition=2, kind="city")))
     places = Viewpoints(world, np.random.default_rng(2), Looks(np.random.default_rng(2), False), 2.0)
     taken = 0
     for _ in range(12):
-        at, moment = places.draw()
-        taken += at.without > 0
+        places.move_on()
+        at = places.draw()
         small = at.camera.resized(64, 36)
-        seen = look(world.changed(world.layout.light, Lens(), at.ego), moment, small, (at.time_s, small))
-        if at.without:
-            assert is_moving(world.layout.boxes[at.without - 1].track)
-            assert not (seen.instance == at.without).any()
+        changed = world.changed(world.layout.light, Lens(), at.ego)
+        seen = look(changed, places.moment, small, (at.time_s, small))
         assert (seen.depth_m[~seen.sky] > 0.3).all()
-    assert taken
+        assert places.seat is not None
+        assert is_moving(places.seat.box.track)
+        assert not (seen.instance == places.seat.instance).any()
+        x, y, _ = places.seat.places(np.array([at.time_s]))[0]
+        taken += np.hypot(*(at.camera.world_from_camera[:2, 3] - [x, y])) < 2.5
+    assert taken > 1
 
 
 def test_lenses_are_of_all_sorts() -> None:
@@ -138,7 +144,7 @@ def test_the_horizon_is_where_level_rays_cross_the_middle() -> None:
     world = World(draw_street(1_000_032, StreetOptions(3.0, edition=2)))
     places = Viewpoints(world, np.random.default_rng(4), Looks(np.random.default_rng(4), False), 2.0)
     for _ in range(6):
-        at, _ = places.draw()
+        at = places.draw()
         horizon, roll = horizon_of(at)
         far = 1e6
         ahead = at.camera.world_from_camera[:3, 2] * [1, 1, 0]

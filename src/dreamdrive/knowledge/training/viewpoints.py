@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Ego, Lens, TrackPoint, track_function
-from dreamdrive.world import Moment, Mover, World, upright
+from dreamdrive.world import Mover, World, upright
 from dreamdrive.world.edition2 import Looks, level_from_camera, most_barrel, pinhole
 
 _SIZES = ((512, 288), (512, 320), (512, 384), (512, 270), (512, 156))
@@ -19,22 +19,18 @@ _PITCH, _ROLL = np.deg2rad((2.0, 12.0)), np.deg2rad((0.5, 5.0))
 _HEIGHT_M, _USUAL_HEIGHT_M = (0.8, 3.0), (1.1, 1.7)
 _CAMERA_AHEAD = 0.13  # of a car's length from its middle to the camera behind its windscreen
 _KERB_M = 9.0
-_TRIES = 40
+_TRIES, _TRIES_AT_ONCE = 60, 12
 _COARSE = (32, 18)
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A camera in the map frame at a time.
-
-    ``ego`` is its place as that of a car; ``without`` is the instance of whose seat it took, or 0.
-    """
+    """A camera in the map frame at a time; ``ego`` is its place as that of a car."""
 
     time_s: float
     camera: Camera
     lens: Lens
     ego: Ego
-    without: int
 
 
 def draw_lens(rng: np.random.Generator, looks: Looks, size: tuple[int, int], *, ahead: bool) -> Lens:
@@ -70,33 +66,38 @@ class Viewpoints:
         firm += [shapely.Point(p.at_m).buffer(1.2 if p.kind == "tree" else 0.7) for p in layout.props]
         self._firm = shapely.STRtree(firm)
         self._seats = [m for m in world.movers if m.moving and m.box.kind in ("car", "van", "truck", "bus")]
+        self.move_on()
 
-    def draw(self) -> tuple[Viewpoint, Moment]:
-        """A viewpoint that shows something, and the world at its time."""
-        for _ in range(_TRIES):
+    def move_on(self) -> None:
+        """Choose another time, and of the moving cars one to sit in, which is then left out."""
+        self._time_s = float(self._rng.uniform(0, self._seconds))
+        self.seat = self._near_seat() if self._seats else None
+        self.moment = self._world.at(self._time_s, without=self.seat.instance if self.seat else 0)
+
+    def draw(self) -> Viewpoint:
+        """A viewpoint at that time that shows something."""
+        for tries in range(_TRIES):
+            if tries and tries % _TRIES_AT_ONCE == 0:
+                self.move_on()
             found = self._draw()
-            if found is not None:
-                moment = self._world.at(found.time_s, without=found.without)
-                if self._open(found.camera, moment):
-                    return found, moment
+            if found is not None and self._open(found.camera):
+                return found
         raise RuntimeError("a drawn street has no place for a camera")
 
     def _draw(self) -> Viewpoint | None:
-        rng = self._rng
-        t_s = float(rng.uniform(0, self._seconds))
+        rng, t_s, mover = self._rng, self._time_s, self.seat
         draw = rng.random()
-        without, height = 0, float(rng.uniform(*(_USUAL_HEIGHT_M if rng.random() < 0.7 else _HEIGHT_M)))
-        if draw < 0.35 or (draw < 0.7 and not self._seats):
+        height = float(rng.uniform(*(_USUAL_HEIGHT_M if rng.random() < 0.7 else _HEIGHT_M)))
+        if draw < 0.35 or (draw < 0.7 and mover is None):
             place = track_function(self._world.layout.ego.track)(np.array([t_s]))[0]
-        elif draw < 0.7:
-            mover = self._near_seat(t_s)
+        elif draw < 0.7 and mover is not None:
             length, _, tall = mover.box.size_m
             place = mover.places(np.array([t_s]))[0]
             place[:2] += _CAMERA_AHEAD * length * np.array([np.cos(place[2]), np.sin(place[2])])
-            without, height = mover.instance, float(np.clip(rng.uniform(0.68, 0.9) * tall, *_HEIGHT_M))
+            height = float(np.clip(rng.uniform(0.68, 0.9) * tall, *_HEIGHT_M))
         else:
-            place = self._beside(t_s)
-        if not self._free(place, t_s, without):
+            place = self._beside()
+        if not self._free(place):
             return None
         ahead = rng.random() < 2 / 3
         size = _SIZES[int(rng.choice(len(_SIZES), p=_SIZE_SHARE))]
@@ -104,31 +105,32 @@ class Viewpoints:
         turn = float(rng.normal(0, 0.04)) if ahead else float(rng.uniform(-np.pi, np.pi))
         pose = self._pose(place, turn, height, lens, plumb=draw >= 0.7)
         track = [TrackPoint(0.0, float(place[0]), float(place[1]), float(place[2]))]
-        return Viewpoint(t_s, pinhole(lens, size).at(pose), lens, Ego(track, height), without)
+        return Viewpoint(t_s, pinhole(lens, size).at(pose), lens, Ego(track, height))
 
-    def _near_seat(self, t_s: float) -> Mover:
+    def _near_seat(self) -> Mover:
         """One of the moving cars, rather a near one than a far one."""
-        rng, here = self._rng, track_function(self._world.layout.ego.track)(np.array([t_s]))[0]
-        places = np.array([m.places(np.array([t_s]))[0] for m in self._seats])
+        rng, time = self._rng, np.array([self._time_s])
+        here = track_function(self._world.layout.ego.track)(time)[0]
+        places = np.array([m.places(time)[0] for m in self._seats])
         weight = np.exp(-np.linalg.norm(places[:, :2] - here[:2], axis=1) / 20.0) + 1e-9
         return self._seats[int(rng.choice(len(self._seats), p=weight / weight.sum()))]
 
-    def _beside(self, t_s: float) -> Float[np.ndarray, "3"]:
+    def _beside(self) -> Float[np.ndarray, "3"]:
         """Anywhere across the road and its sidewalks, looking along it or back."""
         rng = self._rng
-        x, y, yaw = track_function(self._world.layout.ego.track)(np.array([t_s]))[0]
+        x, y, yaw = track_function(self._world.layout.ego.track)(np.array([self._time_s]))[0]
         left, along = float(rng.uniform(-_KERB_M, _KERB_M)), float(rng.uniform(-8, 25))
         x, y = x + along * np.cos(yaw) - left * np.sin(yaw), y + along * np.sin(yaw) + left * np.cos(yaw)
         return np.array([x, y, yaw + np.pi * (rng.random() < 0.4)])
 
-    def _free(self, place: np.ndarray, t_s: float, without: int) -> bool:
+    def _free(self, place: np.ndarray) -> bool:
         """Whether nothing else stands there."""
         if len(self._firm.query(shapely.Point(place[:2]), predicate="intersects")):
             return False
         for mover in self._world.movers:
-            if mover.instance == without:
+            if mover is self.seat:
                 continue
-            x, y, yaw = mover.places(np.array([t_s]))[0]
+            x, y, yaw = mover.places(np.array([self._time_s]))[0]
             cos, sin = np.cos(yaw), np.sin(yaw)
             dx, dy = place[0] - x, place[1] - y
             length, width, _ = mover.box.size_m
@@ -145,14 +147,14 @@ class Viewpoints:
         pose[2, 3] += height_m
         return pose
 
-    def _open(self, camera: Camera, moment: Moment) -> bool:
+    def _open(self, camera: Camera) -> bool:
         """Whether the picture is neither blocked by what is near nor almost all sky."""
         small = camera.resized(*_COARSE)
         rays = small.rays().reshape(-1, 3) @ camera.world_from_camera[:3, :3].T
         centre = camera.world_from_camera[:3, 3]
         depth = np.minimum(
             self._world.standing.first_hits(centre, rays).distance,
-            moment.moving.first_hits(centre, rays).distance,
+            self.moment.moving.first_hits(centre, rays).distance,
         )
         sky, close, near = np.isinf(depth).mean(), (depth < 1.6).mean(), (depth < 5.0).mean()
         return bool(sky < 0.72 and close < 0.2 and near < 0.6)

@@ -90,7 +90,7 @@ def draw_street(seed: int, options: StreetOptions) -> Layout:
 
 
 def _queued(kind: Kind) -> Kind:
-    """A kind of street as narrow as it takes to be full of vehicles, without junctions that would part them."""
+    """A kind of street as narrow as it takes to be full of vehicles, without junctions that part them."""
     middles: dict[Middle, float] = {"dashed": 0.3, "solid": 0.7}
     return replace(
         kind, lanes=(2, 3), one_way=0.0, lane_m=(2.9, 3.1), middles=middles, block_m=None, walkers=(0, 8)
