@@ -19,6 +19,8 @@ _PITCH, _ROLL = np.deg2rad((2.0, 12.0)), np.deg2rad((0.5, 5.0))
 _HEIGHT_M, _USUAL_HEIGHT_M = (0.8, 3.0), (1.1, 1.7)
 _CAMERA_AHEAD = 0.13  # of a car's length from its middle to the camera behind its windscreen
 _KERB_M = 9.0
+_OFF_STREET_M = 1.5
+_LEAST_STREET = 0.06
 _TRIES, _TRIES_AT_ONCE = 60, 12
 _COARSE = (32, 18)
 
@@ -65,6 +67,9 @@ class Viewpoints:
         firm += [shapely.LineString(b.points).buffer(0.6) for b in layout.barriers]
         firm += [shapely.Point(p.at_m).buffer(1.2 if p.kind == "tree" else 0.7) for p in layout.props]
         self._firm = shapely.STRtree(firm)
+        street = [shapely.Polygon(area.polygon, area.holes) for area in layout.areas if area.kind != "grass"]
+        self._street = shapely.union_all(street)
+        shapely.prepare(self._street)
         self._seats = [m for m in world.movers if m.moving and m.box.kind in ("car", "van", "truck", "bus")]
         self.move_on()
 
@@ -125,7 +130,10 @@ class Viewpoints:
 
     def _free(self, place: np.ndarray) -> bool:
         """Whether nothing else stands there."""
-        if len(self._firm.query(shapely.Point(place[:2]), predicate="intersects")):
+        here = shapely.Point(place[:2])
+        if len(self._firm.query(here, predicate="intersects")) or not shapely.dwithin(
+            self._street, here, _OFF_STREET_M
+        ):
             return False
         for mover in self._world.movers:
             if mover is self.seat:
@@ -148,7 +156,7 @@ class Viewpoints:
         return pose
 
     def _open(self, camera: Camera) -> bool:
-        """Whether the picture is neither blocked by what is near nor almost all sky."""
+        """Whether the picture shows some street, and is neither blocked nor almost all sky."""
         small = camera.resized(*_COARSE)
         rays = small.rays().reshape(-1, 3) @ camera.world_from_camera[:3, :3].T
         centre = camera.world_from_camera[:3, 3]
@@ -156,5 +164,9 @@ class Viewpoints:
             self._world.standing.first_hits(centre, rays).distance,
             self.moment.moving.first_hits(centre, rays).distance,
         )
+        seen = np.isfinite(depth)
+        points = centre + depth[seen, None] * rays[seen]
+        low = np.abs(points[:, 2] - self._world.hills.height_m(points[:, :2])) < 0.3
+        street = (shapely.contains_xy(self._street, points[:, :2]) & low).sum() / len(depth)
         sky, close, near = np.isinf(depth).mean(), (depth < 1.6).mean(), (depth < 5.0).mean()
-        return bool(sky < 0.72 and close < 0.2 and near < 0.6)
+        return bool(street > _LEAST_STREET and sky < 0.72 and close < 0.2 and near < 0.6)
