@@ -123,7 +123,8 @@ class World:
             if mover.instance != without
         ]
         poses = self.poses(t_s)
-        owner = np.repeat([number for number, _ in parts], [len(mesh) for _, mesh in parts])
+        numbers = np.array([number for number, _ in parts], dtype=np.int64)
+        owner = np.repeat(numbers, [len(mesh) for _, mesh in parts])
         mesh = Mesh.joined([mesh.moved(poses[number]) for number, mesh in parts])
         return Moment(t_s, Solid(mesh, owner, self._device), poses)
 

@@ -42,6 +42,8 @@ KINDS: dict[BoxKind, str] = {
     "truck": "truck",
     "bicycle": "bicycle",
     "pedestrian": "pedestrian",
+    "bus": "bus",
+    "motorcycle": "motorcycle",
 }
 _UNIT = np.array(
     [[1, -1, 0], [1, -1, 1], [-1, -1, 1], [-1, -1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1], [-1, 1, 0]]
