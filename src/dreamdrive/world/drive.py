@@ -14,7 +14,7 @@ from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.layout import BENCHMARK_EDITION, Ego, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world.mesh import pitched, upright
-from dreamdrive.world.render import WorldView, look
+from dreamdrive.world.render import WorldView, picture_of
 from dreamdrive.world.streets import StreetOptions, draw_street
 from dreamdrive.world.world import World
 
@@ -217,7 +217,7 @@ def _looks(
 
     def one(k: int) -> WorldView:
         following = float(next_times_s[k]), next_cameras[k]
-        return look(world, world.at(float(times_s[k])), cameras[k], following, antialiased=antialiased)
+        return picture_of(world, world.at(float(times_s[k])), cameras[k], following, antialiased=antialiased)
 
     yield one(0)  # what is made on first use is made once
     with ThreadPoolExecutor(2) as pool:

@@ -27,7 +27,7 @@ class Evidence:
     detected: tuple[str, ...]  # sentences for the report
 
 
-def look(clip: Clip) -> Evidence:
+def observe(clip: Clip) -> Evidence:
     """Measure motion and find fixed regions at 320 px width."""
     camera, (width, height) = clip.rig[0], clip.size
     size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
