@@ -15,6 +15,7 @@ from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
+from dreamdrive.cli.look import look
 from dreamdrive.cli.machine import Terminated
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
@@ -23,6 +24,7 @@ from dreamdrive.errors import InputError
 
 COMMANDS = {
     "generate": generate,
+    "look": look,
     "render": render,
     "export": export,
     "clean": clean,
