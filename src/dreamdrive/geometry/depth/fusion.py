@@ -7,7 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from dreamdrive.geometry.depth.contact import on_the_road
+from dreamdrive.geometry.depth.view import View, by_frame
 from dreamdrive.geometry.options import FusionOptions
+from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 _PAVED = (StreetClass.ROAD, StreetClass.MARKING)
@@ -15,9 +17,11 @@ _GROUND = (*_PAVED, StreetClass.GROUND)
 _NEAREST_M, _FARTHEST_M = 0.5, 500.0
 _FAR_INVERSE = 1 / 150  # 1/m; farther away stereo anchors nothing
 _ROAD_INVERSE = 1 / 150
+_USUAL_HEIGHT_M = 1.5  # of a camera above the road
 _FEW = 50  # sure pixels, from which on the network can be aligned
 _ODD = 1.0  # of log depth: a pixel that far from all others anchors nothing
 _COARSE = 0.12  # of the image width
+_TRUSTED = 0.03  # spread of a depth that is as good as sure stereo
 _PRIOR = 0.03  # weight of the coarser ratio against that of sure pixels
 
 
@@ -36,11 +40,48 @@ class Seen:
         return (self.instances > 0) | np.isin(self.classes, ROAD_USERS)
 
 
+def fused(
+    view: View,
+    look: Look,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    """Inverse depth in 1/m, trust in it, and its relative spread, of every used frame.
+
+    Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
+    """
+
+    height_m = _USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
+
+    def one(frame: int) -> Fused:
+        return fuse(
+            Seen(
+                look.depth[frame] * np.float32(height_m),
+                look.spread[frame],
+                look.classes[frame],
+                look.instances[frame],
+            ),
+            inverse[frame],
+            confidence[frame],
+            view.plane_inverse[frame],
+            view.usable[frame],
+            view.options.fusion,
+        )
+
+    found = by_frame(view, one)
+    maps = tuple(np.zeros(inverse.shape, np.float32) for _ in range(3))
+    for frame, each in found.items():
+        for whole, part in zip(maps, (each.inverse, each.confidence, each.spread), strict=True):
+            whole[frame] = part
+    return maps
+
+
 @dataclass(frozen=True)
 class Fused:
-    """Inverse depth in 1/m, 0 where there is none; the relative standard deviation of the depth, 0 there."""
+    """Inverse depth in 1/m, 0 where there is none; trust in [0, 1]; the depth's relative spread, 0 there."""
 
     inverse: Float[np.ndarray, "h w"]
+    confidence: Float[np.ndarray, "h w"]
     spread: Float[np.ndarray, "h w"]
 
 
@@ -62,7 +103,9 @@ def fuse(
     shown = usable & (seen.classes != StreetClass.SKY) & (seen.depth > 0)
     road = np.isin(seen.classes, _PAVED) & (plane_inverse > _ROAD_INVERSE) & usable
     swept, plane = _log_depth(swept_inverse), _log_depth(plane_inverse)
-    sure = np.where(shown & ~users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0)
+    sure = np.where(
+        shown & ~users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0
+    )
     weight = np.where(road & (sure == 0), 0.5, sure).astype(np.float32)
     known = np.where(sure > 0, swept, plane)
     network = np.log(np.clip(seen.depth, 1e-3, 1e6)).astype(np.float32)
@@ -82,9 +125,9 @@ def fuse(
     matched = users & shown & (confidence >= options.sure) & (np.abs(swept - log_depth) < options.user_stereo)
     log_depth[matched], spread[matched] = swept[matched], options.user_spread
     depth = np.clip(np.exp(log_depth), _NEAREST_M, _FARTHEST_M)
-    return Fused(
-        np.where(shown, 1 / depth, 0).astype(np.float32), np.where(shown, spread, 0).astype(np.float32)
-    )
+    trust = np.where(stereo & believed | matched, confidence, np.clip(_TRUSTED / spread, 0, 1))
+    maps = (np.where(shown, each, 0).astype(np.float32) for each in (1 / depth, trust, spread))
+    return Fused(*maps)
 
 
 def _log_depth(inverse: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:

@@ -1,13 +1,11 @@
 """Depth maps of neighbouring frames agree on what stands still."""
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.depth.sweep import Warp
-from dreamdrive.scene.camera import Camera
+from dreamdrive.geometry.depth.view import View, by_frame
 
 _STEPS = (-4, -2, -1, 1, 2, 4)
 """Neighbours asked, in used frames."""
@@ -15,10 +13,23 @@ _ALIKE = 0.4  # of log depth: farther apart two maps show different things
 _LEAST_SPREAD = 0.01
 
 
-def settled(
+def settled_in_time(
+    view: View,
+    inverse: Float[np.ndarray, "f h w"],
+    spread: Float[np.ndarray, "f h w"],
+    still: Bool[np.ndarray, "f h w"],
+) -> Float[np.ndarray, "f h w"]:
+    """Inverse depth of all frames, where what stands still has what its neighbours make of it, too."""
+    settled = inverse.copy()
+    found = by_frame(view, lambda frame: _settled(frame, view, inverse, spread, still))
+    for frame, each in found.items():
+        settled[frame] = each
+    return settled
+
+
+def _settled(
     frame: int,
-    frames: Sequence[int],
-    cameras: Sequence[Camera],
+    view: View,
     inverse: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"],
     still: Bool[np.ndarray, "f h w"],
@@ -28,7 +39,8 @@ def settled(
     A map counts by the inverse of its variance. A car is put on the road far better from nearby than from
     afar, so that the frames that come close to it decide.
     """
-    at = list(frames).index(frame)
+    frames, cameras = view.frames, view.cameras
+    at = frames.index(frame)
     others = [frames[at + step] for step in _STEPS if 0 <= at + step < len(frames)]
     shift = [np.zeros(inverse.shape[1:], np.float32)]
     weight = [np.where(inverse[frame] > 0, 1 / np.maximum(spread[frame], _LEAST_SPREAD) ** 2, 0)]
