@@ -50,7 +50,6 @@ def fused(
 
     Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
     """
-
     height_m = _USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
 
     def one(frame: int) -> Fused:
