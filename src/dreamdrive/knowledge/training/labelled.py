@@ -19,11 +19,17 @@ from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 ROAD_OR_MARKING = 32
+FLOOR = 33
 ROAD_USER = 34
 ROADSIDE = 35
 OFF_ROAD = 36
-CLASSES = {**{c.name.lower(): int(c) for c in StreetClass}, "roadside": ROADSIDE, "void": UNKNOWN}
-"""The names of classes in a file. ``roadside`` is structure, vegetation or pole; ``void`` is not known."""
+CLASSES = {
+    **{c.name.lower(): int(c) for c in StreetClass},
+    "floor": FLOOR,
+    "roadside": ROADSIDE,
+    "void": UNKNOWN,
+}
+"""The names of classes in a file. ``floor`` is road, marking or other ground, ``roadside`` is structure, vegetation or pole; ``void`` is not known."""
 MASK_COLOURS = {
     (0x40, 0x20, 0x20): int(StreetClass.ROAD),
     (0xFF, 0x00, 0x00): int(StreetClass.MARKING),
