@@ -23,13 +23,13 @@ FLOOR = 33
 ROAD_USER = 34
 ROADSIDE = 35
 OFF_ROAD = 36
-CLASSES = {
-    **{c.name.lower(): int(c) for c in StreetClass},
+CLASSES = {c.name.lower(): int(c) for c in StreetClass} | {
     "floor": FLOOR,
     "roadside": ROADSIDE,
     "void": UNKNOWN,
 }
-"""The names of classes in a file. ``floor`` is road, marking or other ground, ``roadside`` is structure, vegetation or pole; ``void`` is not known."""
+"""The names of classes in a file. ``floor`` is road, marking or other ground, ``roadside`` is structure,
+vegetation or pole; ``void`` is not known."""
 MASK_COLOURS = {
     (0x40, 0x20, 0x20): int(StreetClass.ROAD),
     (0xFF, 0x00, 0x00): int(StreetClass.MARKING),
