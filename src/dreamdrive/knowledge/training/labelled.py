@@ -39,6 +39,9 @@ MASK_COLOURS = {
 }
 """Colours of comma10k's masks."""
 
+UNDERFOOT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND, FLOOR)
+"""What road users stand on."""
+
 Point = tuple[float, float]
 
 
@@ -278,11 +281,7 @@ def _depth(
         if shape.foot is not None:
             foot = np.array(sorted(shape.foot)) * (height / picture.size[1])
             contact_rows = np.interp(columns, foot[:, 0], foot[:, 1]).round().astype(int)
-        elif bottom + 1 < height and labels[bottom + 1, columns[rows == bottom][0]] in (
-            StreetClass.ROAD,
-            StreetClass.MARKING,
-            StreetClass.GROUND,
-        ):
+        elif bottom + 1 < height and labels[bottom + 1, columns[rows == bottom][0]] in UNDERFOOT:
             contact_rows = np.full(len(rows), bottom)
         else:
             continue
