@@ -19,11 +19,17 @@ from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 ROAD_OR_MARKING = 32
+FLOOR = 33
 ROAD_USER = 34
 ROADSIDE = 35
 OFF_ROAD = 36
-CLASSES = {**{c.name.lower(): int(c) for c in StreetClass}, "roadside": ROADSIDE, "void": UNKNOWN}
-"""The names of classes in a file. ``roadside`` is structure, vegetation or pole; ``void`` is not known."""
+CLASSES = {c.name.lower(): int(c) for c in StreetClass} | {
+    "floor": FLOOR,
+    "roadside": ROADSIDE,
+    "void": UNKNOWN,
+}
+"""The names of classes in a file. ``floor`` is road, marking or other ground, ``roadside`` is structure,
+vegetation or pole; ``void`` is not known."""
 MASK_COLOURS = {
     (0x40, 0x20, 0x20): int(StreetClass.ROAD),
     (0xFF, 0x00, 0x00): int(StreetClass.MARKING),
@@ -32,6 +38,9 @@ MASK_COLOURS = {
     (0xCC, 0x00, 0xFF): int(StreetClass.OWN_CAR),
 }
 """Colours of comma10k's masks."""
+
+UNDERFOOT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND, FLOOR)
+"""What road users stand on."""
 
 Point = tuple[float, float]
 
@@ -52,9 +61,9 @@ class LabelledPicture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A picture and its outlines.
 
     ``size`` is width and height in pixels. ``horizon`` holds the rows at which the line of eye level crosses
-    the left and the right border. ``flat`` is false where the road rises or falls. ``group`` is the recording
-    it belongs to, by default the picture itself. ``mask`` is a picture of comma10k's classes, of which
-    outlines of road users only cut instances.
+    the left and the right border. ``flat`` is false where the road rises or falls. ``focal_px`` is the focal
+    length where it is known. ``group`` is the recording it belongs to, by default the picture itself.
+    ``mask`` is a picture of comma10k's classes, of which outlines of road users only cut instances.
     """
 
     image: str
@@ -63,6 +72,7 @@ class LabelledPicture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lens: Literal["plain", "wide", "fisheye"]
     shapes: list[Shape]
     flat: bool = True
+    focal_px: Annotated[float, Meta(gt=0)] | None = None
     group: str | None = None
     mask: str | None = None
 
@@ -83,7 +93,7 @@ class LabelledOptions:
     """Larger pictures are reduced to this: twice what the network sees, so that crops stay sharp."""
     region_band_px: int = 3
     """Left unknown on either side of a border between regions, which are drawn with few corners."""
-    marking_contrast: float = 10.0
+    marking_contrast: float = 14.0
     """Road brighter than what surrounds it by so many of 255 levels may be a marking nobody outlined."""
     marking_width_px: int = 17
     """Brighter things on the road are wider than a marking from here."""
@@ -130,10 +140,10 @@ def _write(
     image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     mask = None if picture.mask is None else _mask_labels(_read(data_dir / picture.mask), size)
     painted, instances = _paint(picture.shapes, scale, size, mask)
+    unknown = _bands(painted, instances, options) if mask is None else painted == UNKNOWN
     depth_m = None
     if picture.horizon is not None and picture.flat and picture.lens == "plain":
-        depth_m = _depth(picture, painted, instances, options)
-    unknown = _bands(painted, instances, options) if mask is None else painted == UNKNOWN
+        depth_m = _depth(picture, painted, instances, unknown, options)
     instances = np.where(unknown | ((painted == ROAD_USER) & (instances == 0)), UNKNOWN, instances)
     shown = np.where(unknown, UNKNOWN, painted)
     if mask is None:
@@ -157,6 +167,7 @@ def _write(
         group=picture.group or picture.image,
         labels=names[1],
         depth=None if depth_m is None else names[2],
+        focal_px=None if picture.focal_px is None else picture.focal_px * scale,
         horizon_px=horizon_px,
         roll_rad=roll_rad,
         distorted=picture.lens != "plain",
@@ -235,7 +246,7 @@ def _bands(
 
 def _bright(image: UInt8[np.ndarray, "y x 3"], options: LabelledOptions) -> Bool[np.ndarray, "y x"]:
     """Thin things brighter than what surrounds them."""
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    grey = cv2.medianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), 3)
     across = options.marking_width_px
     top_hat = cv2.morphologyEx(grey, cv2.MORPH_TOPHAT, np.ones((across, across), np.uint8))
     return cv2.dilate((top_hat > options.marking_contrast).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -245,6 +256,7 @@ def _depth(
     picture: LabelledPicture,
     labels: UInt8[np.ndarray, "y x"],
     instances: UInt8[np.ndarray, "y x"],
+    unknown: Bool[np.ndarray, "y x"],
     options: LabelledOptions,
 ) -> Float[np.ndarray, "y x"] | None:
     """Depth of the flat road, and of what stands on it, up to one factor; 0 where unknown.
@@ -269,18 +281,14 @@ def _depth(
         if shape.foot is not None:
             foot = np.array(sorted(shape.foot)) * (height / picture.size[1])
             contact_rows = np.interp(columns, foot[:, 0], foot[:, 1]).round().astype(int)
-        elif bottom + 1 < height and labels[bottom + 1, columns[rows == bottom][0]] in (
-            StreetClass.ROAD,
-            StreetClass.MARKING,
-            StreetClass.GROUND,
-        ):
+        elif bottom + 1 < height and labels[bottom + 1, columns[rows == bottom][0]] in UNDERFOOT:
             contact_rows = np.full(len(rows), bottom)
         else:
             continue
         contact_rows = np.minimum(contact_rows, height - 1)
         low = (rows > (rows.min() + bottom) / 2) & (drop[contact_rows, columns] > 0)
         depth[rows[low], columns[low]] = far[contact_rows[low], columns[low]]
-    return depth * (options.median_depth_m / np.median(depth[road]))
+    return np.where(unknown, 0.0, depth * (options.median_depth_m / np.median(depth[road])))
 
 
 def _drop(
