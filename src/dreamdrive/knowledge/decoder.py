@@ -20,16 +20,16 @@ class Context(nn.Module):
         self.row = nn.Conv2d(WIDE, WIDE, 1)
         self.column = nn.Conv2d(WIDE, WIDE, 1)
         self.whole = nn.Conv2d(WIDE, WIDE, 1)
-        # Where a place lies is told in widths from the middle, so that rows of pictures of any shape agree.
-        self.leave = ConvNorm(WIDE + 2, WIDE, 3)
+        self.place = nn.Conv2d(2, WIDE, 1)
+        self.leave = ConvNorm(WIDE, WIDE, 3)
 
     def forward(self, x: Float[Tensor, "n c h w"]) -> Tensor:
         """Apply to the encoder's last features."""
         x = self.enter(x)
         rows, columns = x.mean(dim=3, keepdim=True), x.mean(dim=2, keepdim=True)
         whole = rows.mean(dim=2, keepdim=True)
-        x = functional.relu6(x + self.row(rows) + self.column(columns) + self.whole(whole))
-        return self.leave(torch.cat([x, places(x)], dim=1))
+        told = self.row(rows) + self.column(columns) + self.whole(whole) + self.place(places(x))
+        return self.leave(functional.relu6(x + told))
 
 
 class Fuse(nn.Module):
