@@ -18,6 +18,7 @@ from dreamdrive.cli.generate import generate
 from dreamdrive.cli.machine import Terminated
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
+from dreamdrive.cli.train import train
 from dreamdrive.cli.world import world
 from dreamdrive.errors import InputError
 
@@ -29,6 +30,7 @@ COMMANDS = {
     "evaluate": evaluate,
     "world": world,
     "prior": prior,
+    "train": train,
     "doctor": doctor,
 }
 _USER_ERROR, _INTERRUPTED, _TERMINATED = 2, 130, 143

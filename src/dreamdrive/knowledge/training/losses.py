@@ -30,7 +30,7 @@ class LossOptions:
     """Share of the depth loss in camera heights without alignment, where the height is known."""
     centre: float = 0.2
     offset: float = 0.2
-    camera: float = 0.15
+    camera: float = 0.3
     distorted: float = 0.05
     taught_classes: float = 0.5
     taught_depth: float = 0.5
