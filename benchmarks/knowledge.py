@@ -1,6 +1,6 @@
 """How well the street network sees: against lidar, known cameras, and the truth of drawn streets.
 
-    python benchmarks/knowledge.py [street|FILE] [--parts lidar kitti cameras drawn] [--json FILE]
+    python benchmarks/knowledge.py [street|FILE] [--parts lidar kitti cameras drawn cost] [--json FILE]
 
 Depth is up to one factor a picture, the median ratio over all points at 2 to 80 m; errors are means over
 pictures, then over cameras. The baseline is a level road below the known camera with a wall at 40 m, through
@@ -9,11 +9,13 @@ also training material: what was trained on them must not be judged by them.
 """
 
 import sys
+import time
 from typing import Any
 
 import numpy as np
 
 from common.machine import describe_machine
+from common.memory import peak_bytes, resident_bytes
 from common.options import parser_of
 from common.report import as_json, write
 from dreamdrive.knowledge import LookOptions, load_knowledge, look
@@ -23,8 +25,9 @@ from knowledge.drawn import judge_drawn
 from knowledge.lidar import Seen, judge, plane_and_backdrop
 from knowledge.shots import Shot, kitti, pandaset
 
-PARTS = ("lidar", "kitti", "cameras", "drawn")
+PARTS = ("lidar", "kitti", "cameras", "drawn", "cost")
 WIDTH_PX = LookOptions().width_px
+FRAMES = 48
 SHOTS = {"lidar": pandaset, "kitti": kitti}
 
 
@@ -56,6 +59,8 @@ def main() -> int:
             report["cameras"] = cameras(see)
         if "drawn" in args.parts:
             report["drawn"] = judge_drawn(args.edition, args.seeds, see)
+        if "cost" in args.parts:
+            report["cost"] = cost(see)
     write(args.json, as_json(report))
     print(as_json(report), end="")
     return 0
@@ -77,6 +82,16 @@ def cameras(see: See) -> dict[str, Any]:
         "horizon_error_deg": float(np.mean([row["horizon_error_deg"] for row in levels])),
         "rows": rows,
     }
+
+
+def cost(see: See) -> dict[str, float]:
+    """Seconds a frame of 480x270, all in, and the most memory that many of them take, in MB."""
+    rng = np.random.default_rng(0)
+    frames = rng.integers(0, 255, (FRAMES, 270, 480, 3), np.uint8)
+    see(frames[:2])
+    before, started = resident_bytes(), time.perf_counter()
+    peak = peak_bytes(lambda: see(frames))
+    return {"seconds": (time.perf_counter() - started) / FRAMES, "peak_mb": (peak - before) / 1e6}
 
 
 if __name__ == "__main__":

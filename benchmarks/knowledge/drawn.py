@@ -13,7 +13,7 @@ from knowledge.lidar import FAR_M, NEAR_M, relative_errors
 
 SIZE = 480, 270
 FRAMES, FPS = 3, 1.0
-_ALIKE = {
+ALIKE = {
     StreetClass.SKY: ("SKY",),
     StreetClass.ROAD: ("ROAD",),
     StreetClass.MARKING: ("MARKING",),
@@ -32,7 +32,7 @@ _FOV_SHARE = 0.15
 def street_classes(semantic: UInt8[np.ndarray, "*n"]) -> UInt8[np.ndarray, "*n"]:
     """Classes of a drawn street as the network has them."""
     table = np.zeros(len(Semantic), np.uint8)
-    for kind, names in _ALIKE.items():
+    for kind, names in ALIKE.items():
         table[[Semantic[name] for name in names]] = kind
     return table[semantic]
 
