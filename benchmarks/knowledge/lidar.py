@@ -56,6 +56,7 @@ class _Sums:
     vehicle_depth: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     vehicles: Found = field(default_factory=Found)
     people: Found = field(default_factory=Found)
+    classified: bool = False
 
 
 def judge(shots: Iterable[Shot], see: Callable[[Shot], Seen]) -> dict[str, Any]:
@@ -77,6 +78,7 @@ def judge(shots: Iterable[Shot], see: Callable[[Shot], Seen]) -> dict[str, Any]:
         if (near & of_vehicle).sum() >= LEAST_POINTS:
             sums.vehicle_depth[shot.camera].append(float(errors[near & of_vehicle].mean()))
         if classes is not None:
+            sums.classified = True
             seen = classes[at][near]
             sums.vehicles.add(of_vehicle[near], seen == StreetClass.VEHICLE)
             riding = np.isin(seen, (StreetClass.PERSON, StreetClass.TWO_WHEELER))
@@ -87,8 +89,14 @@ def judge(shots: Iterable[Shot], see: Callable[[Shot], Seen]) -> dict[str, Any]:
         "abs_rel_of_cameras": _means(sums.depth),
         "vehicle_abs_rel": _mean(sums.vehicle_depth),
         "vehicle_abs_rel_of_cameras": _means(sums.vehicle_depth),
-        "vehicles": sums.vehicles.figures(),
-        "people_and_two_wheelers": sums.people.figures(),
+        **(
+            {}
+            if not sums.classified
+            else {
+                "vehicles": sums.vehicles.figures(),
+                "people_and_two_wheelers": sums.people.figures(),
+            }
+        ),
     }
 
 
@@ -97,7 +105,7 @@ def relative_errors(
 ) -> Float[np.ndarray, " n"]:
     """Relative errors after one factor, the median ratio over what counts; no depth is as far as it gets."""
     known = counted & (depth > 0)
-    factor = np.median(true_m[known] / depth[known])
+    factor = np.median(true_m[known] / depth[known]) if known.any() else 1.0
     scaled = np.where(depth > 0, depth * factor, FAR_M).clip(NEAR_M, FAR_M)
     return np.abs(scaled - true_m) / true_m
 

@@ -5,7 +5,7 @@ from math import degrees, exp
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Shaped, UInt8
 
 from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.street_class import StreetClass
@@ -31,10 +31,12 @@ _NEAR, _FAR = 1.5, 60.0
 """Camera heights at the ends of the colours of depth."""
 _TICKS_M, _TICKS = (3, 5, 10, 20, 50), (2, 4, 8, 16, 40)
 _OUTLINE_RGB, _HORIZON_RGB = (255, 60, 60), (255, 220, 0)
-_WHITE = (255, 255, 255)
+_WHITE, _DARK = (255, 255, 255), 24
+_A_LINE = 6
+"""Classes in a line of the legend."""
 
 
-def draw_look(frame: UInt8[np.ndarray, "h w 3"], look: Look, index: int) -> Image:
+def draw_look(frame: UInt8[np.ndarray, "h w 3"], look: Look, index: int) -> UInt8[np.ndarray, "h2 w2 3"]:
     """Four panels: the frame with road users and horizon, depth, classes, confidence; below them the words.
 
     Args:
@@ -63,7 +65,7 @@ def draw_look(frame: UInt8[np.ndarray, "h w 3"], look: Look, index: int) -> Imag
     return np.concatenate([picture, _words(look.cameras[index], picture.shape[1])])
 
 
-def _larger(picture: Image, times: int) -> Image:
+def _larger(picture: Shaped[np.ndarray, "h w c"], times: int) -> Shaped[np.ndarray, "h2 w2 c"]:
     return np.ascontiguousarray(picture.repeat(times, axis=0).repeat(times, axis=1))
 
 
@@ -74,7 +76,8 @@ def _road_users(picture: Image, look: Look, index: int, times: int) -> Image:
         mask = (instances == number).astype(np.uint8)
         outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(picture, outlines, -1, _OUTLINE_RGB, 1)
-        _write(picture, _name(user), times * user.box_px[0], times * user.box_px[1] - 3)
+        left, top = (times * at for at in user.box_px[:2])
+        _write(picture, _name(user), left, top - 3, _letters(picture.shape[1]))
     return picture
 
 
@@ -110,22 +113,25 @@ def _ramp(picture: Image, colours: int, ticks: dict[str, float]) -> Image:
     levels = np.linspace(255, 0, height).round().astype(np.uint8)[:, None]
     shown = cv2.cvtColor(cv2.applyColorMap(levels, colours), cv2.COLOR_BGR2RGB)
     picture[:, width - bar :] = shown
+    size = _letters(width)
     for word, share in ticks.items():
         row = round((1 - share) * (height - 1))
         cv2.line(picture, (width - bar, row), (width - 1, row), _WHITE, 1)
-        _write(picture, word, width - bar - 6 - 7 * len(word), row + 4)
+        (across, up), _ = cv2.getTextSize(word, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+        _write(picture, word, width - bar - across - 6, row + up // 2, size)
     return picture
 
 
 def _words(camera: CameraEstimate, width: int) -> Image:
     """A legend of the classes and what the frame says of the camera."""
-    size = width // 6
-    strip = np.full((20 * (1 + -(-len(StreetClass) // 6)) + 10, width, 3), 24, np.uint8)
-    _write(strip, _camera_words(camera), 6, 16)
+    size = _letters(width // 2)
+    line = round(53 * size)
+    strip = np.full((line * (2 + -(-len(StreetClass) // _A_LINE)), width, 3), _DARK, np.uint8)
+    _write(strip, _camera_words(camera), line // 3, line, size)
     for place, each in enumerate(StreetClass):
-        left, top = size * (place % 6) + 6, 28 + 20 * (place // 6)
-        cv2.rectangle(strip, (left, top), (left + 14, top + 12), COLOURS[each], -1)
-        _write(strip, each.name.lower().replace("_", " "), left + 20, top + 11)
+        left, top = width // _A_LINE * (place % _A_LINE), line * (2 + place // _A_LINE)
+        cv2.rectangle(strip, (left + 8, top - line // 2), (left + line, top), COLOURS[each], -1)
+        _write(strip, each.name.lower().replace("_", " "), left + line + 6, top, size)
     return strip
 
 
@@ -140,10 +146,15 @@ def _camera_words(camera: CameraEstimate) -> str:
     )
 
 
-def _write(picture: Image, text: str, x: int, y: int) -> None:
-    """Small white letters on a dark box, inside the picture."""
-    (across, up), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)
+def _letters(width: int) -> float:
+    """Size of letters in a panel of a width: a scale of OpenCV's."""
+    return max(0.38, width / 1400)
+
+
+def _write(picture: Image, text: str, x: int, y: int, size: float) -> None:
+    """White letters on a dark box, inside the picture."""
+    (across, up), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
     x = min(max(x, 2), max(2, picture.shape[1] - across - 2))
     y = min(max(y, up + 2), picture.shape[0] - below)
-    cv2.rectangle(picture, (x - 2, y - up - 2), (x + across + 1, y + below - 1), (24, 24, 24), -1)
-    cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, _WHITE, 1, cv2.LINE_AA)
+    cv2.rectangle(picture, (x - 2, y - up - 2), (x + across + 1, y + below - 1), (_DARK,) * 3, -1)
+    cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, _WHITE, 1, cv2.LINE_AA)
