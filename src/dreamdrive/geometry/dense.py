@@ -21,7 +21,14 @@ from dreamdrive.geometry.depth import (
     temporal_neighbours,
     unheard,
 )
-from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence, whole_users
+from dreamdrive.geometry.moving import (
+    FLAGGED,
+    PairFlow,
+    moving_evidence,
+    neighbour_flows,
+    standing_evidence,
+    whole_users,
+)
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
@@ -78,15 +85,17 @@ def densify(
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
         if look is not None and not given:
             inverse, confidence, spread = fused(view, look, inverse, confidence)
+        flows: dict[int, list[PairFlow]] = {}
         if posed.standing:
             moving = standing_evidence(view)
         elif posed.fallback is not None:
             moving = np.zeros(inverse.shape, np.float32)
         else:
-            moving = moving_evidence(view, inverse, sky, given)
+            flows = neighbour_flows(view)
+            moving = moving_evidence(view, flows, inverse, sky, given)
         moving = moving * ~sky
-        if look is not None:
-            moving = whole_users(moving, look)
+        if look is not None and spread is not None:
+            moving = whole_users(view, look, flows, moving, inverse, spread, clip.times_s)
         if spread is not None:
             inverse = settled_in_time(view, inverse, spread, moving < FLAGGED)
         elif not given:
