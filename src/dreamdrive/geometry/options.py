@@ -116,8 +116,8 @@ class UserOptions:
     Attributes:
         sure: Trust in a class from which on a pixel is believed to be no road user.
         moving_share: Flagged part of a road user's pixels, over all its frames, from which on it moves.
-        moving_m_s: Speed of its foot over the map, from which on it moves: oncoming traffic agrees with stereo.
-            Parked cars, of which another part is seen from each place, come to 1.6 to 3.6 m/s.
+        moving_m_s: Speed of its foot over the map, from which on it moves: oncoming traffic agrees with
+            stereo. Parked cars, of which another part is seen from each place, come to 1.6 to 3.6 m/s.
     """
 
     sure: float = 0.8
