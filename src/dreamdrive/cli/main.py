@@ -19,6 +19,7 @@ from dreamdrive.cli.look import look
 from dreamdrive.cli.machine import Terminated
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
+from dreamdrive.cli.train import train
 from dreamdrive.cli.world import world
 from dreamdrive.errors import InputError
 
@@ -31,6 +32,7 @@ COMMANDS = {
     "evaluate": evaluate,
     "world": world,
     "prior": prior,
+    "train": train,
     "doctor": doctor,
 }
 _USER_ERROR, _INTERRUPTED, _TERMINATED = 2, 130, 143

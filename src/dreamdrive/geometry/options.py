@@ -49,6 +49,38 @@ class DepthOptions:
 
 
 @dataclass(frozen=True)
+class FusionOptions:
+    """Who is believed where stereo, the road and the street network all say something of a pixel's depth.
+
+    Spreads are relative standard deviations of the depth.
+
+    Attributes:
+        sure: Confidence from which swept depth counts, and the network is aligned to it.
+        hinted: Confidence from which it counts where it is near the aligned depth.
+        sure_spreads: Spreads of the aligned depth beyond which even sure stereo is not believed.
+        hinted_spreads: Spreads within which hinted stereo is.
+        reach: Part of the image width over which the network's scale is carried from sure pixels.
+        stereo_spread: Of stereo that is believed, and of the road.
+        least_spread: Of the network, at least.
+        contact_spread: Of the depth of a road user that its contact with the road gives, beside that of the
+            row in which it is seen.
+        user_stereo: Log depth by which sure stereo on a road user may differ from its contact.
+        user_spread: Of such stereo.
+    """
+
+    sure: float = 0.5
+    hinted: float = 0.15
+    sure_spreads: float = 4.0
+    hinted_spreads: float = 1.5
+    reach: float = 0.05
+    stereo_spread: float = 0.02
+    least_spread: float = 0.05
+    contact_spread: float = 0.06
+    user_stereo: float = 0.12
+    user_spread: float = 0.05
+
+
+@dataclass(frozen=True)
 class MovingOptions:
     """When pixels count as moving.
 
@@ -90,6 +122,7 @@ class GeometryOptions:
         gate: When structure from motion is believed.
         depth: How the plane sweep finds depth.
         moving: When pixels count as moving.
+        fusion: What is believed where the street network speaks, too.
     """
 
     method: str = "classical"
@@ -99,6 +132,7 @@ class GeometryOptions:
     gate: GateOptions = field(default_factory=GateOptions)
     depth: DepthOptions = field(default_factory=DepthOptions)
     moving: MovingOptions = field(default_factory=MovingOptions)
+    fusion: FusionOptions = field(default_factory=FusionOptions)
 
     def __post_init__(self) -> None:
         height_m = self.camera_height_m

@@ -2,4 +2,5 @@
 
 from dreamdrive.knowledge.files import MARK, write_look
 from dreamdrive.knowledge.look import LookOptions, Network, look
-from dreamdrive.knowledge.shipped import SHIPPED, load_knowledge
+from dreamdrive.knowledge.of_clip import look_at, with_looks
+from dreamdrive.knowledge.shipped import NO_KNOWLEDGE, SHIPPED, load_knowledge, weights_of

@@ -20,16 +20,16 @@ class Context(nn.Module):
         self.row = nn.Conv2d(WIDE, WIDE, 1)
         self.column = nn.Conv2d(WIDE, WIDE, 1)
         self.whole = nn.Conv2d(WIDE, WIDE, 1)
-        # Where a place lies is told in widths from the middle, so that rows of pictures of any shape agree.
-        self.leave = ConvNorm(WIDE + 2, WIDE, 3)
+        self.place = nn.Conv2d(2, WIDE, 1)
+        self.leave = ConvNorm(WIDE, WIDE, 3)
 
     def forward(self, x: Float[Tensor, "n c h w"]) -> Tensor:
         """Apply to the encoder's last features."""
         x = self.enter(x)
         rows, columns = x.mean(dim=3, keepdim=True), x.mean(dim=2, keepdim=True)
         whole = rows.mean(dim=2, keepdim=True)
-        x = functional.relu6(x + self.row(rows) + self.column(columns) + self.whole(whole))
-        return self.leave(torch.cat([x, places(x)], dim=1))
+        told = self.row(rows) + self.column(columns) + self.whole(whole) + self.place(places(x))
+        return self.leave(functional.relu6(x + told))
 
 
 class Fuse(nn.Module):
@@ -46,7 +46,11 @@ class Fuse(nn.Module):
 
 
 class CameraVotes(nn.Module):
-    """The camera by votes of all places; each tells how far above or below itself the horizon lies."""
+    """The camera by votes of all places.
+
+    Each tells how far above or below itself the horizon crosses its column, so that a line through the votes
+    has the height and the roll; a tilt that a place sees itself is added.
+    """
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -58,10 +62,11 @@ class CameraVotes(nn.Module):
         """Means, logarithms of standard deviations and a logit, see ``Prediction.camera``."""
         said = self.votes(self.enter(x)).float()
         value, trust, spread, distorted = said.flatten(2).split([3, 3, 3, 1], dim=1)
-        down = places(x)[:, 1:].float().flatten(2)
-        value = value + torch.cat([torch.zeros_like(down), down, torch.zeros_like(down)], dim=1)
+        across, down = places(x).float().flatten(2).unbind(dim=1)
         share = trust.softmax(dim=2)
         mean, spread = (share * value).sum(dim=2), (share * spread).sum(dim=2)
+        horizon, tilt = line_through(across, down + value[:, 1], share[:, 1])
+        mean = torch.stack([mean[:, 0], horizon, mean[:, 2] - tilt], dim=1)
         # A start near what cameras are: 60 degrees across, level, known to 0.3, 0.1 and 0.05.
         start = said.new_tensor([-0.15, 0.0, 0.0]), said.new_tensor([-1.2, -2.3, -3.0])
         spread = start[1] + 4 * torch.tanh(spread / 4)
@@ -97,6 +102,16 @@ class Decoder(nn.Module):
         kept = self.eight(x, eight)
         x = self.four[1](self.four[0](kept, four))
         return self.maps(self.two(self.narrow(x), two)), self.users(x), camera, kept
+
+
+def line_through(
+    across: Float[Tensor, "n k"], down: Float[Tensor, "n k"], share: Float[Tensor, "n k"]
+) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
+    """Height in the middle column and slope of the line through weighted places; shares sum to 1."""
+    x, y = ((share * each).sum(dim=1, keepdim=True) for each in (across, down))
+    spread = (share * (across - x) ** 2).sum(dim=1) + 1e-3
+    slope = (share * (across - x) * (down - y)).sum(dim=1) / spread
+    return y[:, 0] - slope * x[:, 0], slope
 
 
 def places(x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n 2 h w"]:

@@ -6,6 +6,7 @@ Tan and Le 2019, table 1; Lite0 has no squeeze-and-excitation and ReLU6 for swis
 import re
 from pathlib import Path
 
+import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
@@ -54,7 +55,13 @@ class ConvNorm(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Apply to (n, channels, h, w)."""
-        x = self.norm(self.conv(x))
+        if self.conv.groups > 1 and self.conv.stride != (1, 1) and torch.is_autocast_enabled(x.device.type):
+            # In bfloat16 their gradient takes a hundred times as long on the CPU.
+            with torch.autocast(x.device.type, enabled=False):
+                x = self.conv(x.float()).to(x.dtype)
+        else:
+            x = self.conv(x)
+        x = self.norm(x)
         return functional.relu6(x, inplace=True) if self.bends else x
 
     def fold(self) -> None:

@@ -32,7 +32,9 @@ class StreetNetwork(nn.Module):
             raise ValueError(f"pictures of {tuple(pictures.shape)}, expected sides of multiples of 32 pixels")
         pictures = pictures.contiguous(memory_format=torch.channels_last)
         maps, users, camera, kept = self.decoder(self.encoder(pictures))
-        maps, users = maps.float(), users.float()
+        maps, users = (
+            each.float().contiguous(memory_format=torch.contiguous_format) for each in (maps, users)
+        )
         return Prediction(
             log_depth=maps[:, 0],
             log_spread=maps[:, 1].clamp(*_SPREADS),

@@ -84,6 +84,8 @@ class Geometry:
         confidence: Trust in the depth (F, H, W) in [0, 1]; 0 in sky, invalid and camera-fixed pixels.
         sky: Sky masks (F, H, W).
         moving: Evidence that a pixel belongs to something that moves (F, H, W) in [0, 1].
+        spread: Relative half width of the interval that holds the depth with 68 % (F, H, W), 0 where there is
+            none; None where nothing tells it.
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
             camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
             clip's rig (K, H, W).
@@ -115,6 +117,7 @@ class Geometry:
     fallback_kind: Fallback | None = None
     placed: int | None = None
     metres_per_unit: float | None = 1.0
+    spread: Float[np.ndarray, "f h w"] | None = None
 
     def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
         """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""

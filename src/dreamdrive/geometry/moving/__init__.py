@@ -2,3 +2,4 @@
 
 from dreamdrive.geometry.moving.evidence import FLAGGED, moving_evidence, standing_evidence
 from dreamdrive.geometry.moving.flow import pixel_grid
+from dreamdrive.geometry.moving.users import whole_users

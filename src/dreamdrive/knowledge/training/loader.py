@@ -42,7 +42,7 @@ class LoaderOptions:
     aside_share: float = 0.3
     """Cuts away from the middle, which leave the camera unknown."""
     aside_closest: float = 0.4
-    turn_share: float = 0.25
+    turn_share: float = 0.4
     turn_deg: float = 2.5
     """Standard deviation of the turn about the camera's axis."""
     continued_share: float = 0.15

@@ -87,9 +87,10 @@ def train(
     *,
     data: Mapping[str, str],
     device: torch.device,
+    publish: Callable[[int, StreetNetwork, dict[str, float]], None],
     stop: Callable[[], bool] = lambda: False,
     progress: Progress = silent,
-) -> tuple[StreetNetwork, dict[str, float]] | None:
+) -> dict[str, float] | None:
     """Train, or go on from the checkpoint of the folder.
 
     Args:
@@ -100,11 +101,12 @@ def train(
         options: How.
         data: Digests of the records, which a checkpoint has to agree with.
         device: Where.
+        publish: Given the steps done, the averaged network and its last figures, with each checkpoint.
         stop: Asked after each step; then a checkpoint is written.
         progress: Told of steps done.
 
     Returns:
-        The averaged network and its last figures, or None where it was stopped.
+        Figures of the averaged network, or None where it was stopped.
     """
     folder.mkdir(parents=True, exist_ok=True)
     trainer = Trainer(network, options, device)
@@ -128,14 +130,16 @@ def train(
         if kept_out and (done % options.validate_each == 0 or done == options.steps):
             figures = judge(trainer.averaged, kept_out)
             log.judged(done, figures)
-        if stop() or done == options.steps or time.monotonic() - saved > options.checkpoint_s:
+        stopped = done < options.steps and stop()
+        if stopped or done == options.steps or time.monotonic() - saved > options.checkpoint_s:
             save(done)
+            publish(done, trainer.averaged, figures)
             saved = time.monotonic()
-            if done < options.steps and stop():
-                return None
-    if not figures and kept_out:  # it was finished before
+        if stopped:
+            return None
+    if first == options.steps and kept_out:
         figures = judge(trainer.averaged, kept_out)
-    return trainer.averaged, figures
+    return figures
 
 
 class _Log:

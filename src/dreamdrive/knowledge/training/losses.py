@@ -30,7 +30,7 @@ class LossOptions:
     """Share of the depth loss in camera heights without alignment, where the height is known."""
     centre: float = 0.2
     offset: float = 0.2
-    camera: float = 0.15
+    camera: float = 0.3
     distorted: float = 0.05
     taught_classes: float = 0.5
     taught_depth: float = 0.5
@@ -65,8 +65,9 @@ def class_loss(
     weight = torch.tensor(weights, device=logits.device).expand(256, -1)
     weight = weight.masked_fill(~allowed, torch.inf).amin(dim=1)
     weight = weight.masked_fill(~torch.isfinite(weight), 0)[labels.long()]
-    chance = functional.log_softmax(logits.permute(0, 2, 3, 1), dim=3)
-    inside = chance.masked_fill(~allowed[labels.long()], -1e4).logsumexp(dim=3)
+    chance = functional.log_softmax(logits, dim=1)
+    outside = (~allowed).T[:, labels.long()].transpose(0, 1)
+    inside = chance.masked_fill(outside, -1e4).logsumexp(dim=1)
     return -(inside * weight).sum() / weight.sum().clamp(min=1)
 
 

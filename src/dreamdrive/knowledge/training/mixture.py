@@ -79,11 +79,15 @@ def read_entries(folders: Sequence[Path]) -> list[Entry]:
     return found
 
 
-def split(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
-    """What is trained on and what is kept out; InputError where both share a recording or street."""
+def split(entries: Sequence[Entry], judged: Sequence[Entry] = ()) -> tuple[list[Entry], list[Entry]]:
+    """What is trained on, and what is kept out with ``judged``.
+
+    Raises:
+        InputError: Both share a recording or street.
+    """
     parts = (
         [entry for entry in entries if not entry.record.kept_out],
-        [entry for entry in entries if entry.record.kept_out],
+        [*(entry for entry in entries if entry.record.kept_out), *judged],
     )
     groups = [{(each.record.source, each.record.group) for each in part} for part in parts]
     if shared := sorted(groups[0] & groups[1]):
