@@ -49,6 +49,7 @@ def main() -> int:
     }
     report["baseline"] = {part: judge(SHOTS[part](), plane_and_backdrop) for part in lidar}
     if not args.baseline:
+        report |= {"knowledge": args.knowledge, "width_px": args.width}
         network, options = load_knowledge(args.knowledge), LookOptions(width_px=args.width)
 
         def see(frames: Frames) -> Look:

@@ -88,7 +88,7 @@ def test_metres_follow_from_the_height_and_the_focal_length() -> None:
 def test_frames_see_nothing_of_each_other() -> None:
     frames = np.stack([street(), street(users=False), street()])
     told: list[tuple[int, int]] = []
-    options = LookOptions(width_px=256, batch=2, features=True)
+    options = LookOptions(width_px=256, features=True)
     seen = look(frames, reading, options=options, tell=lambda *each: told.append(each))
     assert told == [(1, 3), (2, 3), (3, 3)]
     assert seen.road_users[1] == ()

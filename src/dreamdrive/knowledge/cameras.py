@@ -11,7 +11,7 @@ from dreamdrive.knowledge.fitting import Fitting
 from dreamdrive.scene.look import CameraEstimate
 
 
-def camera_of(answer: Float[np.ndarray, "7"], fitting: Fitting) -> CameraEstimate:
+def camera_of(answer: Float[np.ndarray, " 7"], fitting: Fitting) -> CameraEstimate:
     """The camera of a picture from ``Prediction.camera``, which is about what the network took."""
     focal, horizon, roll = answer[:3].tolist()
     spread = np.exp(answer[3:6]).tolist()

@@ -1,13 +1,15 @@
 """What the street network sees in frames."""
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import log
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int, UInt8, UInt16
+from jaxtyping import Float, Int, Shaped, UInt8, UInt16
 from torch import Tensor
 
 from dreamdrive.errors import InputError
@@ -16,9 +18,11 @@ from dreamdrive.knowledge.fitting import Fitting, within_regions
 from dreamdrive.knowledge.grouping import GroupingOptions, group
 from dreamdrive.knowledge.prediction import Prediction
 from dreamdrive.knowledge.shipped import SHIPPED, load_knowledge
+from dreamdrive.machine import available_cores
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.look import Look, RoadUser
 from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.splat import one_torch_thread
 
 Network = Callable[[Float[Tensor, "n 3 h w"]], Prediction]
 """From RGB pictures in [0, 1], whose sides are multiples of 32 pixels."""
@@ -35,8 +39,6 @@ class LookOptions:
 
     width_px: int = 512
     """Width of the pictures that it takes, a multiple of 32: at 512 those of 16:9 are 288 high."""
-    batch: int = 2
-    """Pictures at a time: more take memory and no less time on two cores."""
     grouping: GroupingOptions = field(default_factory=GroupingOptions)
     features: bool = False
     """Whether what the network computes its answers from is kept."""
@@ -44,14 +46,12 @@ class LookOptions:
 
 @dataclass(frozen=True)
 class _Seen:
-    """One frame, with depth in camera heights as ``Look`` has it."""
+    """One frame, as ``Look`` has it; the camera as ``Prediction`` does."""
 
-    depth: Float[np.ndarray, "h w"]
-    spread: Float[np.ndarray, "h w"]
-    classes: UInt8[np.ndarray, "h w"]
-    confidence: Float[np.ndarray, "h w"]
-    instances: UInt16[np.ndarray, "h w"]
+    maps: dict[str, Shaped[np.ndarray, "h w"]]
     road_users: tuple[RoadUser, ...]
+    camera: Float[np.ndarray, " 7"]
+    features: Float[np.ndarray, "c h2 w2"] | None
 
 
 def look(
@@ -81,41 +81,33 @@ def look(
     count, height, width = frames.shape[:3]
     network = load_knowledge(knowledge) if isinstance(knowledge, str | Path) else knowledge
     fitting = Fitting.choose(width, height, options.width_px)
-    shape = count, height, width
-    maps = {name: np.zeros(shape, kind) for name, kind in _KINDS.items()}
-    users: list[tuple[RoadUser, ...]] = []
-    answers: list[Float[np.ndarray, 7]] = []
-    features: list[Float[np.ndarray, "c h w"]] = []
-    with torch.inference_mode():
-        for said in _answers(frames, fitting, network, options.batch):
-            seen = _seen(said, fitting, options.grouping)
-            for name, each in maps.items():
-                each[len(users)] = getattr(seen, name)
-            users.append(seen.road_users)
-            answers.append(said.camera[0].double().numpy())
-            if options.features and said.features is not None:
-                features.append(fitting.shown(said.features)[0].numpy())
-            tell(len(users), count)
-    cameras = tuple(camera_of(each, fitting) for each in answers)
+    maps = {name: np.zeros((count, height, width), kind) for name, kind in _KINDS.items()}
+    seen: list[_Seen] = []
+    for each in _see_all(frames, partial(_see, fitting=fitting, network=network, options=options)):
+        for name, values in each.maps.items():
+            maps[name][len(seen)] = values
+        seen.append(replace(each, maps={}))
+        tell(len(seen), count)
+    cameras = tuple(camera_of(each.camera, fitting) for each in seen)
     camera = common_camera(cameras)
     if focal_px is not None:
         maps["depth"] *= np.float32(focal_px / camera.focal_px)
         known = {"focal_px": focal_px, "focal_spread": 0.0}
         camera, cameras = replace(camera, **known), tuple(replace(each, **known) for each in cameras)
-    kept = np.stack(features) if features else None
+    kept = [each.features for each in seen if each.features is not None]
     return Look(
         **maps,
-        road_users=tuple(users),
+        road_users=tuple(each.road_users for each in seen),
         cameras=cameras,
         camera=camera,
         camera_height_m=camera_height_m,
-        features=kept,
+        features=np.stack(kept) if kept else None,
     )
 
 
 _KINDS = {
     "depth": np.float32,
-    # Three digits of trust are enough, and a frame takes 13 bytes a pixel.
+    # Three digits of trust are enough, and a frame takes 11 bytes a pixel.
     "spread": np.float16,
     "classes": np.uint8,
     "confidence": np.float16,
@@ -123,32 +115,46 @@ _KINDS = {
 }
 
 
-def _answers(
-    frames: UInt8[np.ndarray, "f h w 3"], fitting: Fitting, network: Network, batch: int
-) -> Iterator[Prediction]:
-    """The network's answers, one frame at a time."""
-    for first in range(0, len(frames), batch):
-        said = network(fitting.taken(frames[first : first + batch]))
-        for index in range(len(said.camera)):
-            yield said.of(index)
+def _see_all(
+    frames: UInt8[np.ndarray, "f h w 3"], see: Callable[[UInt8[np.ndarray, "h w 3"]], _Seen]
+) -> Iterator[_Seen]:
+    """What is seen in each frame, on every core at once.
+
+    Each thread has a frame to itself. Threads of torch wait for each other after every operation, and beside
+    other work on the machine a frame then took two seconds.
+    """
+    with one_torch_thread(), ThreadPoolExecutor(available_cores()) as pool:
+        try:
+            yield from pool.map(see, frames)
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
-def _seen(said: Prediction, fitting: Fitting, options: GroupingOptions) -> _Seen:
+@torch.inference_mode()
+def _see(
+    frame: UInt8[np.ndarray, "h w 3"], fitting: Fitting, network: Network, options: LookOptions
+) -> _Seen:
     """What the network says of one frame, on the frame's pixels."""
+    said = network(fitting.taken(frame[None]))
     chance, classes = torch.softmax(fitting.on_pixels(said.classes[0]), dim=0).max(dim=0)
     peaks = torch.sigmoid(fitting.shown(said.centre[0]))
     # Between two road users a mean of their offsets would point to neither.
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
-    instances, users = group(classes, chance, peaks, offset_px, options)
+    instances, users = group(classes, chance, peaks, offset_px, options.grouping)
     depth, spread = _depth(said, fitting, _regions(classes, instances))
     empty = torch.isin(classes, torch.tensor(_EMPTY))
+    maps = {
+        "depth": depth.masked_fill(empty, 0),
+        "spread": spread.masked_fill(empty, 0),
+        "classes": classes.byte(),
+        "confidence": chance,
+    }
+    kept = fitting.shown(said.features)[0].numpy() if options.features and said.features is not None else None
     return _Seen(
-        depth=depth.masked_fill(empty, 0).numpy(),
-        spread=spread.masked_fill(empty, 0).numpy(),
-        classes=classes.byte().numpy(),
-        confidence=chance.numpy(),
-        instances=instances,
+        maps={"instances": instances, **{name: values.numpy() for name, values in maps.items()}},
         road_users=users,
+        camera=said.camera[0].double().numpy(),
+        features=kept,
     )
 
 
