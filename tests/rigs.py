@@ -28,6 +28,7 @@ def true_poses(mount: Mount) -> np.ndarray:
 
 def rig_clip(*, poses: bool = False) -> Clip:
     """The frames of both cameras, in the order of time, with their mountings."""
+    layout = next(iter(drives().values())).layout
     parts = [street_clip(made, hold_out=4) for made in drives().values()]
     camera, row = np.tile([0, 1], len(parts[0])), np.repeat(np.arange(len(parts[0])), 2)
     known = Known(intrinsics=True)
@@ -40,6 +41,6 @@ def rig_clip(*, poses: bool = False) -> Clip:
     return Clip(
         **{name: np.stack([getattr(parts[c], name)[r] for c, r in picked]) for name in fields},
         camera=camera,
-        rig=tuple(p.rig[0].at(front_from_mount(m)) for p, m in zip(parts, MOUNTED, strict=True)),
+        rig=tuple(p.rig[0].at(front_from_mount(layout, m)) for p, m in zip(parts, MOUNTED, strict=True)),
         known=known,
     )

@@ -4,6 +4,7 @@ from dreamdrive.world.drive import MOUNTS, Drive, Mount, WorldBox, drive, front_
 from dreamdrive.world.files import MARK, read_world, write_world
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
-from dreamdrive.world.render import WorldView
-from dreamdrive.world.streets import StreetOptions, draw_street
-from dreamdrive.world.world import World
+from dreamdrive.world.options import StreetKind, StreetOptions
+from dreamdrive.world.render import WorldView, picture_of
+from dreamdrive.world.streets import draw_street
+from dreamdrive.world.world import Moment, Mover, World

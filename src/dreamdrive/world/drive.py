@@ -11,11 +11,15 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.layout import BENCHMARK_EDITION, Ego, Layout, track_function
+from dreamdrive.scene.layout import BENCHMARK_EDITION, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.world.edition2.lens import level_from_camera, pinhole
+from dreamdrive.world.edition2.relief import hills_of
+from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
+from dreamdrive.world.options import StreetOptions
 from dreamdrive.world.render import WorldView, picture_of
-from dreamdrive.world.streets import StreetOptions, draw_street
+from dreamdrive.world.streets import draw_street
 from dreamdrive.world.world import World
 
 Mount = Literal["front", "front_left", "front_right", "back", "back_left", "back_right"]
@@ -77,7 +81,7 @@ class Drive:
     @property
     def sky(self) -> Bool[np.ndarray, "f h w"]:
         """Sky masks (F, H, W)."""
-        return self.depth_m == 0
+        return self.semantic == Semantic.SKY
 
     @property
     def trajectory(self) -> Trajectory:
@@ -98,31 +102,45 @@ class Drive:
 
 
 def ego_poses(
-    ego: Ego, times_s: Float[np.ndarray, " f"], mount: Mount = "front"
+    layout: Layout, times_s: Float[np.ndarray, " f"], mount: Mount = "front"
 ) -> Float[np.ndarray, "f 4 4"]:
     """``map_from_camera`` (F, 4, 4) of a camera of the recording car, which nods and rolls a little."""
+    ego, hills = layout.ego, hills_of(layout)
     pitch = ego.shake_rad * np.sin(4.1 * times_s + 0.7)
     roll = 0.7 * ego.shake_rad * np.sin(2.3 * times_s + 1.9)
-    mounted = _mounted(mount)
+    mounted, axes = _mounted(mount), _axes(layout)
     poses: list[np.ndarray] = []
     for place, p, r in zip(track_function(ego.track)(times_s), pitch, roll, strict=True):
-        pose = upright(place)
+        pose = hills.laid(upright(place))
         about_y = pitched((0, 0, 0), p)[:3, :3]
         about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
         nodding = pose[:3, :3] @ about_y @ about_x
-        pose[:3, :3] = nodding @ mounted[:3, :3] @ _LEVEL
+        pose[:3, :3] = nodding @ mounted[:3, :3] @ axes
         pose[:3, 3] += nodding @ mounted[:3, 3] + [0, 0, ego.camera_height_m]
         poses.append(pose)
     return np.stack(poses)
 
 
-def front_from_mount(mount: Mount) -> Float[np.ndarray, "4 4"]:
-    """Pose (4, 4) of a camera of the car in the frame of its front camera."""
-    mounted = _mounted(mount)
+def front_from_mount(layout: Layout, mount: Mount) -> Float[np.ndarray, "4 4"]:
+    """Pose (4, 4) of a camera of the recording car in the frame of its front camera."""
+    mounted, axes = _mounted(mount), _axes(layout)
     pose = np.eye(4)
-    pose[:3, :3] = _LEVEL.T @ mounted[:3, :3] @ _LEVEL
-    pose[:3, 3] = _LEVEL.T @ mounted[:3, 3]
+    pose[:3, :3] = axes.T @ mounted[:3, :3] @ axes
+    pose[:3, 3] = axes.T @ mounted[:3, 3]
     return pose
+
+
+def _axes(layout: Layout) -> Float[np.ndarray, "3 3"]:
+    """Axes (right, down, ahead) of the car's cameras in the frame of their mounts, tilted as the lens is."""
+    return _LEVEL if layout.edition == 1 else level_from_camera(layout.lens)
+
+
+def pinhole_of(layout: Layout, size: tuple[int, int]) -> Camera:
+    """The recording camera of a layout, for pictures of a width and height in pixels."""
+    if layout.edition > 1:
+        return pinhole(layout.lens, size)
+    focal_px = _FOCAL * size[0]
+    return Camera(focal_px, focal_px, size[0] / 2, size[1] / 2, *size)
 
 
 def _mounted(mount: Mount) -> Float[np.ndarray, "4 4"]:
@@ -145,24 +163,24 @@ def drive(
 ) -> Drive:
     """Drive through the street of a layout, or of its world if that is made already.
 
-    The size is width and height in pixels; the horizontal field of view is 64 degrees. ``progress`` is called
-    with frames done and frames in all.
+    The size is width and height in pixels; the horizontal field of view is 64 degrees in the first
+    edition and that of the layout's lens in later ones. ``progress`` is called with frames done and frames
+    in all.
     """
     if frames < 1 or fps <= 0 or min(size) < 2:
         raise ValueError(f"world: cannot drive {frames} frames of {size} at {fps}/s")
     world = World(layout) if world is None else world
     times = np.arange(frames + 1) / fps
-    poses = ego_poses(layout.ego, times, mount)
-    focal_px = _FOCAL * size[0]
-    pinhole = Camera(focal_px, focal_px, size[0] / 2, size[1] / 2, *size)
-    placed = [pinhole.at(pose) for pose in poses]
+    poses = ego_poses(layout, times, mount)
+    camera = pinhole_of(layout, size)
+    placed = [camera.at(pose) for pose in poses]
     seen: list[WorldView] = []
     for view in _looks(world, placed[:-1], times[:-1], placed[1:], times[1:], antialiased=antialiased):
         seen.append(view)
         progress(len(seen), frames)
     world_from_map = np.linalg.inv(poses[0])
     # The product of the first pose with its inverse is the identity only up to rounding; say it exactly.
-    cameras = [pinhole, *(pinhole.at(world_from_map @ pose) for pose in poses[1:-1])]
+    cameras = [camera, *(camera.at(world_from_map @ pose) for pose in poses[1:-1])]
     made = Drive(
         frames=np.stack([v.frame for v in seen]),
         times_s=times[:-1],
@@ -173,7 +191,7 @@ def drive(
         moving=np.stack([v.moving for v in seen]),
         flow_px=np.stack([v.flow_px for v in seen]),
         boxes=_boxes(world, times[:-1], world_from_map),
-        ground=road_plane(world_from_map),
+        ground=road_plane(world_from_map, layout),
         layout=layout,
         world_from_map=world_from_map,
     )
@@ -198,10 +216,16 @@ def make_street(
     return drive(draw_street(seed, options), frames, fps, size)
 
 
-def road_plane(world_from_map: Float[np.ndarray, "4 4"]) -> Ground:
-    """The plane z = 0 of the map in the world."""
-    up = world_from_map[:3, 2]
-    return Ground(up, float(-up @ world_from_map[:3, 3]))
+def road_plane(world_from_map: Float[np.ndarray, "4 4"], layout: Layout) -> Ground:
+    """The map in the world: z = 0, or the plane that touches the hills under the world's origin."""
+    hills = hills_of(layout)
+    if hills.level:
+        up = world_from_map[:3, 2]
+        return Ground(up, float(-up @ world_from_map[:3, 3]))
+    map_from_world = np.linalg.inv(world_from_map)
+    eye = map_from_world[:3, 3]
+    touched = hills.laid(upright((*eye[:2], 0.0)))
+    return Ground(world_from_map[:3, :3] @ touched[:3, 2], float(touched[:3, 2] @ (eye - touched[:3, 3])))
 
 
 def _looks(

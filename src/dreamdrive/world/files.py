@@ -83,7 +83,7 @@ def write_world(
         write_picture(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])
         write_json(folder / "classes.json", {kind.name.lower(): int(kind) for kind in Semantic})
         if len(drives) > 1:
-            write_rig({name: front_from_mount(name) for name in drives}, folder, "cameras.json")
+            write_rig({name: front_from_mount(first.layout, name) for name in drives}, folder, "cameras.json")
         for name, drive in drives.items():
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)
@@ -131,7 +131,7 @@ def _read_camera(folder: Path, layout: Layout) -> Drive:
         moving=_images(folder / "moving", shape) > 0,
         flow_px=_array(folder / "flow.npz", "flow_px", (*shape, 2)),
         boxes=tuple(_box(values, len(times_s)) for values in hulls.boxes),
-        ground=road_plane(world_from_map),
+        ground=road_plane(world_from_map, layout),
         layout=layout,
         world_from_map=world_from_map,
     )

@@ -30,8 +30,25 @@ _BOXES = {
     "truck": (140, 60, 110),
     "bicycle": (20, 140, 90),
     "pedestrian": (200, 90, 20),
+    "bus": (170, 40, 140),
+    "motorcycle": (20, 120, 130),
 }
-_PROPS = {"tree": (96, 150, 70), "lamp": (120, 120, 120), "sign": (200, 60, 60)}
+_PROPS = {
+    "tree": (96, 150, 70),
+    "lamp": (120, 120, 120),
+    "sign": (200, 60, 60),
+    "bush": (120, 165, 80),
+    "mast": (110, 96, 80),
+    "traffic_light": (220, 150, 20),
+    "bin": (90, 100, 90),
+    "cone": (230, 100, 30),
+}
+_BARRIERS = {
+    "fence": (150, 120, 90),
+    "hedge": (80, 130, 60),
+    "wall": (110, 100, 96),
+    "rail": (90, 96, 110),
+}
 _PARKED, _EGO, _INK = (130, 136, 146), (210, 30, 60), (40, 40, 40)
 _SHIFT = 4
 
@@ -64,6 +81,8 @@ class _Sheet:
         for house in layout.buildings:
             self._fill([house.polygon], (184, 168, 156))
             self._stroke([*house.polygon, house.polygon[0]], (120, 104, 94), 1)
+        for barrier in layout.barriers:
+            self._stroke(barrier.points, _BARRIERS[barrier.kind], 2)
         for prop in layout.props:
             radius = int((1.6 if prop.kind == "tree" else 0.4) * self.scale * 2**_SHIFT)
             centre = self._pixels([prop.at_m])[0].tolist()

@@ -110,15 +110,28 @@ class Textures:
 
 @dataclass
 class Materials:
-    """All materials of a world, by index; gloss is the light mirrored when seen from straight above."""
+    """All materials of a world, by index; gloss is the light mirrored when seen from straight above.
+
+    ``glow`` is the index of the texture of the light a surface sends out at night, -1 where it sends none.
+    """
 
     textures: Textures = field(default_factory=Textures)
     texture: list[int] = field(default_factory=list)
     semantic: list[int] = field(default_factory=list)
     gloss: list[float] = field(default_factory=list)
+    glow: list[int] = field(default_factory=list)
 
-    def add(self, image: Image, semantic: Semantic, *, gloss: float = 0.0, repeats: bool = False) -> int:
+    def add(
+        self,
+        image: Image,
+        semantic: Semantic,
+        *,
+        gloss: float = 0.0,
+        repeats: bool = False,
+        glow: Image | None = None,
+    ) -> int:
         """A new material; its index."""
+        self.glow.append(-1 if glow is None else self.textures.add(glow, repeats=repeats))
         self.texture.append(self.textures.add(image, repeats=repeats))
         self.semantic.append(int(semantic))
         self.gloss.append(gloss)

@@ -16,12 +16,14 @@ from jaxtyping import Float, Int
 class Mesh:
     """Triangles: places in metres by triangle, corner and axis, and the index of the material of each.
 
-    ``uv`` is the place of each corner on its texture: 0 to 1 is once across, v downwards.
+    ``uv`` is the place of each corner on its texture: 0 to 1 is once across, v downwards. ``normals`` are
+    unit normals at the corners, between which a curved body is shaded; None shades each triangle as it lies.
     """
 
     corners: Float[np.ndarray, "m 3 3"]
     uv: Float[np.ndarray, "m 3 2"]
     material: Int[np.ndarray, " m"]
+    normals: Float[np.ndarray, "m 3 3"] | None = None
 
     def __len__(self) -> int:
         return len(self.material)
@@ -29,7 +31,16 @@ class Mesh:
     def moved(self, pose: Float[np.ndarray, "4 4"]) -> "Mesh":
         """The same in another frame."""
         corners = np.einsum("ij,mcj->mci", pose[:3, :3], self.corners) + pose[:3, 3]
-        return Mesh(corners, self.uv, self.material)
+        turned = self.normals
+        if turned is not None:
+            turned = np.einsum("ij,mcj->mci", pose[:3, :3], turned)
+        return Mesh(corners, self.uv, self.material, turned)
+
+    def flat_normals(self) -> Float[np.ndarray, "m 3 3"]:
+        """Unit normals of the triangles, at each corner the same."""
+        across = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+        return np.repeat(across[:, None], 3, axis=1)
 
     @staticmethod
     def joined(parts: Sequence["Mesh"]) -> "Mesh":
@@ -37,7 +48,11 @@ class Mesh:
         if not parts:
             return Mesh(np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64))
         fields = zip(*((p.corners, p.uv, p.material) for p in parts), strict=True)
-        return Mesh(*(np.concatenate(field) for field in fields))
+        made = Mesh(*(np.concatenate(field) for field in fields))
+        if all(p.normals is None for p in parts):
+            return made
+        normals = [p.flat_normals() if p.normals is None else p.normals for p in parts]
+        return Mesh(made.corners, made.uv, made.material, np.concatenate(normals))
 
 
 def upright(place: Sequence[float] | Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:

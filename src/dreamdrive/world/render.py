@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
+from dreamdrive.world.edition2.lens import bent, unbent
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.solid import Hits
 from dreamdrive.world.world import Moment, World
@@ -17,6 +18,7 @@ _CONTRAST = 0.07  # of encoded brightness, from which on a pixel takes further r
 _SHOULDER = 0.75
 _FLATTEST = 0.03
 _NEAR_M = 0.05
+_WIDEST = 10.0
 _GROUND_MIRRORED = np.array([0.12, 0.12, 0.12], np.float32)
 
 
@@ -38,7 +40,7 @@ class WorldView:
     @property
     def sky(self) -> Bool[np.ndarray, "h w"]:
         """Sky mask (H, W)."""
-        return self.depth_m == 0
+        return self.semantic == Semantic.SKY
 
 
 def picture_of(
@@ -49,15 +51,16 @@ def picture_of(
     Antialiased, pixels that differ from their neighbours take four further rays.
     """
     shape = camera.height_px, camera.width_px
-    eye = _Eye(world, moment, camera)
+    eye = _eye(world, moment, camera)
     columns, rows = (g.ravel() + 0.5 for g in np.meshgrid(np.arange(shape[1]), np.arange(shape[0])))
     rays = eye.rays(columns, rows)
     hits = eye.trace(rays, columns, rows)
     colour = eye.shade(rays, hits)
     if antialiased:
         _refine(eye, colour, columns, rows, shape)
+    colour = eye.behind_glass(colour, hits)
     frame = _encoded(colour * np.float32(world.exposure(moment.time_s)))
-    return WorldView(
+    view = WorldView(
         frame=np.rint(255 * frame).astype(np.uint8).reshape(*shape, 3),
         depth_m=np.where(hits.triangle >= 0, hits.distance, 0).astype(np.float32).reshape(shape),
         instance=eye.instances(hits).reshape(shape),
@@ -65,10 +68,20 @@ def picture_of(
         moving=(hits.triangle >= len(world.standing)).reshape(shape),
         flow_px=eye.flow(rays, hits, columns, rows, following).astype(np.float32).reshape(*shape, 2),
     )
+    return eye.completed(view)
+
+
+def _eye(world: World, moment: Moment, camera: Camera) -> "Eye":
+    """The eye of the world's edition."""
+    if world.layout.edition == 1:
+        return Eye(world, moment, camera)
+    from dreamdrive.world.edition2.eye import Eye2  # which is made from the one below
+
+    return Eye2(world, moment, camera)
 
 
 def _refine(
-    eye: "_Eye", colour: np.ndarray, columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]
+    eye: "Eye", colour: np.ndarray, columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]
 ) -> None:
     """Give pixels that differ from a neighbour the mean over further rays, in place."""
     seen = _encoded(colour).T.mean(axis=0).reshape(shape)
@@ -93,13 +106,14 @@ def _encoded(colour: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(soft, 0))
 
 
-class _Eye:
+class Eye:
     """A camera in a world at a time."""
 
     def __init__(self, world: World, moment: Moment, camera: Camera) -> None:
         self.world, self.moment, self.camera = world, moment, camera
         self.centre = camera.world_from_camera[:3, 3]
         self.standing = len(world.standing)
+        self.k1 = world.layout.lens.distortion if world.layout.edition > 1 else 0.0
         self._window = self._reach()
 
     def _reach(self) -> tuple[float, float, float, float]:
@@ -108,7 +122,7 @@ class _Eye:
         local = turned(corners.reshape(-1, 3) - self.centre, c.world_from_camera[:3, :3].T)
         ahead = local[:, 2] > _NEAR_M
         part = ahead.reshape(-1, 3)
-        if (part.any(axis=1) & ~part.all(axis=1)).any():
+        if self.k1 or (part.any(axis=1) & ~part.all(axis=1)).any():
             return 0.0, float(c.width_px), 0.0, float(c.height_px)
         if not ahead.any():
             return 0.0, -1.0, 0.0, -1.0
@@ -119,8 +133,10 @@ class _Eye:
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Directions (N, 3) in the map frame, of length 1 along z."""
         c = self.camera
-        local = by_columns([(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px, np.ones(len(columns))])
-        return turned(local, c.world_from_camera[:3, :3])
+        plane = [(columns - c.cx_px) / c.fx_px, (rows - c.cy_px) / c.fy_px]
+        if self.k1:
+            plane = list(unbent(np.stack(plane, axis=-1), self.k1).T)
+        return turned(by_columns([*plane, np.ones(len(columns))]), c.world_from_camera[:3, :3])
 
     def trace(self, rays: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> Hits:
         """The first triangle on each ray; those of movers are counted on from the standing ones."""
@@ -132,6 +148,15 @@ class _Eye:
         hits.triangle[near[nearer]] = moving.triangle[nearer] + self.standing
         hits.distance[near[nearer]] = moving.distance[nearer]
         return hits
+
+    def behind_glass(self, colour: np.ndarray, hits: Hits) -> np.ndarray:
+        """Linear colours (N, 3) of the whole picture as they come through the windscreen: here, unchanged."""
+        del hits
+        return colour
+
+    def completed(self, view: WorldView) -> WorldView:
+        """The picture and its truth with what is fixed to the camera: here, nothing."""
+        return view
 
     def _gather(self, name: str, triangle: np.ndarray) -> np.ndarray:
         """A table's rows for triangles of both kinds."""
@@ -189,6 +214,9 @@ class _Eye:
         start = by_columns([np.where(solid, a, b) for a, b in zip(there, self.centre, strict=True)])
         local = turned(points - start, camera.world_from_camera[:3, :3].T)
         z = np.maximum(local[:, 2], 1e-6)
+        if self.k1:
+            # What lies beside or behind the camera would be bent beyond all numbers.
+            local[:, :2] = z[:, None] * bent(np.clip(local[:, :2] / z[:, None], -_WIDEST, _WIDEST), self.k1)
         across = local[:, 0] / z * camera.fx_px + camera.cx_px - columns
         return np.stack([across, local[:, 1] / z * camera.fy_px + camera.cy_px - rows], axis=-1)
 
@@ -213,6 +241,7 @@ class _Eye:
         slope = np.maximum(np.abs(facing), _FLATTEST)
         material = self._gather("material", triangle)
         albedo = self._albedo(triangle, material, points, view, normal, slope, distance_m)
+        self._bend(triangle, points, view, normal, slope)
         light = self._light(points, normal, material)
         gloss = np.array(self.world.materials.gloss, np.float32)[material]
         mirrored = self._mirrored(view, normal, slope, gloss)
@@ -241,6 +270,30 @@ class _Eye:
         width = np.maximum(short_m, short_m / slope / 6) * np.sqrt(dot(rows[:, 0, :3], rows[:, 0, :3]))
         index = np.array(self.world.materials.texture)[material]
         return (self.world.materials.textures.lookup(index, uv, reach, width) / 255) ** 2
+
+    def _bend(
+        self,
+        triangle: np.ndarray,
+        points: np.ndarray,
+        view: np.ndarray,
+        normal: np.ndarray,
+        slope: np.ndarray,
+    ) -> None:
+        """Turn the normals of curved bodies to those between the corners of their triangles, in place."""
+        for solid, first in ((self.world.standing, 0), (self.moment.moving, self.standing)):
+            if solid.curved is None or solid.to_normal is None:
+                continue
+            mine = np.flatnonzero((triangle >= first) & (triangle < first + len(solid)))
+            mine = mine[solid.curved[triangle[mine] - first]]
+            rows, at = solid.to_normal[triangle[mine] - first], picked(points, mine)
+            bent = by_columns([dot(rows[:, k, :3], at) + rows[:, k, 3] for k in range(3)])
+            bent *= np.sign(dot(bent, picked(normal, mine)))[:, None]
+            # One that leans away from the eye would mirror the inside of its body.
+            along = picked(view, mine)
+            bent -= np.maximum(dot(bent, along) + _FLATTEST, 0)[:, None] * along
+            bent /= np.maximum(np.sqrt(dot(bent, bent)), 1e-6)[:, None]
+            normal[mine] = bent
+            slope[mine] = np.maximum(-dot(bent, along), _FLATTEST)
 
     def _light(self, points: np.ndarray, normal: np.ndarray, material: np.ndarray) -> np.ndarray:
         """Light that falls on surfaces (N, 3)."""

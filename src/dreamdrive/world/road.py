@@ -23,21 +23,12 @@ _OTHERS_SHARE = 10 / 16
 
 
 @dataclass(frozen=True)
-class Road:
-    """A road along a middle line in the map, given every metre from station ``start_m`` on.
-
-    Headings are in radians; lanes are those of each direction.
-    """
+class Curve:
+    """A line in the map, given every metre from station ``start_m`` on; headings are in radians."""
 
     points: Float[np.ndarray, "n 2"]
     headings: Float[np.ndarray, " n"]
     start_m: float
-    lanes: int
-
-    @property
-    def half_m(self) -> float:
-        """From the middle line to the kerb."""
-        return self.lanes * LANE_M + PARKING_M
 
     @property
     def end_m(self) -> float:
@@ -47,7 +38,7 @@ class Road:
     def at(
         self, station_m: Float[np.ndarray, " k"], left_m: float | np.ndarray = 0.0
     ) -> Float[np.ndarray, "k 3"]:
-        """x, y and heading (K, 3) at stations along the road, to the left of its middle line."""
+        """x, y and heading (K, 3) at stations along the line, to the left of it."""
         grid = self.start_m + _STEP_M * np.arange(len(self.points))
         x, y = (np.interp(station_m, grid, self.points[:, i]) for i in (0, 1))
         heading = np.interp(station_m, grid, self.headings)
@@ -56,7 +47,7 @@ class Road:
     def strip(
         self, right_m: float, left_m: float, start_m: float | None = None, end_m: float | None = None
     ) -> shapely.Polygon:
-        """The part of the road between two distances from its middle line, left counted positive."""
+        """What lies between two distances from the line, left counted positive."""
         first = self.start_m if start_m is None else start_m
         last = self.end_m if end_m is None else end_m
         stations = np.linspace(first, last, 2 * len(self.points))
@@ -64,9 +55,21 @@ class Road:
         return shapely.Polygon(np.concatenate([right, left[::-1]]))
 
     def line(self, left_m: float) -> shapely.LineString:
-        """A line along the road."""
+        """A line beside it."""
         stations = np.linspace(self.start_m, self.end_m, len(self.points))
         return shapely.LineString(self.at(stations, left_m)[:, :2])
+
+
+@dataclass(frozen=True)
+class Road(Curve):
+    """A road along a middle line; lanes are those of each direction."""
+
+    lanes: int
+
+    @property
+    def half_m(self) -> float:
+        """From the middle line to the kerb."""
+        return self.lanes * LANE_M + PARKING_M
 
 
 def bent_road(bend_per_m: float, bend_from_m: float, lanes: int, way_m: float) -> Road:
@@ -124,36 +127,38 @@ class RoadNet:
 
     def areas(self, zebras: list[shapely.Polygon]) -> list[Area]:
         """The map's polygons."""
-        found = [*_areas("road", self.paved), *_areas("sidewalk", self.walks)]
-        return found + [area for zebra in zebras for area in _areas("crossing", zebra)]
+        found = [*map_areas("road", self.paved), *map_areas("sidewalk", self.walks)]
+        return found + [area for zebra in zebras for area in map_areas("crossing", zebra)]
 
     def lines(self) -> list[Line]:
         """The map's paint, left out inside the junction."""
         found: list[Line] = []
         for road in self.roads:
             middle: LineKind = "road_divider" if road.lanes > 1 else "lane_divider"
-            found += _lines(middle, road.line(0.0), self.junction)
+            found += map_lines(middle, road.line(0.0), self.junction)
             for side in (-1, 1):
                 for lane in range(1, road.lanes):
-                    found += _lines("lane_divider", road.line(side * lane * LANE_M), self.junction)
-                found += _lines("road_edge", road.line(side * road.lanes * LANE_M), self.junction)
+                    found += map_lines("lane_divider", road.line(side * lane * LANE_M), self.junction)
+                found += map_lines("road_edge", road.line(side * road.lanes * LANE_M), self.junction)
         if self.crossing_m is not None:
             main, other = self.roads
             before = self.crossing_m - other.half_m - 3.2
             ends = main.at(np.array([before, before]), np.array([0.0, -main.lanes * LANE_M]))[:, :2]
-            found.append(Line(kind="stop_line", points=_points(ends)))
+            found.append(Line(kind="stop_line", points=map_points(ends)))
         return found
 
 
-def _points(values: np.ndarray) -> list[tuple[float, float]]:
+def map_points(values: np.ndarray) -> list[tuple[float, float]]:
+    """Places (N, 2) as a layout writes them, to the millimetre."""
     return [(round(float(x), 3), round(float(y), 3)) for x, y in values]
 
 
 def _ring(ring: shapely.LinearRing) -> list[tuple[float, float]]:
-    return _points(np.array(ring.coords)[:-1])
+    return map_points(np.array(ring.coords)[:-1])
 
 
-def _areas(kind: AreaKind, shape: BaseGeometry) -> list[Area]:
+def map_areas(kind: AreaKind, shape: BaseGeometry) -> list[Area]:
+    """The polygons of a shape as areas."""
     return [
         Area(kind=kind, polygon=_ring(part.exterior), holes=[_ring(hole) for hole in part.interiors])
         for part in shapely.get_parts(shape)
@@ -161,10 +166,11 @@ def _areas(kind: AreaKind, shape: BaseGeometry) -> list[Area]:
     ]
 
 
-def _lines(kind: LineKind, line: shapely.LineString, outside: BaseGeometry) -> list[Line]:
+def map_lines(kind: LineKind, line: shapely.LineString, outside: BaseGeometry) -> list[Line]:
+    """What of a line lies outside a shape, as lines of the map."""
     rest = line.difference(outside) if not outside.is_empty else line
     return [
-        Line(kind=kind, points=_points(np.array(part.coords)))
+        Line(kind=kind, points=map_points(np.array(part.coords)))
         for part in shapely.get_parts(rest)
         if part.length > 1
     ]

@@ -1,12 +1,11 @@
 """Layouts drawn at random: streets, houses and traffic that a seed decides."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import shapely
 
-from dreamdrive.errors import InputError
-from dreamdrive.scene.layout import BENCHMARK_EDITION, Building, Ego, Layout, Light, Prop
+from dreamdrive.scene.layout import Building, Ego, Layout, Light, Prop
+from dreamdrive.world import edition2
+from dreamdrive.world.options import StreetOptions
 from dreamdrive.world.road import (
     LANE_M,
     MOST_M_S,
@@ -21,40 +20,18 @@ from dreamdrive.world.traffic import Traffic, to_track
 
 _EGO_STEP_S = 0.1
 _LEAST_EGO_M_S = 1.0
-MOST_SECONDS = 60.0
-"""Longest drive that is drawn: a street of a kilometre."""
 _AFTER_S = 1.2  # for which traffic goes on behind the end
-
-
-@dataclass(frozen=True)
-class StreetOptions:
-    """What a drawn street has to be like; None leaves a choice to the seed.
-
-    Speed is that of the recording car; movers and parked are numbers of road users; editions see
-    ``scene.layout``.
-    """
-
-    seconds: float = 2.4
-    speed_m_s: float | None = None
-    movers: int | None = None
-    parked: int | None = None
-    camera_height_m: float = 1.5
-    edition: int = BENCHMARK_EDITION
 
 
 def draw_street(seed: int, options: StreetOptions = StreetOptions()) -> Layout:
     """A street with houses, trees, parked and moving road users; equal seeds give equal streets.
 
-    Of three streets one is straight, one bends and one crosses another. In those of an even seed some parked
-    vehicles look the same as moving ones.
+    In the first edition one street of three is straight, one bends and one crosses another; in those of an
+    even seed some parked vehicles look the same as moving ones.
     """
-    if options.seconds <= 0 or min(options.speed_m_s or 0, options.movers or 0, options.parked or 0) < 0:
-        raise ValueError(f"street: cannot draw {options}")
-    if options.seconds > MOST_SECONDS:
-        raise InputError(
-            f"a drive of {options.seconds:g} s: streets are drawn for at most {MOST_SECONDS:g} s; ask for "
-            "fewer frames, or give a layout of your own"
-        )
+    options.check()
+    if options.edition > 1:
+        return edition2.draw_street(seed, options)
     rng = np.random.default_rng(seed)
     net = _roads(rng, seed, max(MOST_M_S, options.speed_m_s or 0) * (options.seconds + _AFTER_S))
     speed = float(rng.uniform(6, 10)) if options.speed_m_s is None else options.speed_m_s

@@ -1,15 +1,26 @@
 """A street made from a layout: to be looked at from any camera at any time, with everything known exactly."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from embreex.rtcore import EmbreeDevice
 from jaxtyping import Float
+from msgspec.structs import replace
 
-from dreamdrive.scene.layout import Box, Layout, TrackPoint, is_moving, track_function
-from dreamdrive.world.bodies import Part, body
+from dreamdrive.scene.layout import Box, Ego, Layout, Lens, Light, TrackPoint, is_moving, track_function
+from dreamdrive.world import bodies
+from dreamdrive.world.bodies import Part
+from dreamdrive.world.edition2.bodies import body as body2
+from dreamdrive.world.edition2.ground import paint_ground as paint_ground2
+from dreamdrive.world.edition2.lamps import Lamps
+from dreamdrive.world.edition2.relief import Hills, hills_of
+from dreamdrive.world.edition2.scenery import scenery as scenery2
+from dreamdrive.world.edition2.sky import make_sky as make_sky2
+from dreamdrive.world.edition2.textures import TextureLibrary
+from dreamdrive.world.edition2.tiles import grain
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, upright
@@ -34,10 +45,12 @@ class Mover:
     parts: list[Part]
     places: Callable[[np.ndarray], np.ndarray]
     way_m: Callable[[np.ndarray], np.ndarray]
+    hills: Hills
 
     def pose(self, t_s: float) -> Float[np.ndarray, "4 4"]:
-        """``map_from_body`` (4, 4)."""
-        return upright(self.places(np.array([t_s]))[0])
+        """``map_from_body`` (4, 4); only who goes on foot stays plumb on a slope."""
+        level = upright(self.places(np.array([t_s]))[0])
+        return self.hills.laid(level, plumb=self.box.kind == "pedestrian")
 
     def part_poses(self, t_s: float) -> list[Float[np.ndarray, "4 4"]]:
         """``map_from_part`` of each part."""
@@ -55,16 +68,16 @@ class Moment:
 
 
 class World:
-    """The street of a layout, in the map frame; what never moves is ``standing``."""
+    """The street of a layout, in the map frame; what never moves is ``standing``.
 
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
+    From edition 2 on ``textures`` are mixed with the painted surfaces; None leaves those alone.
+    """
+
+    def __init__(self, layout: Layout, textures: TextureLibrary | None = None) -> None:
+        self.layout, self.textures = layout, textures
+        self.hills = hills_of(layout)
         self.materials = Materials()
-        self.ground: GroundMap = paint_ground(layout, _bounds(layout))
-        self.sky: Sky = make_sky(layout.light, layout.seed)
-        self.ground_material = self.materials.add(self.ground.image, Semantic.ROAD)
-        self.movers = [self._mover(i + 1, box) for i, box in enumerate(layout.boxes)]
-        still = scenery(layout, self.ground, self.ground_material, self.materials)
+        still = self.hills.lifted(self._still() if layout.edition == 1 else self._still2())
         parked = [m for m in self.movers if not m.moving]
         meshes = [
             Mesh.joined([p.mesh.moved(pose) for p, pose in zip(m.parts, m.part_poses(0.0), strict=True)])
@@ -75,18 +88,52 @@ class World:
         self._device = EmbreeDevice()
         self.standing = Solid(Mesh.joined([still, *meshes]), owner, self._device)
 
+    def _still(self) -> Mesh:
+        """Sky, ground, bodies and scenery of edition 1."""
+        self.ground: GroundMap = paint_ground(self.layout, _bounds(self.layout))
+        self.sky: Sky = make_sky(self.layout.light, self.layout.seed)
+        self.ground_material = self.materials.add(self.ground.image, Semantic.ROAD)
+        self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
+        return scenery(self.layout, self.ground, self.ground_material, self.materials)
+
+    def _still2(self) -> Mesh:
+        """Those of edition 2, with its lamps."""
+        ground = paint_ground2(self.layout, _bounds(self.layout), self.textures)
+        self.ground = self.ground2 = ground
+        self.sky = make_sky2(self.layout, self.textures)
+        self.ground_material = self.materials.add(ground.image, Semantic.ROAD)
+        self.far_material = self.materials.add(ground.far.image, Semantic.ROAD)
+        self.detail_texture = self.materials.textures.add(grain(self.layout.seed % 8), repeats=True)
+        self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
+        both = self.ground_material, self.far_material
+        made = scenery2(self.layout, ground, both, self.materials, self.textures)
+        self.lamps: Lamps = Lamps(self.hills.raised(made.lamps.at_m), made.lamps.colour, made.lamps.ahead)
+        return made.mesh
+
     def poses(self, t_s: float) -> Float[np.ndarray, "p 4 4"]:
         """``map_from_part`` of all parts of moving boxes at a time."""
         poses = [pose for mover in self.movers if mover.moving for pose in mover.part_poses(t_s)]
         return np.stack(poses) if poses else np.zeros((0, 4, 4))
 
-    def at(self, t_s: float) -> Moment:
-        """The world at a time."""
-        parts = [part.mesh for mover in self.movers if mover.moving for part in mover.parts]
+    def at(self, t_s: float, without: int = 0) -> Moment:
+        """The world at a time, perhaps without the moving road user of an instance."""
+        parts = [
+            (number, part.mesh)
+            for number, (mover, part) in enumerate((m, p) for m in self.movers if m.moving for p in m.parts)
+            if mover.instance != without
+        ]
         poses = self.poses(t_s)
-        owner = np.repeat(np.arange(len(parts)), [len(mesh) for mesh in parts])
-        mesh = Mesh.joined([mesh.moved(pose) for mesh, pose in zip(parts, poses, strict=True)])
+        owner = np.repeat([number for number, _ in parts], [len(mesh) for _, mesh in parts])
+        mesh = Mesh.joined([mesh.moved(poses[number]) for number, mesh in parts])
         return Moment(t_s, Solid(mesh, owner, self._device), poses)
+
+    def changed(self, light: Light, lens: Lens, ego: Ego) -> "World":
+        """The same street in another light, through another lens, from another car, built once for all."""
+        other = copy(self)
+        other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
+        one = self.layout.edition == 1
+        other.sky = make_sky(light, self.layout.seed) if one else make_sky2(other.layout, self.textures)
+        return other
 
     @cached_property
     def part_instance(self) -> np.ndarray:
@@ -99,9 +146,11 @@ class World:
         return 1 + self.layout.light.exposure_drift * float(np.sin(1.1 * t_s + phase))
 
     def _mover(self, instance: int, box: Box) -> Mover:
+        body = body2 if self.layout.edition == 2 else bodies.body
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
-        return Mover(box, instance, is_moving(box.track), parts, places, _way(box.track, places))
+        way = _way(box.track, places)
+        return Mover(box, instance, is_moving(box.track), parts, places, way, self.hills)
 
 
 def _way(

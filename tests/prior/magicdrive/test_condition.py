@@ -133,7 +133,9 @@ def test_golden_corners() -> None:
 
 def test_the_front_camera_sees_boxes_where_that_of_the_street_world_does() -> None:
     layout = draw_street(4)
-    front = np.linalg.inv(ego_poses(Ego(layout.ego.track, NUSCENES[0].place_m[2]), np.array([0.7]))[0])
+    front = np.linalg.inv(
+        ego_poses(Layout(Ego(layout.ego.track, NUSCENES[0].place_m[2])), np.array([0.7]))[0]
+    )
     lidar_from_map = np.linalg.inv(map_from_car(layout.ego, np.array([0.7]))[0] @ car_from_lidar())
     camera_from_lidar = np.linalg.inv(car_from_camera(NUSCENES[0])) @ car_from_lidar()
     corners, _ = layout_boxes(layout, lidar_from_map, 0.7)

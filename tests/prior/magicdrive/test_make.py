@@ -15,6 +15,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.prior import choose_prior
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.layout import Layout
 from dreamdrive.world import draw_street
 from dreamdrive.world.drive import ego_poses
 
@@ -57,7 +58,7 @@ def test_the_poses_are_those_of_the_path(drive: Clip, inputs: Control) -> None:
     """The front camera follows the layout's path as that of the street world does, without its shaking."""
     assert inputs.path is not None
     ego = read_layout(inputs.path).ego
-    path = ego_poses(type(ego)(track=ego.track), np.array([0.0, 1.0, 2.0]))
+    path = ego_poses(Layout(ego=type(ego)(track=ego.track)), np.array([0.0, 1.0, 2.0]))
     poses = drive.known.world_from_camera
     assert poses is not None
     np.testing.assert_allclose(poses[::6], np.linalg.inv(path[0]) @ path, atol=1e-9)
