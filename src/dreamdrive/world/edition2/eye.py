@@ -168,7 +168,7 @@ class Eye2(Eye):
         width = distance_m[shining] / np.float32(self.camera.fx_px) / np.sqrt(slope[shining]) * across
         none = np.zeros_like(uv)
         light = self.world.materials.textures.lookup(glow[shining], uv, none, width) / np.float32(255)
-        seen[shining] += light**2 * np.float32(2.2 * night)
+        seen[shining] += light**2 * np.float32(1.6 * night)
 
     def _wet(
         self,

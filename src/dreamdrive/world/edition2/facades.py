@@ -44,7 +44,9 @@ def facade(variant: int, floors: int) -> Facade:
     elif style != "shed":
         _entrance(paper)
     _stains(paper)
-    return Facade(finished(paper.image), finished(paper.glow), width_m, style)
+    # What is behind the glass shows in its light.
+    glow = paper.glow * np.clip(0.35 + paper.image.mean(axis=-1, keepdims=True) / 160, 0.3, 1)
+    return Facade(finished(paper.image), finished(glow), width_m, style)
 
 
 class _Paper:

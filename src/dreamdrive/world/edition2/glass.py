@@ -199,14 +199,14 @@ def screen(rng: np.random.Generator, image: np.ndarray, veil: float) -> np.ndarr
     side, up = rng.uniform(-0.8, 0.8), rng.uniform(-1.2, 0.2)
     spread = np.exp(-((x - side) ** 2 + (y - up) ** 2) / rng.uniform(0.3, 1.5)).astype(np.float32)
     image = image + np.float32(veil) * (0.4 + spread)[..., None] * mean
-    if rng.random() < 0.2:
+    if rng.random() < 0.12:
         spread = noise(
             rng,
             (height, width),
             {max(2.0, 0.004 * width): 0.25, max(4.0, 0.015 * width): 0.3, width / 5: 0.6},
         )
         dirt = np.clip(spread - 0.7, 0, 1)[..., None]
-        image = image + np.float32(rng.uniform(0.02, 0.15)) * dirt * (0.7 * mean - image)
+        image = image + np.float32(rng.uniform(0.02, 0.1)) * dirt * (0.7 * mean - image)
     if rng.random() < 0.2:
         band = np.exp(-(((y - rng.uniform(0.3, 0.9) - 0.1 * x * rng.normal()) / rng.uniform(0.05, 0.3)) ** 2))
         image = image + np.float32(rng.uniform(0.01, 0.07)) * band[..., None] * mean

@@ -14,7 +14,6 @@ from dreamdrive.scene.layout import Area, Layout, Line
 from dreamdrive.world.edition2 import marks
 from dreamdrive.world.edition2.sheet import Sheet
 from dreamdrive.world.edition2.textures import (
-    KINDS,
     TextureKind,
     TextureLibrary,
     levelled,
@@ -44,6 +43,7 @@ _PAINTED = {
     "sidewalk": (["slabs", "concrete", "asphalt", "stones", "earth"], [0.5, 0.2, 0.15, 0.1, 0.05]),
     "grass": (["grass", "earth", "asphalt", "slabs"], [0.78, 0.16, 0.03, 0.03]),
 }
+_WRONG: tuple[TextureKind, ...] = ("road", "ground", "facade", "vegetation", "clutter")
 _CUT_KIND: dict[str, TextureKind] = {
     "road": "road",
     "parking": "road",
@@ -119,7 +119,7 @@ class _Covers:
         if self.textures is not None and rng.random() < _CUT_SHARE:
             cut_kind: TextureKind = _CUT_KIND[kind]
             if rng.random() < 0.06:
-                cut_kind = KINDS[int(rng.integers(len(KINDS)))]
+                cut_kind = _WRONG[int(rng.integers(len(_WRONG)))]
             found = self.textures.pick(cut_kind, self.layout.seed, rng)
         if found is not None:
             picture, about = found

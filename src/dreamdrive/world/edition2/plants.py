@@ -57,7 +57,7 @@ def hedge(barrier: Barrier, paints: Paints) -> Mesh:
         length = float(np.linalg.norm(there - here))
         along = (there - here) / max(length, 1e-6)
         aside = np.array([-along[1], along[0]])
-        count = int(np.clip(length * (high + thick) * 14, 12, 900))
+        count = int(np.clip(length * (high + thick) * 45, 12, 3000))
         s, t, z = (
             rng.uniform(0, length, count),
             rng.uniform(-0.5, 0.5, count) * thick,
@@ -68,7 +68,7 @@ def hedge(barrier: Barrier, paints: Paints) -> Mesh:
         z = np.where(which == 2, high, z)
         place = here + s[:, None] * along + t[:, None] * aside
         centre = np.column_stack([place, z]) + rng.normal(0, wild, (count, 3))
-        parts.append(_facets(rng, centre, rng.uniform(0.12, 0.32, count), leaves))
+        parts.append(_facets(rng, centre, rng.uniform(0.06, 0.2, count), leaves))
         core = 0.42 * thick * aside
         low, top = 0.02, high - 0.1
         for side in (1, -1):
@@ -143,7 +143,7 @@ def _clump(
     material: int,
     detail: float,
 ) -> Mesh:
-    """A cloud of facets near the surface of an ellipsoid, fewer inside; with less detail fewer, larger ones."""
+    """A cloud of facets near the surface of an ellipsoid; with less detail fewer and larger ones."""
     count, size = max(12, round(detail * count)), size / np.sqrt(detail)
     way = rng.standard_normal((count, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)

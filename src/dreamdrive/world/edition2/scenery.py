@@ -21,7 +21,7 @@ from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, plate, quads, upright
 
 _REACH_M = 900.0
-_DETAIL = ((35.0, 1.0), (80.0, 0.35), (np.inf, 0.12))
+_DETAIL = ((25.0, 2.2), (55.0, 0.8), (110.0, 0.3), (np.inf, 0.12))
 """Share of the leaves that are drawn up to some distances from the way of the car."""
 _LAMP = 80.0
 """Linear intensity of a street lamp at a metre."""

@@ -11,11 +11,11 @@ from dreamdrive.world.edition2.textures import TextureLibrary
 from dreamdrive.world.paint import noise
 from dreamdrive.world.sky import Sky
 
-_SHAPE = (160, 768)
+_SHAPE = (256, 1280)
 _SHARE_CUT = 0.55  # of the skies by day that are cut from pictures, where there are any
 _TRIES, _GREY, _DULL = 8, 0.22, 0.25
-"""How often a cut sky is drawn until it fits: with less sun than the last number one whose colours differ by less
-than the second."""
+"""How often a cut sky is drawn until it fits: one whose colours differ by less than the second number where
+the share of the sun is less than the third."""
 _EVEN = 1.25
 """Light on level ground that the camera exposes for."""
 _ADAPTED = 0.75
@@ -46,7 +46,7 @@ def _tones(rng: np.random.Generator, light: Light) -> Tones:
     pale = _mix(pale, rng.uniform((0.75, 0.42, 0.25), (1.0, 0.7, 0.5)), low * light.sun)
     cloud = _mix((1.0, 1.0, 1.02), rng.uniform(0.7, 1.25) * np.array([0.97, 0.99, 1.02]), grey)
     cloud = _mix(cloud, (0.9, 0.62, 0.5), 0.5 * low * light.sun)
-    town = rng.uniform((0.02, 0.02, 0.025), (0.075, 0.05, 0.045))
+    town = rng.uniform(0.015, 0.06) * np.array([1.0, rng.uniform(0.72, 1.0), rng.uniform(0.6, 1.2)])
     dark = light.night**0.5
     cast = np.exp(rng.normal(0, 0.07, 3)).astype(np.float32)
     sun = _mix((1.0, 0.95, 0.86), (1.0, 0.6, 0.3), low) * 2.1 * light.sun * (1 - light.night) ** 2
@@ -96,7 +96,7 @@ def _painted(rng: np.random.Generator, light: Light, tones: Tones) -> np.ndarray
     up = np.linspace(1, 0, height, dtype=np.float32)[:, None, None]
     curve = up ** rng.uniform(0.35, 0.9)
     image = tones.zenith * curve + tones.horizon * (1 - curve)
-    field = noise(rng, (height, width + 96), {4: 0.05, 9: 0.1, 24: 0.24, 80: 0.4, 200: 0.3})
+    field = noise(rng, (height, width + 96), {5: 0.05, 14: 0.1, 40: 0.24, 130: 0.4, 330: 0.3})
     blend = np.linspace(0, 1, 96, dtype=np.float32)
     field[:, :96] = field[:, :96] * blend + field[:, width:] * (1 - blend)  # no seam at the full turn
     field = field[:, :width]
@@ -115,7 +115,7 @@ def _painted(rng: np.random.Generator, light: Light, tones: Tones) -> np.ndarray
 def _cut(
     rng: np.random.Generator, painted: np.ndarray, textures: TextureLibrary, seed: int, sun: float
 ) -> np.ndarray:
-    """A strip of a real sky above the horizon, mirrored around the turn; its top colour goes on above."""
+    """A strip of a real sky above the horizon, mirrored around the turn and upwards, plainer above."""
     for _ in range(_TRIES):
         found = textures.pick("sky", seed, rng)
         if found is None:
@@ -130,21 +130,18 @@ def _cut(
     height, width = _SHAPE
     times = 2 * max(2, round(360 / found[1].width_m / 2 * rng.uniform(0.7, 1.3)))
     wide = -(-width // times)
-    rise = int(height * rng.uniform(0.25, 0.45))
+    degrees = found[1].width_m * strip.shape[0] / strip.shape[1]
+    rise = int(np.clip(degrees / 90 * height * rng.uniform(0.9, 1.5), 0.1 * height, 0.6 * height))
     one = cv2.resize(strip, (wide, rise), interpolation=cv2.INTER_AREA)
     if rng.random() < 0.5:
         one = one[:, ::-1]
     turn = np.concatenate([one, one[:, ::-1]] * (times // 2), axis=1)
-    turn = cv2.resize(turn, (width, rise))
-    turn = np.roll(turn, int(rng.integers(width)), axis=1) * rng.uniform(0.85, 1.15)
-    top = cv2.GaussianBlur(np.tile(turn[:6].mean(axis=0), (3, 1, 1)), (0, 0), 20)[1][None]
-    panorama = np.empty_like(painted)
-    panorama[height - rise :] = turn
-    above = np.linspace(0.75, 1, height - rise, dtype=np.float32)[:, None, None]
-    panorama[: height - rise] = top * above
-    seam = slice(height - rise - 12, height - rise + 12)
-    panorama[seam] = cv2.GaussianBlur(panorama, (0, 0), 5)[seam]
-    return panorama
+    turn = np.roll(cv2.resize(turn, (width, rise)), int(rng.integers(width)), axis=1) * rng.uniform(
+        0.85, 1.15
+    )
+    tower = np.concatenate([turn[::-1], turn] * (-(-height // (2 * rise)) + 1), axis=0)[-height:]
+    above = np.clip(np.linspace(1.4, -0.4, height, dtype=np.float32), 0, 1)[:, None, None]
+    return (tower + above * (turn[: rise // 3 + 1].mean(axis=(0, 1)) - tower)).astype(np.float32)
 
 
 def _sun(light: Light, tones: Tones, shape: tuple[int, int]) -> np.ndarray:

@@ -81,12 +81,16 @@ def mirrored_tile(image: Image) -> Image:
 
 _LEVEL = {"facade": 132.0, "road": 96.0, "ground": 118.0, "vegetation": 92.0, "clutter": 115.0}
 """Mean brightness of surfaces in even light, 0..255."""
+_NEUTRAL = {"road": 0.75}
+"""Share of a tint that is taken off: that of cameras, as asphalt is grey."""
 
 
 def levelled(image: Image, kind: TextureKind) -> Image:
-    """The image about as bright as surfaces of its kind are in even light; half of what differs is left."""
-    gain = (_LEVEL.get(kind, 120.0) / max(float(image.mean()), 12.0)) ** 0.6
-    return cv2.LUT(image, np.clip(np.arange(256) * gain, 0, 255).astype(np.uint8))
+    """The image about as bright as surfaces of its kind are in even light, and less tinted."""
+    mean = np.maximum(image.mean(axis=(0, 1)), 8)
+    gain = (_LEVEL.get(kind, 120.0) / max(float(mean.mean()), 12.0)) ** 0.6
+    table = np.arange(256)[:, None] * gain * (mean.mean() / mean) ** _NEUTRAL.get(kind, 0.35)
+    return cv2.LUT(image, np.clip(table, 0, 255).astype(np.uint8)[None])
 
 
 def recoloured(rng: np.random.Generator, image: Image, strength: float = 1.0) -> Image:
