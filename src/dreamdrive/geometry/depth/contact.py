@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.scene.windows import grown
 
@@ -28,7 +28,7 @@ class Contact:
 
 
 def on_the_road(
-    instances: Int[np.ndarray, "h w"],
+    instances: Integer[np.ndarray, "h w"],
     ground: Bool[np.ndarray, "h w"],
     plane_inverse: Float[np.ndarray, "h w"],
     least_spread: float,
@@ -66,7 +66,7 @@ def on_the_road(
 
 
 def _hull(
-    columns: Int[np.ndarray, " s"], rows: Int[np.ndarray, " s"], wanted: Int[np.ndarray, " n"]
+    columns: Integer[np.ndarray, " s"], rows: Integer[np.ndarray, " s"], wanted: Integer[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """Rows at which wanted columns meet the lower convex hull of some points; level beyond its ends."""
     points = np.stack([columns, rows], axis=1).astype(np.float32)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.geometry.depth.contact import on_the_road
 from dreamdrive.geometry.depth.view import View, by_frame
@@ -31,8 +31,8 @@ class Seen:
 
     depth: Float[np.ndarray, "h w"]
     spread: Float[np.ndarray, "h w"]
-    classes: Int[np.ndarray, "h w"]
-    instances: Int[np.ndarray, "h w"]
+    classes: Integer[np.ndarray, "h w"]
+    instances: Integer[np.ndarray, "h w"]
 
     @property
     def users(self) -> Bool[np.ndarray, "h w"]:

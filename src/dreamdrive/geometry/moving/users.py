@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.geometry.depth import View
 from dreamdrive.geometry.moving.evidence import FLAGGED
@@ -87,7 +87,7 @@ def _speed(track: Sequence[Sighting], times_s: Float[np.ndarray, " f"]) -> tuple
 
 def follow(
     view: View,
-    instances: Int[np.ndarray, "f h w"],
+    instances: Integer[np.ndarray, "f h w"],
     flows: Mapping[int, Sequence[PairFlow]],
     evidence: Float[np.ndarray, "f h w"],
     inverse: Float[np.ndarray, "f h w"],
@@ -114,7 +114,7 @@ def follow(
 
 
 def _linked(
-    instances: Int[np.ndarray, "f h w"], before: int, after: int, flows: Sequence[PairFlow]
+    instances: Integer[np.ndarray, "f h w"], before: int, after: int, flows: Sequence[PairFlow]
 ) -> dict[int, int]:
     """Of each label in a frame that of the frame before, where both share most pixels with one another.
 
@@ -139,8 +139,8 @@ def _linked(
 
 
 def _counts(
-    first: Int[np.ndarray, "h w"], second: Int[np.ndarray, "h w"], shape: tuple[int, int]
-) -> Int[np.ndarray, "n m"]:
+    first: Integer[np.ndarray, "h w"], second: Integer[np.ndarray, "h w"], shape: tuple[int, int]
+) -> Integer[np.ndarray, "n m"]:
     both = first.astype(np.intp) * shape[1] + second
     return np.bincount(both.ravel(), minlength=shape[0] * shape[1]).reshape(shape)
 
@@ -149,7 +149,7 @@ def _sighting(
     view: View,
     frame: int,
     label: int,
-    instances: Int[np.ndarray, "h w"],
+    instances: Integer[np.ndarray, "h w"],
     evidence: Float[np.ndarray, "h w"],
     inverse: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"],
