@@ -78,7 +78,7 @@ def densify(
             inverse = _inverse(np.where(view.used[:, None, None], measured[0], 0))
             confidence = np.where(inverse > 0, measured[1], 0).astype(np.float32)
         elif rough and look is not None:
-            inverse, confidence = np.zeros((2, *view.grey.shape), np.float32)
+            inverse, confidence = np.zeros(view.grey.shape, np.float32), np.zeros(view.grey.shape, np.float32)
         elif rough:
             inverse, confidence = _plane_and_backdrop(view)
         else:

@@ -68,11 +68,10 @@ def fused(
         )
 
     found = by_frame(view, one)
-    maps = tuple(np.zeros(inverse.shape, np.float32) for _ in range(3))
+    depth, trust, spread = (np.zeros_like(inverse, dtype=np.float32) for _ in range(3))
     for frame, each in found.items():
-        for whole, part in zip(maps, (each.inverse, each.confidence, each.spread), strict=True):
-            whole[frame] = part
-    return maps
+        depth[frame], trust[frame], spread[frame] = each.inverse, each.confidence, each.spread
+    return depth, trust, spread
 
 
 @dataclass(frozen=True)
