@@ -101,16 +101,20 @@ def test_what_stays_as_it_is_and_what_is_learned(data: tuple[Path, Path], tmp_pa
 
 @pytest.mark.slow
 def test_the_first_losses_are_those_of_before(data: tuple[Path, Path], tmp_path: Path) -> None:
-    """Made by ``write_first_losses``; within 1 % on other processors."""
-    found = first_losses(data, tmp_path)
+    """On other kernels (``ATEN_CPU_CAPABILITY=default ONEDNN_MAX_CPU_ISA=SSE41``) they differ by 0.35 %.
+
+    The rate is low, and the teacher's threshold is not used: both would let rounding grow.
+    """
+    options = replace(
+        TINY,
+        steps=50,
+        rate=1e-4,
+        losses=replace(TINY.losses, taught_classes=0.0),
+        loader=replace(TINY.loader, batch=4),
+    )
+    train_street(StreetTraining(data, tmp_path, options), device=CPU)
+    found = [each["loss"] for each in lines(tmp_path)]
     wanted = json.loads(FIRST.read_text())
     assert len(found) == len(wanted) == 50
     assert found == pytest.approx(wanted, rel=0.01)
-    assert sum(found[-5:]) < 0.6 * sum(found[:5])
-
-
-def first_losses(data: tuple[Path, Path], out: Path) -> list[float]:
-    """Of a training that makes no use of the teacher's threshold, on which rounding would tell."""
-    losses = replace(TINY.losses, taught_classes=0.0)
-    train_street(StreetTraining(data, out, replace(TINY, steps=50, losses=losses)), device=CPU)
-    return [each["loss"] for each in lines(out)]
+    assert sum(found[-10:]) < 0.85 * sum(found[:10])

@@ -25,7 +25,7 @@ def judge(network: StreetNetwork, entries: Sequence[Entry]) -> dict[str, float]:
     - ``iou/NAME``, ``miou``: intersection over union over all pixels whose label is one class;
     - ``depth_rel``: mean over pictures of the mean error of depth as a share of it, after the median is
       aligned; ``depth_rel_in_heights`` the same without alignment;
-    - ``focal``: median error of focal length as a share of it; ``horizon``: of the horizon in picture
+    - ``focal``: median error of the logarithm of the focal length; ``horizon``: of the horizon in picture
       widths; ``roll_deg``: of the roll;
     - ``records``: how many were judged.
     """
