@@ -282,26 +282,10 @@ def _face(rng: np.random.Generator, shape: str) -> paint.Image:
         "black": (24, 24, 26),
         "brown": (110, 66, 40),
     }
-    names = list(colours)
     ink = {k: np.array(v, np.float32) for k, v in colours.items()}
     size = 64
     if shape in ("long", "board"):
-        width = 128
-        field = ink[str(rng.choice(["blue", "green", "white", "yellow", "brown", "green"]))]
-        image = np.empty((size, width, 3), np.float32)
-        image[:] = field
-        letter = 245.0 if field.mean() < 150 else 25.0
-        cv2.rectangle(image, (2, 2), (width - 3, size - 3), (letter,) * 3, 1)
-        for row in range(int(rng.integers(1, 4))):
-            text = "".join(
-                rng.choice(
-                    list("ABCDEFGHIJKLMNOPRSTUVabcdeghiklmnorstu 0123456789"), int(rng.integers(4, 10))
-                )
-            )
-            _write(
-                image, text, (8, 18 + 18 * row), cv2.FONT_HERSHEY_DUPLEX, 0.5, (letter,) * 3, 1, cv2.LINE_AA
-            )
-        return paint.finished(image)
+        return _board(rng, ink)
     rim, field = {
         "round": [("red", "white"), ("blue", "blue"), ("red", "blue"), ("red", "red"), ("red", "yellow")],
         "triangle": [("red", "white"), ("red", "yellow"), ("red", "white")],
@@ -317,7 +301,30 @@ def _face(rng: np.random.Generator, shape: str) -> paint.Image:
         cv2.circle(image, (32, 32), 22, ink[field].tolist(), -1) if shape == "round" else cv2.rectangle(
             image, (5, 5), (58, 58), ink[field].tolist(), -1
         )
-    symbol = (245.0,) * 3 if ink[field].mean() < 130 else (20.0,) * 3
+    _symbol(rng, image, shape, dark=bool(ink[field].mean() < 130))
+    return paint.finished(image * (1 - rng.uniform(0, 0.25)))
+
+
+def _board(rng: np.random.Generator, ink: dict[str, np.ndarray]) -> paint.Image:
+    """Lines of letters on a field of one of some colours."""
+    size = 64
+    width = 128
+    field = ink[str(rng.choice(["blue", "green", "white", "yellow", "brown", "green"]))]
+    image = np.empty((size, width, 3), np.float32)
+    image[:] = field
+    letter = 245.0 if field.mean() < 150 else 25.0
+    cv2.rectangle(image, (2, 2), (width - 3, size - 3), (letter,) * 3, 1)
+    for row in range(int(rng.integers(1, 4))):
+        text = "".join(
+            rng.choice(list("ABCDEFGHIJKLMNOPRSTUVabcdeghiklmnorstu 0123456789"), int(rng.integers(4, 10)))
+        )
+        _write(image, text, (8, 18 + 18 * row), cv2.FONT_HERSHEY_DUPLEX, 0.5, (letter,) * 3, 1, cv2.LINE_AA)
+    return paint.finished(image)
+
+
+def _symbol(rng: np.random.Generator, image: np.ndarray, shape: str, *, dark: bool) -> None:
+    """A number, an arrow, a bar or a figure in the middle of a sign, in place."""
+    symbol = (245.0,) * 3 if dark else (20.0,) * 3
     kind = rng.integers(4)
     if kind == 0 or shape == "octagon":
         text = (
@@ -345,5 +352,3 @@ def _face(rng: np.random.Generator, shape: str) -> paint.Image:
     else:
         cv2.circle(image, (32, 26), 4, symbol, -1)
         cv2.line(image, (32, 28), (32, 42), symbol, 5)
-    del names
-    return paint.finished(image * (1 - rng.uniform(0, 0.25)))

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args
 import cv2
 import msgspec
 import numpy as np
+from jaxtyping import UInt8
 from msgspec import Meta
 
 from dreamdrive.errors import InputError
@@ -73,7 +74,7 @@ class TextureLibrary:
         return np.ascontiguousarray(picture[..., ::-1]), self.textures[chosen]
 
 
-def mirrored_tile(image: Image) -> Image:
+def mirrored_tile(image: Image) -> UInt8[np.ndarray, "2*h 2*w 3"]:
     """The image beside and above its mirror images, which repeats without a seam."""
     twice = np.concatenate([image, image[:, ::-1]], axis=1)
     return np.concatenate([twice, twice[::-1]], axis=0)
