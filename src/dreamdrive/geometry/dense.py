@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt16
 
 from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
@@ -68,7 +68,7 @@ def densify(
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
-    look, spread = clip.look, None
+    look, spread, users = clip.look, None, None
     with single_threaded_opencv():
         sky = _sky(clip, view)
         if clip.known.depth_m is not None:
@@ -95,12 +95,12 @@ def densify(
             moving = moving_evidence(view, flows, inverse, sky, given)
         moving = moving * ~sky
         if look is not None and spread is not None:
-            moving = whole_users(view, look, flows, moving, inverse, spread, clip.times_s)
+            moving, users = whole_users(view, look, flows, moving, inverse, spread, clip.times_s)
         if spread is not None:
             inverse = settled_in_time(view, inverse, spread, moving < FLAGGED)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    return _geometry(posed, view, inverse, confidence, sky, moving, spread)
+    return _geometry(posed, view, inverse, confidence, sky, moving, spread, users)
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -198,6 +198,7 @@ def _geometry(
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"] | None,
+    users: UInt16[np.ndarray, "f h w"] | None,
 ) -> Geometry:
     """What both halves found, as the next stages take it."""
     shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
@@ -218,6 +219,7 @@ def _geometry(
         sky=sky,
         moving=moving,
         spread=None if spread is None else np.where(shown, spread, 0).astype(np.float32),
+        users=users,
         fixed_regions=posed.fixed_regions[None],
         region_names=posed.region_names,
         ground=posed.ground,

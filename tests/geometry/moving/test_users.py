@@ -40,7 +40,7 @@ class Scene:
     def found(self, evidence: np.ndarray) -> np.ndarray:
         """What is flagged in the end."""
         times = np.arange(FRAMES) / 10
-        whole = whole_users(self.view, self.look, {}, evidence, self.inverse, self.spread, times)
+        whole, _ = whole_users(self.view, self.look, {}, evidence, self.inverse, self.spread, times)
         return whole >= FLAGGED
 
 

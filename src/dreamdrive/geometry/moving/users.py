@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Integer
+from jaxtyping import Bool, Float, Integer, UInt16
 
 from dreamdrive.geometry.depth import View
 from dreamdrive.geometry.moving.evidence import FLAGGED
@@ -41,24 +41,28 @@ def whole_users(
     inverse: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"],
     times_s: Float[np.ndarray, " f"],
-) -> Float[np.ndarray, "f h w"]:
+) -> tuple[Float[np.ndarray, "f h w"], UInt16[np.ndarray, "f h w"]]:
     """Evidence of motion in [0, 1] with each road user moving as a whole, in all its frames, or not at all.
+
+    With it the number of the road user of each pixel, from 1, the same in all frames.
 
     A road user moves if enough of its pixels do, or if its foot changes its place on the map. What surely is
     no road user does not move.
     """
     options = view.options.users
-    whole = evidence.copy()
+    whole, users = evidence.copy(), np.zeros(evidence.shape, np.uint16)
     for frame in view.frames:
         street = (look.instances[frame] == 0) & (look.confidence[frame] >= options.sure)
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
-    for track in follow(view, look.instances, flows, evidence, inverse, spread):
+    tracks = follow(view, look.instances, flows, evidence, inverse, spread)
+    for number, track in enumerate(tracks, start=1):
         moves = is_moving(track, times_s, options)
         for seen in track:
             own = look.instances[seen.frame] == seen.label
+            users[seen.frame][own] = number
             part = whole[seen.frame]
             part[own] = np.maximum(part[own], FLAGGED) if moves else np.minimum(part[own], 0.9 * FLAGGED)
-    return whole
+    return whole, users
 
 
 def is_moving(track: Sequence[Sighting], times_s: Float[np.ndarray, " f"], options: UserOptions) -> bool:
