@@ -20,6 +20,7 @@ PUBLIC = [
     "Geometry",
     "Given",
     "InputError",
+    "Look",
     "Options",
     "Outcome",
     "Scene",
@@ -27,6 +28,7 @@ PUBLIC = [
     "build_scene",
     "generate",
     "load_scene",
+    "look",
     "render_scene",
     "save_scene",
 ]

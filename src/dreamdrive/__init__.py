@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dreamdrive.errors import InputError as InputError
+    from dreamdrive.knowledge import look as look
     from dreamdrive.options import Options as Options
     from dreamdrive.pipeline import Given as Given
     from dreamdrive.pipeline import build_scene as build_scene
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from dreamdrive.scene.control import Control as Control
     from dreamdrive.scene.gaussians import Gaussians as Gaussians
     from dreamdrive.scene.geometry import Geometry as Geometry
+    from dreamdrive.scene.look import Look as Look
     from dreamdrive.scene.scene import Scene as Scene
     from dreamdrive.scene.trajectory import Trajectory as Trajectory
     from dreamdrive.splat import render_scene as render_scene
@@ -32,6 +34,7 @@ _HOME = {
     "Geometry": "dreamdrive.scene.geometry",
     "Given": "dreamdrive.pipeline",
     "InputError": "dreamdrive.errors",
+    "Look": "dreamdrive.scene.look",
     "Options": "dreamdrive.options",
     "Outcome": "dreamdrive.run",
     "Scene": "dreamdrive.scene.scene",
@@ -39,6 +42,7 @@ _HOME = {
     "build_scene": "dreamdrive.pipeline",
     "generate": "dreamdrive.pipeline",
     "load_scene": "dreamdrive.stored.folder",
+    "look": "dreamdrive.knowledge",
     "render_scene": "dreamdrive.splat",
     "save_scene": "dreamdrive.stored.folder",
 }

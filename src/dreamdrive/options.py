@@ -6,6 +6,7 @@ from dreamdrive.choices import DeviceName, MethodName, QualityName, Representati
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
+from dreamdrive.knowledge import NO_KNOWLEDGE
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
 
 
@@ -25,6 +26,7 @@ class Options:
         representation: ``"hybrid"``, or one of its baselines.
         device: Where networks and both fits are computed.
         geometry: How cameras and depth are found.
+        knowledge: Weights of the street network: the name of those that ship, a file, or ``"none"``.
         method: Whose equations the others are set to, see ``with_method``.
         seed: Seed of everything random.
     """
@@ -40,6 +42,7 @@ class Options:
     representation: RepresentationName = "hybrid"
     device: DeviceName = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    knowledge: str = NO_KNOWLEDGE
     method: MethodName = "dreamdrive"
     seed: int = 0
 

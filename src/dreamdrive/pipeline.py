@@ -12,6 +12,7 @@ from dreamdrive.decompose import Cast, Grouping, cast, error_maps, group, score
 from dreamdrive.device import computing_on
 from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
+from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, weights_of, with_looks
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options
 from dreamdrive.progress import StageProgress
@@ -22,6 +23,7 @@ from dreamdrive.run import (
     call,
     check,
     check_place,
+    file_digest,
     only_run,
     open_workspace,
     read_outcome,
@@ -33,6 +35,7 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.look import Look
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import why_unusable
 
@@ -42,12 +45,14 @@ class Given:
     """What is known of a clip already, in place of what its stage would find; each may be absent.
 
     Attributes:
+        looks: What the street network sees, a look for each camera of the rig.
         geometry: Cameras and depth.
         static: The fit as if nothing moved, of the seeds in their order.
         labels: Which seeds move, and with which others.
         tracks: What moves, in canonical places, and how it moves.
     """
 
+    looks: tuple[Look, ...] | None = None
     geometry: Geometry | None = None
     static: StaticFit | None = None
     labels: Grouping | None = None
@@ -127,6 +132,9 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     """
     o, seed = options, {name: stage_seed(options.seed, name) for name in ("geometry", "static", "fit")}
     device = torch.device(o.device)
+    weights = None if o.knowledge == NO_KNOWLEDGE else file_digest(weights_of(o.knowledge))
+    looks = run("look", weights, lambda work: look_at(clip, o.knowledge, work), given=given.looks)
+    clip = with_looks(clip, looks)
     geometry = run(
         "geometry",
         [o.geometry, BACKENDS.package(o.geometry.method), o.seed],

@@ -10,7 +10,7 @@ from tests.geometry.toy_drive import make_clip, straight
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.geometry.cameras.paths import stands
-from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.evidence import observe
 from dreamdrive.geometry.finish import check_frames, finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
@@ -46,7 +46,7 @@ def measured(toy: Toy, poses: np.ndarray, **more: object) -> Measured:
 
 
 def finished(clip: Clip, found: Measured, height_m: float | None = None) -> Geometry:
-    return finish(clip, found, look(clip), GeometryOptions(camera_height_m=height_m))
+    return finish(clip, found, observe(clip), GeometryOptions(camera_height_m=height_m))
 
 
 def depth_ratio(found: Geometry, toy: Toy) -> float:
@@ -163,7 +163,7 @@ def test_what_else_tells_metres_is_told(moving: Toy) -> None:
 
 
 def test_who_stands(still: Toy, moving: Toy) -> None:
-    here, there = look(still.clip), look(moving.clip)
+    here, there = observe(still.clip), observe(moving.clip)
     assert stands(still.clip, here)
     assert not stands(moving.clip, there)
     count = len(still.clip)

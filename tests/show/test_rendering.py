@@ -20,7 +20,14 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels, rendering
-from dreamdrive.show.rendering import Look, check_size, depth_png, video_rate, view_camera, write_drive
+from dreamdrive.show.rendering import (
+    RenderOptions,
+    check_size,
+    depth_png,
+    video_rate,
+    view_camera,
+    write_drive,
+)
 from dreamdrive.splat.scene_view import SceneView, render_scene
 
 
@@ -45,32 +52,32 @@ def view(scene: Scene, drive: Drive, i: int, part: str = "all") -> SceneView:
     return render_scene(scene, camera, float(drive.path.times_s[i]), part=part)  # pyright: ignore
 
 
-def refusal(look: Look) -> str:
+def refusal(options: RenderOptions) -> str:
     with pytest.raises(InputError) as error:
-        check_size(look)
+        check_size(options)
     return str(error.value)
 
 
 def test_sizes_that_cannot_be_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     for size in ((0, 0), (15, 40)):
         refused = f"--size {size[0]}x{size[1]}: expected sides of at least 16 pixels"
-        assert refusal(Look(size=size, format="png")) == refused
+        assert refusal(RenderOptions(size=size, format="png")) == refused
     for size in ((99999, 99999), (8194, 16), (8192, 8192)):
-        assert refusal(Look(size=size, format="png")) == (
+        assert refusal(RenderOptions(size=size, format="png")) == (
             f"--size {size[0]}x{size[1]}: too large for H.264 video; expected 8192 pixels a side and 8.9 "
             "million in all at most, such as 3840x2160"
         )
-    assert refusal(Look(size=(321, 193))) == (
+    assert refusal(RenderOptions(size=(321, 193))) == (
         "--size 321x193: a video has even sides; choose 320x192, or --format png"
     )
     monkeypatch.setattr(rendering, "free_bytes", lambda: 10**9)
-    assert refusal(Look(size=(3840, 2160))) == (
+    assert refusal(RenderOptions(size=(3840, 2160))) == (
         "--size 3840x2160 takes about 1.7 GB, and 1.0 GB of memory are free; choose a smaller size"
     )
     monkeypatch.setattr(rendering, "free_bytes", lambda: None)
-    check_size(Look(size=(3840, 2160)))
-    check_size(Look(size=(321, 193), format="png"))
-    check_size(Look())
+    check_size(RenderOptions(size=(3840, 2160)))
+    check_size(RenderOptions(size=(321, 193), format="png"))
+    check_size(RenderOptions())
 
 
 def test_another_size_keeps_the_field_of_view_and_the_shape_of_pixels() -> None:
@@ -83,7 +90,7 @@ def test_another_size_keeps_the_field_of_view_and_the_shape_of_pixels() -> None:
 
 
 def test_a_larger_size_shows_the_same(scene: Scene, drive: Drive, tmp_path: Path) -> None:
-    write_drive(tmp_path / "large", scene, drive, Look(format="png", size=(99, 72)), nothing)
+    write_drive(tmp_path / "large", scene, drive, RenderOptions(format="png", size=(99, 72)), nothing)
     large = cv2.imread(str(tmp_path / "large" / "0001.png"))
     assert large is not None
     small = panels.to_bytes(view(scene, drive, 1).colour.numpy())[..., ::-1]
@@ -92,11 +99,11 @@ def test_a_larger_size_shows_the_same(scene: Scene, drive: Drive, tmp_path: Path
 
 
 def test_rates_are_the_drives_own_or_the_wanted(drive: Drive) -> None:
-    assert video_rate(drive, Look()) == pytest.approx(10)
-    assert video_rate(drive, Look(fps=7.0)) == 7
+    assert video_rate(drive, RenderOptions()) == pytest.approx(10)
+    assert video_rate(drive, RenderOptions(fps=7.0)) == 7
     fast = Drive("fast", Trajectory(drive.path.world_from_camera, np.arange(3) * 1e-6))
     with pytest.raises(InputError) as error:
-        video_rate(fast, Look())
+        video_rate(fast, RenderOptions())
     assert str(error.value) == (
         "--trajectory fast has 1e+06 poses a second, and a video 0.1 to 240 frames: give --fps"
     )
@@ -107,9 +114,9 @@ def test_pictures_and_arrays_hold_exactly_what_is_rendered(
     scene: Scene, drive: Drive, tmp_path: Path, show: str
 ) -> None:
     done: list[int] = []
-    look = Look(show, "png")  # pyright: ignore
-    write_drive(tmp_path / "png", scene, drive, look, done.append)
-    write_drive(tmp_path / "npz", scene, drive, replace(look, format="npz"), nothing)
+    options = RenderOptions(show, "png")  # pyright: ignore
+    write_drive(tmp_path / "png", scene, drive, options, done.append)
+    write_drive(tmp_path / "npz", scene, drive, replace(options, format="npz"), nothing)
     assert done == [1, 2, 3]
     assert sorted(p.name for p in (tmp_path / "png").iterdir()) == [
         *(f"{i:04d}.png" for i in range(3)),
@@ -138,8 +145,8 @@ def test_parts_differ(scene: Scene, drive: Drive) -> None:
 
 
 def test_depth_is_read_back_in_metres(scene: Scene, drive: Drive, tmp_path: Path) -> None:
-    write_drive(tmp_path / "png", scene, drive, Look("depth", "png"), nothing)
-    write_drive(tmp_path / "npz", scene, drive, Look("depth", "npz"), nothing)
+    write_drive(tmp_path / "png", scene, drive, RenderOptions("depth", "png"), nothing)
+    write_drive(tmp_path / "npz", scene, drive, RenderOptions("depth", "npz"), nothing)
     depth_m, _ = read_depth(tmp_path / "png" / "0002.png", 1 / 256)
     with np.load(tmp_path / "npz" / "0002.npz") as arrays:
         assert sorted(arrays) == ["alpha", "depth_m"]
@@ -156,7 +163,7 @@ def test_depth_beyond_16_bits_stays_the_farthest() -> None:
 
 def test_a_video_of_depth_has_the_colours_of_the_panel(scene: Scene, drive: Drive, tmp_path: Path) -> None:
     large = replace(scene, cameras=tuple(c.resized(132, 96) for c in scene.cameras))
-    write_drive(tmp_path / "a.mp4", large, drive, Look("depth", fps=4.0), nothing)
+    write_drive(tmp_path / "a.mp4", large, drive, RenderOptions("depth", fps=4.0), nothing)
     with av.open(str(tmp_path / "a.mp4")) as container:
         assert container.streams.video[0].average_rate == 4
         shown = [
@@ -168,7 +175,7 @@ def test_a_video_of_depth_has_the_colours_of_the_panel(scene: Scene, drive: Driv
 
 
 def test_the_note_is_a_calibration_and_a_trajectory(scene: Scene, drive: Drive, tmp_path: Path) -> None:
-    write_drive(tmp_path / "a", scene, drive, Look(format="npz", size=(66, 40)), nothing)
+    write_drive(tmp_path / "a", scene, drive, RenderOptions(format="npz", size=(66, 40)), nothing)
     found = read_intrinsics(tmp_path / "a" / "render.json", (66, 40)).camera
     np.testing.assert_array_equal(found.matrix, view_camera(scene.cameras[0], (66, 40)).matrix)
     np.testing.assert_array_equal(
@@ -178,24 +185,24 @@ def test_the_note_is_a_calibration_and_a_trajectory(scene: Scene, drive: Drive, 
 
 def test_an_earlier_result_is_replaced_and_nothing_else(scene: Scene, drive: Drive, tmp_path: Path) -> None:
     folder = tmp_path / "a"
-    write_drive(folder, scene, drive, Look(format="npz"), nothing)
+    write_drive(folder, scene, drive, RenderOptions(format="npz"), nothing)
     write_drive(
         folder,
         scene,
         replace(drive, path=Trajectory(np.eye(4)[None], np.zeros(1))),
-        Look(format="png"),
+        RenderOptions(format="png"),
         nothing,
     )
     assert sorted(p.name for p in folder.iterdir()) == ["0000.png", "render.json"]
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(InputError) as error:
-        write_drive(folder, scene, drive, Look(format="png"), nothing)
+        write_drive(folder, scene, drive, RenderOptions(format="png"), nothing)
     assert str(error.value) == f"{folder} holds other files (notes.txt); choose another place"
     own = tmp_path / "photos"
     own.mkdir()
     (own / "0000.png").write_text("mine")
     with pytest.raises(InputError) as error:
-        write_drive(own, scene, drive, Look(format="png"), nothing)
+        write_drive(own, scene, drive, RenderOptions(format="png"), nothing)
     assert (
         str(error.value)
         == f"{own} holds other files (no render.json), and is not replaced; choose another place"
@@ -208,7 +215,11 @@ def test_a_failure_half_way_leaves_nothing(scene: Scene, drive: Drive, tmp_path:
         if done == 2:
             raise KeyboardInterrupt
 
-    for look, name in ((Look(), "a.mp4"), (Look(format="png"), "a"), (Look(format="npz"), "b")):
+    for options, name in (
+        (RenderOptions(), "a.mp4"),
+        (RenderOptions(format="png"), "a"),
+        (RenderOptions(format="npz"), "b"),
+    ):
         with pytest.raises(KeyboardInterrupt):
-            write_drive(tmp_path / name, scene, drive, look, stop)
+            write_drive(tmp_path / name, scene, drive, options, stop)
     assert list(tmp_path.iterdir()) == []

@@ -29,6 +29,7 @@ def generate(
     geometry: Annotated[GeometryName | None, arg(help_behavior_hint="(default: classical)")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
     geometry_weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
+    knowledge: Annotated[str | None, arg(metavar="street|none|FILE", help_behavior_hint="")] = None,
     quality: QualityName = "standard",
     method: MethodName = "dreamdrive",
     frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
@@ -68,6 +69,8 @@ def generate(
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a
             model that the hub's cache holds. Nothing is ever downloaded.
         geometry_weights: Weights of the geometry's network, where the prior has one too.
+        knowledge: Weights of the street network, which sees depth, classes and road users in each frame:
+            street are those that ship, none asks no network.
         quality: How many steps the fits take.
         method: dreamdrive is ours; paper takes the equations of the DreamDrive paper as printed.
         frames: Frames of the input to use, counted from 0.
@@ -129,7 +132,7 @@ def generate(
         chosen = read_options(options, chosen)
     found = _given(method=geometry, camera_height_m=camera_height, refine_poses=refine_poses or None)
     chosen = replace(chosen, geometry=replace(chosen.geometry, **found))
-    chosen = replace(chosen, **_given(representation=representation, device=device))
+    chosen = replace(chosen, **_given(representation=representation, device=device, knowledge=knowledge))
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(

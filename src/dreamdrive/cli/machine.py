@@ -2,6 +2,8 @@
 
 import os
 import signal
+from collections.abc import Generator
+from contextlib import contextmanager
 from types import FrameType
 
 from dreamdrive.machine import available_cores
@@ -33,3 +35,36 @@ def stop_like_an_interruption() -> None:
         raise Terminated
 
     signal.signal(signal.SIGTERM, stop)
+
+
+class Stop:
+    """Whether somebody asked to stop; the work then ends at its next safe point."""
+
+    def __init__(self) -> None:
+        self._signal = 0
+
+    def __call__(self) -> bool:
+        """Whether the work shall end."""
+        return self._signal != 0
+
+    def ask(self, number: int, frame: FrameType | None = None) -> None:
+        """Remember a signal; a second one ends the work at once."""
+        if self._signal:
+            self.end()
+        self._signal = number
+
+    def end(self) -> None:
+        """End the command as its signal would have."""
+        raise Terminated if self._signal == signal.SIGTERM else KeyboardInterrupt
+
+
+@contextmanager
+def asked_to_stop() -> Generator[Stop, None, None]:
+    """Take Ctrl-C and requests to terminate as requests to stop at the next safe point."""
+    stop = Stop()
+    before = {number: signal.signal(number, stop.ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -15,20 +15,24 @@ from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
+from dreamdrive.cli.look import look
 from dreamdrive.cli.machine import Terminated
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
+from dreamdrive.cli.train import train
 from dreamdrive.cli.world import world
 from dreamdrive.errors import InputError
 
 COMMANDS = {
     "generate": generate,
+    "look": look,
     "render": render,
     "export": export,
     "clean": clean,
     "evaluate": evaluate,
     "world": world,
     "prior": prior,
+    "train": train,
     "doctor": doctor,
 }
 _USER_ERROR, _INTERRUPTED, _TERMINATED = 2, 130, 143

@@ -46,21 +46,21 @@ def render(
         raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
     use_all_cores()
     from dreamdrive.drive import check_numbers, drives_of
-    from dreamdrive.show import Look, check_size, places, video_rate, write_drive
+    from dreamdrive.show import RenderOptions, check_size, places, video_rate, write_drive
 
-    look = Look(show, format, None if size is None else parse_size(size), fps)
+    options = RenderOptions(show, format, None if size is None else parse_size(size), fps)
     check_numbers(shift_m, fps)
-    check_size(look)
+    check_size(options)
     scene = open_scene(out)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":
         for drive in drives:
-            video_rate(drive, look)
+            video_rate(drive, options)
     console = Console()
-    for drive, place in zip(drives, places(out, output, drives, look), strict=True):
+    for drive, place in zip(drives, places(out, output, drives, options), strict=True):
         start, count = time.perf_counter(), len(drive.path)
         with Bars(console) as bars:
-            write_drive(place, scene, drive, look, partial(bars, "render", total=count))
+            write_drive(place, scene, drive, options, partial(bars, "render", total=count))
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
         console.print(f"{place}: {rate}", soft_wrap=True, markup=False)

@@ -48,6 +48,7 @@ class GroupOptions:
             ``"density"``, clusters of HDBSCAN over all Gaussians, of which ``majority`` and ``smallest``
             alone count (the paper); ``"none"``, each for itself: 0.495, but there are no things then that
             could have tracks, and held-out frames lose 0.7 dB.
+        users: Whether a road user that the street network sees, and that was followed, is one cluster.
     """
 
     threshold: float = 0.35
@@ -62,6 +63,7 @@ class GroupOptions:
     smallest: int = 24
     road: float | None = 0.1
     clusters: Literal["flow", "density", "none"] = "flow"
+    users: bool = True
 
 
 @dataclass(frozen=True)
@@ -107,13 +109,33 @@ def group(
     index = np.flatnonzero(value > options.candidate)
     points = source_pixels(geometry, gaussians, index)
     frames = gaussians.source_frame.numpy()[index]
-    labels = _space_time_labels(clip, points, frames, options, reach_px)
+    labels = _labels(clip, geometry, points, frames, options, reach_px)
     upright = ~on_road(points[:, :2], frames, labels, _low(geometry, gaussians, index, options))
     wins = elected(labels[upright], value[index[upright]], options)
     members = upright & np.isin(labels, wins)
     cluster = np.full(len(gaussians), -1, dtype=np.int64)
     cluster[index[members]] = np.searchsorted(wins, labels[members])
     return _grouping(cluster)
+
+
+def _labels(
+    clip: Clip,
+    geometry: Geometry,
+    points: Float[np.ndarray, "m 3"],
+    frames: Int[np.ndarray, " m"],
+    options: GroupOptions,
+    reach_px: float,
+) -> Int[np.ndarray, " m"]:
+    """One label a thing: road users that were followed are one each; flow joins the rest."""
+    if geometry.users is None or not options.users:
+        return _space_time_labels(clip, points, frames, options, reach_px)
+    height, width = geometry.users.shape[1:]
+    column, row = np.floor(points[:, :2]).astype(np.intp).T
+    user = geometry.users[frames, row.clip(0, height - 1), column.clip(0, width - 1)].astype(np.int64)
+    labels, rest = user - 1, user == 0
+    others = _space_time_labels(clip, points[rest], frames[rest], options, reach_px)
+    labels[rest] = others + int(user.max(initial=0))
+    return labels
 
 
 def _low(

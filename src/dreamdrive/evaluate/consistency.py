@@ -14,8 +14,7 @@ from dreamdrive.evaluate.epipolar import EpipolarShare, epipolar_share
 from dreamdrive.evaluate.paths import PathError, compare_paths
 from dreamdrive.evaluate.warp_error import WarpError, warp_error
 from dreamdrive.geometry.cameras import MIN_TRACKS, fill, odometry, settle, sfm
-from dreamdrive.geometry.evidence import Evidence, Features, features
-from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.evidence import Evidence, Features, features, observe, resized, working_frames
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.trajectory import Trajectory
@@ -110,7 +109,7 @@ def evaluate_consistency(
             "give the trajectory that this video was asked for, one pose a frame"
         )
     clip = _clip(frames, times_s, intrinsics, calibrated, valid)
-    seen = evidence.look(clip)
+    seen = observe(clip)
     found, path = _followed(clip, seen, moving, seed)
     error = None if path is None or asked is None else compare_paths(path.world_from_camera, _poses(asked))
     camera, poses, whose = _lines(clip, path, asked)
@@ -144,11 +143,11 @@ def _followed(
     clip: Clip, seen: Evidence, moving: np.ndarray | None, seed: int
 ) -> tuple[list[Features], Recovered | None]:
     """Features of what stands still, and the path that they and the road show."""
-    grey, usable = evidence.working_frames(clip, seen)
+    grey, usable = working_frames(clip, seen)
     street = seen.street
     if moving is not None:
-        usable = usable & ~evidence.resized(moving, usable.shape[:0:-1])
-        street = street & ~evidence.resized(moving, street.shape[:0:-1])
+        usable = usable & ~resized(moving, usable.shape[:0:-1])
+        street = street & ~resized(moving, street.shape[:0:-1])
     found = features.extract(grey, usable)
     return found, _recovered(clip, seen, street, found, seed)
 

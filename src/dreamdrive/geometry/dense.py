@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt16
 
 from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
@@ -12,14 +12,23 @@ from dreamdrive.geometry.depth import (
     agreement,
     combine,
     fill_flanks,
+    fused,
     make_view,
+    settled_in_time,
     single_threaded_opencv,
     sky_mask,
     sweep_frames,
     temporal_neighbours,
     unheard,
 )
-from dreamdrive.geometry.moving import FLAGGED, moving_evidence, standing_evidence
+from dreamdrive.geometry.moving import (
+    FLAGGED,
+    PairFlow,
+    moving_evidence,
+    neighbour_flows,
+    standing_evidence,
+    whole_users,
+)
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
@@ -59,6 +68,7 @@ def densify(
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
+    look, spread, users = clip.look, None, None
     with single_threaded_opencv():
         sky = _sky(clip, view)
         if clip.known.depth_m is not None:
@@ -67,20 +77,30 @@ def densify(
         elif measured is not None:
             inverse = _inverse(np.where(view.used[:, None, None], measured[0], 0))
             confidence = np.where(inverse > 0, measured[1], 0).astype(np.float32)
+        elif rough and look is not None:
+            inverse, confidence = np.zeros(view.grey.shape, np.float32), np.zeros(view.grey.shape, np.float32)
         elif rough:
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
+        if look is not None and not given:
+            inverse, confidence, spread = fused(view, look, inverse, confidence)
+        flows: dict[int, list[PairFlow]] = {}
         if posed.standing:
             moving = standing_evidence(view)
         elif posed.fallback is not None:
             moving = np.zeros(inverse.shape, np.float32)
         else:
-            moving = moving_evidence(view, inverse, sky, given)
+            flows = neighbour_flows(view)
+            moving = moving_evidence(view, flows, inverse, sky, given)
         moving = moving * ~sky
-        if not given:
+        if look is not None and spread is not None:
+            moving, users = whole_users(view, look, flows, moving, inverse, spread, clip.times_s)
+        if spread is not None:
+            inverse = settled_in_time(view, inverse, spread, moving < FLAGGED)
+        elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    return _geometry(posed, view, inverse, confidence, sky, moving)
+    return _geometry(posed, view, inverse, confidence, sky, moving, spread, users)
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -94,6 +114,8 @@ def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:
     for frame in view.frames:
         if clip.known.sky is not None:
             sky[frame] = clip.known.sky[frame] & view.usable[frame]
+        elif clip.look is not None:
+            sky[frame] = clip.look.sky[frame] & view.usable[frame]
         else:
             above = above_horizon(view.cameras[frame], view.ground)
             sky[frame] = sky_mask(view.rgb[frame], above, view.usable[frame])
@@ -175,6 +197,8 @@ def _geometry(
     confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
+    spread: Float[np.ndarray, "f h w"] | None,
+    users: UInt16[np.ndarray, "f h w"] | None,
 ) -> Geometry:
     """What both halves found, as the next stages take it."""
     shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
@@ -194,6 +218,8 @@ def _geometry(
         confidence=confidence,
         sky=sky,
         moving=moving,
+        spread=None if spread is None else np.where(shown, spread, 0).astype(np.float32),
+        users=users,
         fixed_regions=posed.fixed_regions[None],
         region_names=posed.region_names,
         ground=posed.ground,

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras import as_posed, contradiction, rebase, stands, without_poses
 from dreamdrive.geometry.dense import densify
-from dreamdrive.geometry.evidence import Evidence, look
+from dreamdrive.geometry.evidence import Evidence, observe
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
@@ -34,7 +34,7 @@ def begin(clip: Clip, backend: str, weights: Path | None) -> tuple[Path, Evidenc
     if weights is None:
         raise InputError(f"geometry {backend} needs the weights of its network")
     check_frames(clip, backend)
-    evidence = look.look(clip)
+    evidence = observe(clip)
     contradiction.check(clip, evidence)
     return weights, evidence, without_poses(clip) if stands(clip, evidence) else clip
 

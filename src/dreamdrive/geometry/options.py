@@ -49,6 +49,38 @@ class DepthOptions:
 
 
 @dataclass(frozen=True)
+class FusionOptions:
+    """Who is believed where stereo, the road and the street network all say something of a pixel's depth.
+
+    Spreads are relative standard deviations of the depth.
+
+    Attributes:
+        sure: Confidence from which swept depth counts, and the network is aligned to it.
+        hinted: Confidence from which it counts where it is near the aligned depth.
+        sure_spreads: Spreads of the aligned depth beyond which even sure stereo is not believed.
+        hinted_spreads: Spreads within which hinted stereo is.
+        reach: Part of the image width over which the network's scale is carried from sure pixels.
+        stereo_spread: Of stereo that is believed, and of the road.
+        least_spread: Of the network, at least.
+        contact_spread: Of the depth of a road user that its contact with the road gives, beside that of the
+            row in which it is seen.
+        user_stereo: Log depth by which sure stereo on a road user may differ from its contact.
+        user_spread: Of such stereo.
+    """
+
+    sure: float = 0.5
+    hinted: float = 0.15
+    sure_spreads: float = 4.0
+    hinted_spreads: float = 1.5
+    reach: float = 0.05
+    stereo_spread: float = 0.02
+    least_spread: float = 0.05
+    contact_spread: float = 0.06
+    user_stereo: float = 0.12
+    user_spread: float = 0.05
+
+
+@dataclass(frozen=True)
 class MovingOptions:
     """When pixels count as moving.
 
@@ -78,6 +110,22 @@ class MovingOptions:
 
 
 @dataclass(frozen=True)
+class UserOptions:
+    """Which of the road users that the street network sees move.
+
+    Attributes:
+        sure: Trust in a class from which on a pixel is believed to be no road user.
+        moving_share: Flagged part of a road user's pixels, over all its frames, from which on it moves.
+        moving_m_s: Speed of its foot over the map, from which on it moves: oncoming traffic agrees with
+            stereo. Parked cars, of which another part is seen from each place, come to 1.6 to 3.6 m/s.
+    """
+
+    sure: float = 0.8
+    moving_share: float = 0.3
+    moving_m_s: float = 4.5
+
+
+@dataclass(frozen=True)
 class GeometryOptions:
     """How cameras and depth are found.
 
@@ -90,6 +138,8 @@ class GeometryOptions:
         gate: When structure from motion is believed.
         depth: How the plane sweep finds depth.
         moving: When pixels count as moving.
+        fusion: What is believed where the street network speaks, too.
+        users: Which of the road users that it sees move.
     """
 
     method: str = "classical"
@@ -99,6 +149,8 @@ class GeometryOptions:
     gate: GateOptions = field(default_factory=GateOptions)
     depth: DepthOptions = field(default_factory=DepthOptions)
     moving: MovingOptions = field(default_factory=MovingOptions)
+    fusion: FusionOptions = field(default_factory=FusionOptions)
+    users: UserOptions = field(default_factory=UserOptions)
 
     def __post_init__(self) -> None:
         height_m = self.camera_height_m

@@ -103,7 +103,7 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
     return replace(
         first,
         cameras=tuple(cameras),
-        **{name: _woven(clip, parts, name) for name in ("depth_m", "confidence", "sky", "moving")},
+        **{name: _woven(clip, maps) for name, maps in _maps_of(parts).items()},
         fixed_regions=fixed,
         region_names=names,
         detected=tuple(dict.fromkeys(said)),
@@ -111,9 +111,22 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
     )
 
 
-def _woven(clip: Clip, parts: dict[int, Geometry], name: str) -> Any:
+def _maps_of(parts: dict[int, Geometry]) -> dict[str, dict[int, Any]]:
+    """Maps of each camera by their names; road users of two cameras have no number in common."""
+    found: dict[str, dict[int, Any]] = {}
+    for name in ("depth_m", "confidence", "sky", "moving", "spread", "users"):
+        maps = {camera: getattr(part, name) for camera, part in parts.items()}
+        if all(each is not None for each in maps.values()):
+            found[name] = maps
+    first = 0
+    for camera, users in found.get("users", {}).items():
+        found["users"][camera] = np.where(users > 0, users + np.uint16(first), 0).astype(np.uint16)
+        first += int(users.max(initial=0))
+    return found
+
+
+def _woven(clip: Clip, maps: dict[int, Any]) -> Any:
     """Maps of all frames (F, H, W) from those of each camera."""
-    maps = {camera: getattr(part, name) for camera, part in parts.items()}
     some = next(iter(maps.values()))
     whole = np.zeros((len(clip), *some.shape[1:]), some.dtype)
     for camera, values in maps.items():

@@ -1,1 +1,9 @@
 """The small street network: what a picture shows, without any geometry."""
+
+from dreamdrive.knowledge.files import MARK, write_look
+from dreamdrive.knowledge.look import LookOptions, Network, look
+from dreamdrive.knowledge.network import StreetNetwork
+from dreamdrive.knowledge.of_clip import look_at, with_looks
+from dreamdrive.knowledge.prediction import Prediction
+from dreamdrive.knowledge.shipped import NO_KNOWLEDGE, SHIPPED, load_knowledge, weights_of
+from dreamdrive.knowledge.weights import load_network

@@ -25,6 +25,7 @@ from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
+from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -32,6 +33,7 @@ NOUNS: dict[str, type] = {
     noun.__name__: noun
     for noun in (
         Camera,
+        CameraEstimate,
         Clip,
         Exposure,
         Focal,
@@ -40,9 +42,11 @@ NOUNS: dict[str, type] = {
         Ground,
         Grouping,
         Known,
+        Look,
         Measured,
         Posed,
         Recorded,
+        RoadUser,
         Scale,
         Sky,
         StaticFit,

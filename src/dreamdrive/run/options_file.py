@@ -15,7 +15,11 @@ from dreamdrive.files.paths import read_text
 from dreamdrive.options import Options
 
 T = TypeVar("T")
-_ELSEWHERE = {"seed": "--seed", "geometry.weights": "--weights or --geometry-weights"}
+_ELSEWHERE = {
+    "seed": "--seed",
+    "geometry.weights": "--weights or --geometry-weights",
+    "knowledge": "--knowledge",
+}
 
 
 def read_options(path: Path, base: Options) -> Options:

@@ -8,6 +8,7 @@ from dreamdrive.choices import DATASETS, PRIORS, QualityName
 from dreamdrive.data import dataset_of
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, bent_model, companions
+from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, weights_of
 from dreamdrive.models import find_weights
 from dreamdrive.options import QUALITIES, Options, with_method
 from dreamdrive.prior import choose_prior, prior_of
@@ -36,7 +37,7 @@ class Request:
     @property
     def reading(self) -> list[object]:
         """All that the frames depend on."""
-        files = {name: value for name, value in self.digests.items() if name != "weights"}
+        files = {name: value for name, value in self.digests.items() if name not in ("weights", "knowledge")}
         packages = PRIORS.package(self.prior) | DATASETS.package(self.control.dataset)
         return [self.prior, packages, self.control.settings, files, self.control.seed]
 
@@ -53,6 +54,8 @@ class Request:
         options = asdict(self.options)
         geometry = options.pop("geometry")
         del options["seed"], geometry["weights"]
+        if options["knowledge"] not in (SHIPPED, NO_KNOWLEDGE):
+            options["knowledge"] = "file"
         chosen = {
             "prior": self.prior,
             "geometry": geometry.pop("method"),
@@ -83,16 +86,17 @@ def request_of(
     control = _with_lens(control, geometry_files)
     quality = _quality_of(whole)
     options = replace(whole, geometry=geometry, seed=control.seed)
-    return Request(
-        control, prior, geometry_files, options, quality, _digests(control, geometry_files, network)
-    )
+    knowledge = None if options.knowledge == NO_KNOWLEDGE else weights_of(options.knowledge)
+    digests = _digests(control, geometry_files, network, knowledge)
+    return Request(control, prior, geometry_files, options, quality, digests)
 
 
 def _quality_of(options: Options) -> str:
     """The name of the options, whatever is chosen beside the quality."""
     g = options.geometry
-    geometry = GeometryOptions(gate=g.gate, depth=g.depth, moving=g.moving)
-    plain = replace(options, geometry=geometry, representation="hybrid", device="cpu", seed=0)
+    geometry = GeometryOptions(gate=g.gate, depth=g.depth, moving=g.moving, fusion=g.fusion, users=g.users)
+    beside = {"representation": "hybrid", "device": "cpu", "knowledge": Options.knowledge, "seed": 0}
+    plain = replace(options, geometry=geometry, **beside)
     named = {name: with_method(one, options.method) for name, one in QUALITIES.items()}
     return next((name for name, one in named.items() if one == plain), "custom")
 
@@ -119,7 +123,9 @@ def _with_lens(control: Control, geometry_files: Path | None) -> Control:
     return replace(control, intrinsics=bent_model(geometry_files))
 
 
-def _digests(control: Control, geometry_files: Path | None, weights: Path | None) -> dict[str, str]:
+def _digests(
+    control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None
+) -> dict[str, str]:
     given = {
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
@@ -129,6 +135,7 @@ def _digests(control: Control, geometry_files: Path | None, weights: Path | None
         "prior-weights": (control.weights, "a file of weights or its folder"),
         "geometry-files": (geometry_files, EXPECTED),
         "weights": (weights, "a file of weights or its folder"),
+        "knowledge": (knowledge, "weights of the street network"),
     }
     digests: dict[str, str] = {}
     for name, (path, expected) in given.items():

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Geometry, Ground
+from dreamdrive.scene.look import Look
 from dreamdrive.scene.trajectory import Trajectory
 
 OF_GEOMETRY = 2
@@ -79,6 +80,7 @@ class Clip:
         latents: What the frames were decoded from, for priors with a latent space (F, h, w, C).
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
+        looks: What the street network sees, one look a camera of the rig; empty where it was not asked.
         cuts: Index of each first frame of its camera after a change to another scene.
         recorded: How the frames were taken from pictures on disk; None where they were drawn or generated.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
@@ -96,6 +98,7 @@ class Clip:
     latents: Float[np.ndarray, "f _ _ _"] | None = None
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
+    looks: tuple[Look, ...] = ()
     cuts: tuple[int, ...] = ()
     recorded: Recorded | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -107,6 +110,9 @@ class Clip:
                 raise ValueError(f"clip: {name} has {len(getattr(self, name))} entries for {count} frames")
         if not all(0 < cut < count for cut in self.cuts):
             raise ValueError(f"clip: cuts {self.cuts} are not all inside its {count} frames")
+        seen = [len(look) for look in self.looks]
+        if self.looks and seen != [int((self.camera == k).sum()) for k in range(len(self.rig))]:
+            raise ValueError(f"clip: looks of {seen} frames are not those of its cameras")
         if count and not 0 <= int(self.camera.min()) <= int(self.camera.max()) < len(self.rig):
             raise ValueError("clip: camera indexes beyond the rig")
 
@@ -132,6 +138,11 @@ class Clip:
             step[own] = np.arange(np.count_nonzero(own))
         return step
 
+    @property
+    def look(self) -> Look | None:
+        """What the street network sees in the frames of the one camera, where it was asked."""
+        return self.looks[0] if self.looks else None
+
     def of_camera(self, camera: int) -> Int[np.ndarray, " k"]:
         """Indices of the frames of one camera of the rig, in the order of time."""
         return np.flatnonzero(self.camera == camera)
@@ -154,6 +165,7 @@ class Clip:
             source_index=self.source_index[rows],
             features={name: values[rows] for name, values in self.features.items()},
             latents=None if self.latents is None else self.latents[rows],
+            looks=self.looks[camera : camera + 1],
             cuts=tuple(np.flatnonzero(np.isin(rows, self.cuts)).tolist()),
             known=replace(
                 known,

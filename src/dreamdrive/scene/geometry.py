@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt16
 
 from dreamdrive.scene.camera import Camera
 
@@ -84,6 +84,10 @@ class Geometry:
         confidence: Trust in the depth (F, H, W) in [0, 1]; 0 in sky, invalid and camera-fixed pixels.
         sky: Sky masks (F, H, W).
         moving: Evidence that a pixel belongs to something that moves (F, H, W) in [0, 1].
+        spread: Relative half width of the interval that holds the depth with 68 % (F, H, W), 0 where there is
+            none; None where nothing tells it.
+        users: The road user that a pixel belongs to (F, H, W), one number over all frames in which it was
+            followed, from 1; 0 where there is none. None where nobody looked for them.
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
             camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
             clip's rig (K, H, W).
@@ -115,6 +119,8 @@ class Geometry:
     fallback_kind: Fallback | None = None
     placed: int | None = None
     metres_per_unit: float | None = 1.0
+    spread: Float[np.ndarray, "f h w"] | None = None
+    users: UInt16[np.ndarray, "f h w"] | None = None
 
     def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
         """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""

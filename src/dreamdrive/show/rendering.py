@@ -38,7 +38,7 @@ _FILES = (".mp4", ".png", ".npz")
 
 
 @dataclass(frozen=True)
-class Look:
+class RenderOptions:
     """What is shown of a drive, and how it is kept: a video, or a folder with a file a frame.
 
     Without a size it is that of the recording, without a rate that of the drive.
@@ -50,15 +50,15 @@ class Look:
     fps: float | None = None
 
 
-def check_size(look: Look) -> None:
+def check_size(options: RenderOptions) -> None:
     """Refuse sizes that cannot be rendered or kept, before anything is loaded."""
-    if look.size is None:
+    if options.size is None:
         return
-    width, height = look.size
-    check_largest(look.size, f"--size {width}x{height}")
-    if min(look.size) < MIN_SIDE_PX:
+    width, height = options.size
+    check_largest(options.size, f"--size {width}x{height}")
+    if min(options.size) < MIN_SIDE_PX:
         raise InputError(f"--size {width}x{height}: expected sides of at least {MIN_SIDE_PX} pixels")
-    if look.format == "mp4" and (width % 2 or height % 2):
+    if options.format == "mp4" and (width % 2 or height % 2):
         raise InputError(
             f"--size {width}x{height}: a video has even sides; choose "
             f"{width - width % 2}x{height - height % 2}, or --format png"
@@ -71,7 +71,9 @@ def check_size(look: Look) -> None:
         )
 
 
-def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Callable[[int], None]) -> None:
+def write_drive(
+    path: Path, scene: Scene, drive: Drive, options: RenderOptions, progress: Callable[[int], None]
+) -> None:
     """Render a drive and write it; the result appears when it is whole, in place of one from here.
 
     A video holds colours; depth has those of ``drive.panels``. A folder holds one file a frame: ``NNNN.png``,
@@ -80,27 +82,27 @@ def write_drive(path: Path, scene: Scene, drive: Drive, look: Look, progress: Ca
     float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has calibration,
     poses and times. One frame is held at a time. ``progress`` is called with the number of frames done.
     """
-    camera = view_camera(scene.cameras[0], look.size)
-    part = look.show if look.show in ("dynamic", "static") else "all"
+    camera = view_camera(scene.cameras[0], options.size)
+    part = options.show if options.show in ("dynamic", "static") else "all"
 
     def views() -> Iterator[SceneView]:
         for i, pose in enumerate(drive.path.world_from_camera):
             yield render_scene(scene, camera.at(pose), float(drive.path.times_s[i]), part=part)
             progress(i + 1)
 
-    if look.format == "mp4":
-        write_video(path, (_picture(view, look.show) for view in views()), video_rate(drive, look))
+    if options.format == "mp4":
+        write_video(path, (_picture(view, options.show) for view in views()), video_rate(drive, options))
         return
     _check_replaceable(path)
     with new_folder(path, replace=True, mark=NOTE) as folder:
         for i, view in enumerate(views()):
-            _write_frame(folder / f"{i:04d}.{look.format}", view, look.show)
-        (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, look), allow_nan=False) + "\n")
+            _write_frame(folder / f"{i:04d}.{options.format}", view, options.show)
+        (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, options), allow_nan=False) + "\n")
 
 
-def video_rate(drive: Drive, look: Look) -> float:
+def video_rate(drive: Drive, options: RenderOptions) -> float:
     """Frames a second of a video of a drive, within ``RATES_HZ``."""
-    rate = frame_rate(drive.path) if look.fps is None else look.fps
+    rate = frame_rate(drive.path) if options.fps is None else options.fps
     if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
         raise InputError(
             f"--trajectory {drive.name} has {rate:.3g} poses a second, and a video {RATES_HZ[0]:g} to "
@@ -150,11 +152,11 @@ def _write_frame(path: Path, view: SceneView, show: Show) -> None:
         write_png(path, _picture(view, show))
 
 
-def _note(camera: Camera, drive: Trajectory, look: Look) -> dict[str, Any]:
+def _note(camera: Camera, drive: Trajectory, options: RenderOptions) -> dict[str, Any]:
     """Calibration as ``--intrinsics`` reads it (pixels by integer index), path as ``--trajectory`` does."""
-    unit = {"depth_unit": f"1/{PER_METRE} m"} if (look.show, look.format) == ("depth", "png") else {}
+    unit = {"depth_unit": f"1/{PER_METRE} m"} if (options.show, options.format) == ("depth", "png") else {}
     return {
-        "show": look.show,
+        "show": options.show,
         **unit,
         **indexed_pinhole(camera),
         "world_from_camera": drive.world_from_camera.tolist(),
@@ -170,7 +172,7 @@ def _check_replaceable(path: Path) -> None:
         raise InputError(f"{path} holds other files ({', '.join(sorted(foreign)[:3])}); choose another place")
 
 
-def places(out: Path, output: Path | None, drives: Sequence[Drive], look: Look) -> list[Path]:
+def places(out: Path, output: Path | None, drives: Sequence[Drive], options: RenderOptions) -> list[Path]:
     """Where each drive goes: ``-o``, or ``video`` in the output folder, where no link leads elsewhere.
 
     ``-o`` is the result of a single drive, or the folder for those of several. What is not all colours is
@@ -179,24 +181,26 @@ def places(out: Path, output: Path | None, drives: Sequence[Drive], look: Look) 
     if output is not None:
         _check_place(out, output)
         if len(drives) == 1:
-            return [_single(output, look)]
+            return [_single(output, options)]
         if output.suffix.lower() in _FILES:
             raise InputError(
                 f"-o {output}: expected a folder for {len(drives)} trajectories, not the name of a file"
             )
-    kind = "" if look.show == "colour" else f"_{look.show}"
-    kind += {"mp4": ".mp4", "png": "", "npz": "_npz"}[look.format]
+    kind = "" if options.show == "colour" else f"_{options.show}"
+    kind += {"mp4": ".mp4", "png": "", "npz": "_npz"}[options.format]
     names = [f"{drive.name}{kind}" for drive in drives]
     if output is not None:
         return [inside(output, name) for name in names]
     return [inside(out, f"video/{name}") for name in names]
 
 
-def _single(output: Path, look: Look) -> Path:
-    if look.format == "mp4" and output.suffix.lower() != ".mp4":
+def _single(output: Path, options: RenderOptions) -> Path:
+    if options.format == "mp4" and output.suffix.lower() != ".mp4":
         raise InputError(f"-o {output}: expected a name that ends in .mp4")
-    if look.format != "mp4" and output.suffix.lower() in _FILES:
-        raise InputError(f"-o {output}: expected a folder for --format {look.format}, not the name of a file")
+    if options.format != "mp4" and output.suffix.lower() in _FILES:
+        raise InputError(
+            f"-o {output}: expected a folder for --format {options.format}, not the name of a file"
+        )
     if output.name in ("", ".."):
         raise InputError(f"-o {output}: expected the name of a new folder")
     return output

@@ -5,6 +5,6 @@ from dreamdrive.world.files import MARK, read_world, write_world
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
 from dreamdrive.world.options import StreetKind, StreetOptions
-from dreamdrive.world.render import WorldView, look
+from dreamdrive.world.render import WorldView, picture_of
 from dreamdrive.world.streets import draw_street
 from dreamdrive.world.world import Moment, Mover, World

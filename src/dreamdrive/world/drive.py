@@ -18,7 +18,7 @@ from dreamdrive.world.edition2.relief import hills_of
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.options import StreetOptions
-from dreamdrive.world.render import WorldView, look
+from dreamdrive.world.render import WorldView, picture_of
 from dreamdrive.world.streets import draw_street
 from dreamdrive.world.world import World
 
@@ -241,7 +241,7 @@ def _looks(
 
     def one(k: int) -> WorldView:
         following = float(next_times_s[k]), next_cameras[k]
-        return look(world, world.at(float(times_s[k])), cameras[k], following, antialiased=antialiased)
+        return picture_of(world, world.at(float(times_s[k])), cameras[k], following, antialiased=antialiased)
 
     yield one(0)  # what is made on first use is made once
     with ThreadPoolExecutor(2) as pool:

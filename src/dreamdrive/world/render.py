@@ -43,7 +43,7 @@ class WorldView:
         return self.semantic == Semantic.SKY
 
 
-def look(
+def picture_of(
     world: World, moment: Moment, camera: Camera, following: tuple[float, Camera], *, antialiased: bool = True
 ) -> WorldView:
     """The picture of a camera in the map frame, and the flow to where another time and camera see the same.

@@ -6,7 +6,7 @@ from tests.geometry.toy_drive import make_clip, straight, turning
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.contradiction import check, explain
-from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.clip import Clip, Known
 
 PATH = turning(8, 0.4, 2.0)
@@ -18,7 +18,7 @@ def clip() -> Clip:
 
 
 def share(clip: Clip, poses: np.ndarray) -> float:
-    found = explain(look(clip), poses)
+    found = explain(observe(clip), poses)
     assert found.own > 0.8
     assert found.contradictory == (found.given < 0.5 * found.own)
     return found.given / found.own
@@ -48,28 +48,28 @@ def test_wrong_poses_are_refused(clip: Clip, wrong) -> None:
     assert share(clip, wrong(PATH)) < 0.5
     given = replace(clip, known=Known(world_from_camera=wrong(PATH), intrinsics=True))
     with pytest.raises(InputError, match=r"contradict the frames.*world-from-camera") as refused:
-        check(given, look(given))
+        check(given, observe(given))
     assert "guess" not in str(refused.value)
 
 
 def test_frames_that_a_model_drew_are_nobodys_mistake(clip: Clip) -> None:
     drawn = replace(clip, known=Known(np.linalg.inv(PATH), intrinsics=True, generated=True))
-    check(drawn, look(drawn))
+    check(drawn, observe(drawn))
 
 
 def test_a_wrong_focal_length_is_thought_of(clip: Clip) -> None:
     narrow = replace(clip.rig[0], fx_px=4 * clip.rig[0].fx_px, fy_px=4 * clip.rig[0].fy_px)
     given = replace(clip, rig=(narrow,), known=Known(world_from_camera=PATH, intrinsics=False))
     with pytest.raises(InputError, match="the focal length is a guess"):
-        check(given, look(given))
+        check(given, observe(given))
 
 
 def test_frames_that_show_nothing_contradict_nothing(clip: Clip) -> None:
     blank = replace(clip, frames=np.full_like(clip.frames, 90))
-    evidence = look(blank)
+    evidence = observe(blank)
     assert explain(evidence, PATH).pairs == 0
     still = straight([0.0] * 7)
-    evidence = look(clip)
+    evidence = observe(clip)
     assert explain(evidence, still).pairs == 0
 
 
@@ -77,10 +77,10 @@ def test_poses_that_stand_are_refused_where_the_camera_moves(clip: Clip) -> None
     standing = np.tile(np.eye(4), (len(clip), 1, 1))
     given = replace(clip, known=Known(world_from_camera=standing, intrinsics=True))
     with pytest.raises(InputError) as refused:
-        check(given, look(given))
+        check(given, observe(given))
     assert str(refused.value) == (
         "the given poses are all the same, but the camera moves in the frames: with them nothing has a "
         "depth. Give the pose of each frame, or none to have them found"
     )
     still = replace(given, frames=np.repeat(clip.frames[:1], len(clip), axis=0))
-    check(still, look(still))
+    check(still, observe(still))

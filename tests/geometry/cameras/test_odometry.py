@@ -3,12 +3,12 @@ import pytest
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
 from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive
-from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.evidence import observe
 
 
 def run(path: np.ndarray, blank_road: bool = False) -> Odometry:
     clip = make_clip(path)
-    seen = evidence.look(clip)
+    seen = observe(clip)
     grey = seen.grey.copy()
     if blank_road:
         grey[:, 92:] = 100
@@ -23,7 +23,7 @@ def test_a_turn_is_followed() -> None:
 
 
 def test_a_fast_turn_counts_as_motion() -> None:
-    assert evidence.look(make_clip(turning(6))).motion.moving.all()
+    assert observe(make_clip(turning(6))).motion.moving.all()
 
 
 def test_a_stop_and_go_drive_stops_and_goes_again() -> None:

@@ -9,12 +9,12 @@ from dreamdrive.geometry import GateOptions
 from dreamdrive.geometry.cameras import sfm
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.sfm import Model
-from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.clip import Clip
 
 
 def run(clip: Clip, seed: int = 0) -> Outcome:
-    return reconstruct(clip, evidence.look(clip), GateOptions(), seed)
+    return reconstruct(clip, observe(clip), GateOptions(), seed)
 
 
 @pytest.fixture(scope="module")

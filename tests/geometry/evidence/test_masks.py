@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 from tests.geometry.toy_drive import HEIGHT, HOOD_ROWS, WIDTH, make_clip, straight
 
-from dreamdrive.geometry.evidence import look as evidence
-from dreamdrive.geometry.evidence import masks
+from dreamdrive.geometry.evidence import masks, observe
 
 STEPS = [0.5] * 9
 
@@ -66,7 +65,7 @@ def test_a_lead_car_at_a_constant_distance_is_an_object_and_no_region(plain: np.
 
 def test_a_standing_clip_gives_no_bonnet() -> None:
     clip = make_clip(straight([0.0] * 5), hood=True)
-    assert evidence.look(clip).fixed.names == ()
+    assert observe(clip).fixed.names == ()
 
 
 def test_traffic_past_a_standing_camera_is_no_motion(plain: np.ndarray) -> None:
@@ -75,6 +74,6 @@ def test_traffic_past_a_standing_camera_is_no_motion(plain: np.ndarray) -> None:
         frame[90:150, 20 + 12 * index : 110 + 12 * index] = plain[5, 20:80, 100:190]
     clip = make_clip(straight([0.0] * 9))
     frames = np.repeat(still[..., None], 3, axis=-1)
-    seen = evidence.look(type(clip)(**{**vars(clip), "frames": frames}))
+    seen = observe(type(clip)(**{**vars(clip), "frames": frames}))
     assert seen.motion.standing
     assert not seen.motion.moving.any()

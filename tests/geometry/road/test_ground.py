@@ -6,7 +6,7 @@ from tests.geometry.toy_drive import HEIGHT_M, make_clip, straight, turning
 
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.geometry.cameras.posing import pose_clip
-from dreamdrive.geometry.evidence import look as evidence
+from dreamdrive.geometry.evidence import observe
 from dreamdrive.geometry.road.ground_points import fit_points
 from dreamdrive.geometry.road.ground_sweep import Road, sweep
 from dreamdrive.geometry.road.scale import Street, asked_m_s, from_ground, from_road_points
@@ -16,7 +16,7 @@ from dreamdrive.scene.trajectory import Trajectory
 @pytest.mark.parametrize("path", [straight([0.6] * 7), turning(8, 0.6, 3.0)], ids=["straight", "turning"])
 def test_the_sweep_finds_the_height_of_a_rendered_road(path: np.ndarray) -> None:
     clip = make_clip(path)
-    seen = evidence.look(clip)
+    seen = observe(clip)
     plane = sweep(Road(seen.grey, seen.street, seen.small, path))
     assert plane is not None
     assert plane.height == pytest.approx(HEIGHT_M, rel=0.02)
@@ -46,7 +46,7 @@ def test_a_shelf_above_the_road_is_not_the_road() -> None:
 
 def test_a_blank_road_gives_an_assumed_speed_and_says_so() -> None:
     clip = make_clip(straight([0.6] * 5))
-    seen = evidence.look(clip)
+    seen = observe(clip)
     grey = seen.grey.copy()
     grey[:, 90:] = 100
     street = Street(grey, seen.street, seen.small, straight([0.3] * 5), np.zeros((0, 3)), clip.times_s)

@@ -11,7 +11,7 @@ from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Evidence, Features, features, look
+from dreamdrive.geometry.evidence import Evidence, Features, features, working_frames
 from dreamdrive.geometry.options import GateOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -50,7 +50,7 @@ def reconstruct(
     """
     if len(clip) < MIN_FRAMES:
         return _refused(f"{len(clip)} frames are too few for structure from motion", "few")
-    found = features.extract(*look.working_frames(clip, evidence))
+    found = features.extract(*working_frames(clip, evidence))
     tell()
     typical = int(np.median([len(entry.keypoints_px) for entry in found]))
     if typical < MIN_FEATURES:

@@ -11,7 +11,7 @@ from dreamdrive.geometry.cameras import contradiction, odometry
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Evidence, look
+from dreamdrive.geometry.evidence import Evidence, observe
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.road import Metric, Street, depth_points, depth_ratios, scale
 from dreamdrive.scene.camera import Camera
@@ -73,7 +73,7 @@ def pose_clip(
     if len(clip) == 0:
         raise InputError("The clip holds no frame; at least two are needed for geometry from motion.")
     camera_height_m = options.camera_height_m
-    evidence = look.look(clip)
+    evidence = observe(clip)
     contradiction.check(clip, evidence)
     tell()
     if clip.known.world_from_camera is not None:

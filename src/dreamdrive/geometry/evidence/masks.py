@@ -81,6 +81,16 @@ def find_fixed(
     return Fixed(resized.astype(np.int32), names, kept > 0)
 
 
+def with_own_car(fixed: Fixed, own_car: Bool[np.ndarray, "h w"]) -> Fixed:
+    """What is fixed with the own car as another picture of it shows that, where nothing was found before."""
+    added = own_car & (fixed.regions == 0)
+    if not added.any():
+        return fixed
+    names = fixed.names if BONNET in fixed.names else (*fixed.names, BONNET)
+    regions = np.where(added, 1 + names.index(BONNET), fixed.regions).astype(np.int32)
+    return Fixed(regions, names, fixed.objects & ~added)
+
+
 def _bars(grey: np.ndarray) -> np.ndarray:
     """Rows and columns at the border that are black in every frame."""
     dark = grey.max(axis=0) < BAR_LEVEL

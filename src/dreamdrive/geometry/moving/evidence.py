@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.depth import View, by_frame, sample
 from dreamdrive.geometry.moving import contest
-from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
+from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.moving.oncoming import oncoming
 from dreamdrive.geometry.moving.outline import outline
 from dreamdrive.geometry.options import MovingOptions
@@ -25,6 +25,7 @@ _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 
 def moving_evidence(
     view: View,
+    flows: Mapping[int, list[PairFlow]],
     inverse_depth: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     known_depth: bool,
@@ -36,7 +37,7 @@ def moving_evidence(
     static ones; they are found where they visibly do not stand on the road, see ``oncoming``, unless depth
     was given rather than found.
     """
-    flows, options = neighbour_flows(view), view.options.moving
+    options = view.options.moving
 
     def judged(frame: int) -> contest.Verdict:
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)

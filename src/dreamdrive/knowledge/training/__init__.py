@@ -1,1 +1,5 @@
-"""How the street network is trained."""
+"""How the street network is trained: records, batches, losses, the loop."""
+
+from dreamdrive.knowledge.training.loader import LoaderOptions
+from dreamdrive.knowledge.training.options import TrainingOptions
+from dreamdrive.knowledge.training.street import WEIGHTS, StreetTraining, train_street

@@ -15,7 +15,7 @@ from dreamdrive.files.atomic import new_folder
 from dreamdrive.knowledge.training.records import Record, depth_steps, read_records, write_records
 from dreamdrive.knowledge.training.viewpoints import Viewpoint, Viewpoints
 from dreamdrive.scene.street_class import StreetClass
-from dreamdrive.world import Semantic, StreetOptions, World, WorldView, draw_street, look
+from dreamdrive.world import Semantic, StreetOptions, World, WorldView, draw_street, picture_of
 from dreamdrive.world.edition2 import FIRST_TRAINING_SEED, Looks, TextureLibrary, bent, draw_light, photograph
 
 EDITION = 2
@@ -130,7 +130,7 @@ def draw_street_records(
             for _ in range(options.views):
                 at = places.draw()
                 seen = world.changed(light, at.lens, at.ego)
-                view = look(seen, places.moment, at.camera, (at.time_s, at.camera))
+                view = picture_of(seen, places.moment, at.camera, (at.time_s, at.camera))
                 view = replace(view, frame=photograph(view.frame, int(rng.integers(2**31))))
                 quality = int(rng.integers(options.quality[0], options.quality[1] + 1))
                 records.append(_write(view, at, made, f"{len(records):02d}", f"street-{seed}", quality))

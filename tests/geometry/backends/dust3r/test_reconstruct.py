@@ -17,7 +17,7 @@ from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.backends.dust3r.network.images import fitting
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.backends.dust3r.reconstruct import measured, planned_pairs
-from dreamdrive.geometry.evidence.look import look
+from dreamdrive.geometry.evidence import observe
 from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.progress import Work
@@ -52,7 +52,7 @@ def test_true_geometry_in_any_unit_comes_back_in_metres(drive, clip: Clip, facto
     found = finish(
         clip,
         Measured(poses, clip.rig[0], True, depth, confidence),
-        look(clip),
+        observe(clip),
         GeometryOptions(camera_height_m=1.5),
     )
     truth = drive.trajectory.world_from_camera[-1, :3, 3]
@@ -68,7 +68,7 @@ def test_a_unit_that_is_the_metre_is_kept(drive, clip: Clip):
     depth = np.where(clip.held_out[:, None, None], 0, drive.depth_m).astype(np.float32)
     poses = drive.trajectory.world_from_camera
     given = Measured(poses, clip.rig[0], True, depth, (depth > 0).astype(np.float32), unit="a metric network")
-    found = finish(clip, given, look(clip), GeometryOptions(camera_height_m=3.0))
+    found = finish(clip, given, observe(clip), GeometryOptions(camera_height_m=3.0))
     assert found.cameras[-1].world_from_camera == pytest.approx(poses[-1], abs=1e-6)
     assert found.scale.source == "a metric network"
     assert any("m above the road" in note for note in found.detected)

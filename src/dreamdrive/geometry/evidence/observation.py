@@ -12,6 +12,9 @@ from dreamdrive.geometry.evidence.masks import Fixed
 from dreamdrive.geometry.evidence.motion import Motion
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.windows import window_px
+
+_AROUND_PX = 5  # the side of the window that outlines grow by: they are not exact
 
 
 @dataclass(frozen=True)
@@ -27,21 +30,30 @@ class Evidence:
     detected: tuple[str, ...]  # sentences for the report
 
 
-def look(clip: Clip) -> Evidence:
+def observe(clip: Clip) -> Evidence:
     """Measure motion and find fixed regions at 320 px width."""
     camera, (width, height) = clip.rig[0], clip.size
     size = (motion.WIDTH_PX, max(1, round(height * motion.WIDTH_PX / width)))
     working = features.working_size(width, height)
     grey = features.to_grey(clip.frames, size)
     valid = resized(clip.valid, size)
-    moves = motion.measure(grey, valid, clip.times_s)
+    users = resized(road_users(clip), size)
+    moves = motion.measure(grey, valid & ~users, clip.times_s)
     in_motion = np.zeros(len(clip), bool)
     if not moves.standing:
         in_motion[:-1] |= moves.moving
         in_motion[1:] |= moves.moving
     fixed = masks.find_fixed(grey, np.logical_and.reduce(valid), in_motion, clip.size)
-    street = valid & ~resized(((fixed.regions > 0) | fixed.objects)[None], size)
+    if clip.look is not None:
+        fixed = masks.with_own_car(fixed, np.median(clip.look.own_car, axis=0) > 0)
+    street = valid & ~users & ~resized(((fixed.regions > 0) | fixed.objects)[None], size)
     detected = masks.describe(fixed)
+    if clip.look is not None and not clip.known.intrinsics:
+        detected.append(
+            f"the street network sees a field of view of {np.degrees(clip.look.camera.hfov_rad):.0f} "
+            f"degrees, give or take {100 * clip.look.camera.focal_spread:.0f} %: it is taken unless turning "
+            "shows another"
+        )
     if moves.brightness < motion.DARK_LEVEL:
         detected.append(
             f"the clip is dark: nine tenths of the pixels lie below grey level {moves.brightness:.0f} of 255"
@@ -61,8 +73,20 @@ def working_frames(
 
 
 def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
-    """Pixels (F, H, W) that show the street: something that keeps its place in the image is none."""
-    return clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects
+    """Pixels (F, H, W) that show the street: road users and what keeps its place in the image are none."""
+    return clip.valid & ~(evidence.fixed.regions > 0) & ~evidence.fixed.objects & ~road_users(clip)
+
+
+def road_users(clip: Clip) -> Bool[np.ndarray, "f h w"]:
+    """Pixels (F, H, W) that the street network takes for road users, and those around them; else none.
+
+    Those that stand are left out, too: nobody knows yet which do.
+    """
+    if clip.look is None:
+        return np.zeros(clip.valid.shape, bool)
+    side = window_px(_AROUND_PX, clip.size[0])
+    kernel = np.ones((side, side), np.uint8)
+    return np.stack([cv2.dilate((each > 0).astype(np.uint8), kernel) > 0 for each in clip.look.instances])
 
 
 def resized(masks: Bool[np.ndarray, "f _ _"], size: Sequence[int]) -> Bool[np.ndarray, "f h w"]:

@@ -1,0 +1,84 @@
+"""Depth, classes and camera of drawn streets against their exact truth."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.world import Drive, Semantic, make_street
+from knowledge.cameras import See, errors_deg
+from knowledge.lidar import FAR_M, NEAR_M, relative_errors
+
+SIZE = 480, 270
+FRAMES, FPS = 3, 1.0
+ALIKE = {
+    StreetClass.SKY: ("SKY",),
+    StreetClass.ROAD: ("ROAD",),
+    StreetClass.MARKING: ("MARKING",),
+    StreetClass.GROUND: ("SIDEWALK", "GRASS"),
+    StreetClass.STRUCTURE: ("BUILDING", "WALL"),
+    StreetClass.VEGETATION: ("VEGETATION",),
+    StreetClass.POLE: ("POLE", "SIGN"),
+    StreetClass.VEHICLE: ("CAR", "VAN", "TRUCK", "BUS"),
+    StreetClass.TWO_WHEELER: ("BICYCLE", "MOTORCYCLE"),
+    StreetClass.PERSON: ("PEDESTRIAN",),
+    StreetClass.OWN_CAR: ("OWN_CAR",),
+}
+_FOV_SHARE = 0.15
+
+
+def street_classes(semantic: UInt8[np.ndarray, "*n"]) -> UInt8[np.ndarray, "*n"]:
+    """Classes of a drawn street as the network has them."""
+    table = np.zeros(len(Semantic), np.uint8)
+    for kind, names in ALIKE.items():
+        table[[Semantic[name] for name in names]] = kind
+    return table[semantic]
+
+
+def judge_drawn(edition: int, seeds: Iterable[int], see: See) -> dict[str, Any]:
+    """Means over streets: errors of depth and camera, and pooled intersections over unions of classes."""
+    found: list[dict[str, float]] = []
+    confusion = np.zeros((len(StreetClass), len(StreetClass)), int)
+    for seed in seeds:
+        made = make_street(seed, FRAMES, FPS, SIZE, edition=edition)
+        look = see(made.frames)
+        true = street_classes(made.semantic)
+        confusion += np.bincount(
+            true.astype(int).ravel() * len(StreetClass) + look.classes.ravel(), minlength=confusion.size
+        ).reshape(confusion.shape)
+        camera = made.cameras[0]
+        up = made.ground.normal_world
+        pairs = zip(look.cameras, made.cameras, strict=True)
+        off_deg = np.mean([errors_deg(said, each, up) for said, each in pairs], axis=0)
+        hfov_rad = 2 * np.arctan(camera.width_px / 2 / camera.fx_px)
+        found.append(
+            {
+                **depth_errors(look.depth, made),
+                "hfov_within_15_percent": float(abs(look.camera.hfov_rad / hfov_rad - 1) <= _FOV_SHARE),
+                "horizon_error_deg": float(off_deg[0]),
+                "roll_error_deg": float(off_deg[1]),
+            }
+        )
+    means = {name: float(np.mean([each[name] for each in found])) for name in found[0]}
+    return {"edition": edition, "streets": len(found), **means, "class_iou": ious(confusion)}
+
+
+def depth_errors(depth: Float[np.ndarray, "f h w"], made: Drive) -> dict[str, float]:
+    """Mean relative errors after a factor a picture, and in metres by the true height of the camera."""
+    height_m = abs(float(made.ground.height_m(made.cameras[0].world_from_camera[:3, 3])))
+    aligned, metric = [], []
+    for said, true_m in zip(depth, made.depth_m, strict=True):
+        near = (true_m >= NEAR_M) & (true_m <= FAR_M)
+        aligned.append(relative_errors(said.ravel(), true_m.ravel(), near.ravel())[near.ravel()].mean())
+        scaled = np.where(said > 0, said * height_m, FAR_M).clip(NEAR_M, FAR_M)
+        metric.append((np.abs(scaled - true_m)[near] / true_m[near]).mean())
+    return {"abs_rel": float(np.mean(aligned)), "abs_rel_in_metres": float(np.mean(metric))}
+
+
+def ious(confusion: np.ndarray) -> dict[str, float]:
+    """Intersection over union of the classes that there are."""
+    same = confusion.diagonal()
+    union = confusion.sum(axis=0) + confusion.sum(axis=1) - same
+    return {each.name: float(same[each] / union[each]) for each in StreetClass if confusion[each].any()}

@@ -1,0 +1,96 @@
+"""``dreamdrive train``: networks of our own."""
+
+from pathlib import Path
+from typing import Annotated
+
+from rich.console import Console
+from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, UseAppendAction, arg
+
+from dreamdrive.choices import DeviceName
+from dreamdrive.cli.arguments import commands_of
+from dreamdrive.cli.machine import asked_to_stop, use_all_cores
+from dreamdrive.cli.progress import Bars
+from dreamdrive.errors import InputError
+
+
+def street(
+    *,
+    data: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")],
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    steps: Annotated[int, arg(metavar="N")] = 20_000,
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    encoder: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    init: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    validate: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")] = (),
+    mix: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="SOURCE=WEIGHT")] = (),
+    batch: Annotated[int, arg(metavar="N")] = 8,
+    rate: Annotated[float, arg(metavar="R")] = 2e-3,
+    licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
+    device: DeviceName = "cpu",
+) -> None:
+    """Train the street network on folders of records.
+
+    Args:
+        data: Folder of records, see docs/guides/train.md.
+        out: Folder for the weights, losses and checkpoints; the same command goes on from there.
+        steps: Steps of the whole training.
+        seed: Seed of everything random.
+        encoder: Weights of EfficientNet-Lite0 from ImageNet to start the encoder from.
+        init: Weights of a street network to start from.
+        validate: Folder of records to judge by, beside those of --data that are kept out.
+        mix: How often a source is drawn against the others, 1 where it is not named.
+        batch: Pictures a step.
+        rate: Largest step of the optimiser.
+        licence: Under which the weights may be used; it is written into them.
+        device: Where it is computed.
+    """
+    use_all_cores()
+    from dreamdrive.device import computing_on
+    from dreamdrive.knowledge.training import WEIGHTS, LoaderOptions, StreetTraining, TrainingOptions
+    from dreamdrive.knowledge.training import train_street as run
+
+    if not data:
+        raise InputError("--data is missing; expected a folder with records.jsonl")
+    if min(steps, batch) < 1 or seed < 0 or not 0 < rate < 1:
+        raise InputError(
+            f"--steps {steps} --batch {batch} --seed {seed} --rate {rate:g}: expected at least one step, one "
+            "picture, a seed of 0 or more and a rate between 0 and 1"
+        )
+    options = TrainingOptions(steps=steps, seed=seed, rate=rate, loader=LoaderOptions(batch=batch))
+    training = StreetTraining(data, out, options, validate, _weights(mix), encoder, init, licence)
+    console = Console(highlight=False)
+    with computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
+        figures = run(
+            training, device=where, stop=stop, progress=lambda done, total: bars("street", done, total)
+        )
+    if figures is None:
+        stop.end()
+        return
+    console.print(f"{out / WEIGHTS}: {steps} steps", soft_wrap=True, markup=False)
+    for name, value in figures.items():
+        console.print(f"{name}: {value:.4g}", soft_wrap=True, markup=False)
+
+
+def _weights(words: tuple[str, ...]) -> dict[str, float]:
+    """Weights by their sources."""
+    found: dict[str, float] = {}
+    for word in words:
+        source, _, weight = word.rpartition("=")
+        try:
+            found[source] = float(weight)
+        except ValueError:
+            found[source] = -1.0
+        if not source or not 0 <= found[source] < float("inf"):
+            raise InputError(f"--mix {word}: expected SOURCE=WEIGHT, such as drawn=2") from None
+    return found
+
+
+_Train = commands_of({"street": street})
+
+
+def train(what: Annotated[_Train, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]
+    """Train networks of our own.
+
+    Args:
+        what: What to do.
+    """

@@ -1,0 +1,85 @@
+"""The depth of what stands on the road, from where it touches it."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Integer
+
+from dreamdrive.scene.windows import grown
+
+_LEAST_PX = 8  # of a thing that is given a depth
+_BELOW_PX = 2  # rows under a thing's lowest pixel in which the ground is looked for
+_SEEN_SHARE = 0.1  # of a thing's columns whose contact has to be seen
+_SEEN_COLUMNS = 3
+_LEAST_INVERSE = 1 / 250  # 1/m; a contact farther away is the horizon
+_ROW_PX = 0.7  # by which a contact is off
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What contact with the road says of one picture: inverse depth in 1/m, 0 where it says nothing.
+
+    ``spread`` is the relative standard deviation of the depth.
+    """
+
+    inverse: Float[np.ndarray, "h w"]
+    spread: Float[np.ndarray, "h w"]
+
+
+def on_the_road(
+    instances: Integer[np.ndarray, "h w"],
+    ground: Bool[np.ndarray, "h w"],
+    plane_inverse: Float[np.ndarray, "h w"],
+    least_spread: float,
+) -> Contact:
+    """Every column of a road user gets the depth at which it meets the road.
+
+    Wheels touch the road, the floor between them does not: the line of contact is the lower convex hull of
+    the outline, taken of those columns in which the ground is seen right below. Columns between these are on
+    the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing.
+    """
+    height, width = instances.shape
+    inverse, spread = np.zeros((2, height, width), np.float32)
+    below = max(1, round(grown(_BELOW_PX, width)))
+    for label in range(1, int(instances.max(initial=0)) + 1):
+        mask = instances == label
+        columns = np.flatnonzero(mask.any(axis=0))
+        if mask.sum() < _LEAST_PX:
+            continue
+        lowest = height - 1 - mask[::-1, columns].argmax(axis=0)
+        seen = (lowest + below < height) & ground[np.minimum(lowest + below, height - 1), columns]
+        if seen.sum() < max(_SEEN_COLUMNS, _SEEN_SHARE * len(columns)):
+            continue
+        foot = _hull(columns[seen], lowest[seen] + 1, columns)
+        row = np.clip(np.rint(foot).astype(np.intp), 0, height - 1)
+        contact = plane_inverse[row, columns]
+        higher = plane_inverse[np.maximum(row - 1, 0), columns]
+        off = _ROW_PX * (contact - higher) / np.maximum(contact, 1e-6)
+        near = contact > _LEAST_INVERSE
+        place = np.zeros((2, width), np.float32)
+        place[0, columns[near]] = contact[near]
+        place[1, columns[near]] = np.hypot(off[near], least_spread)
+        inverse[mask] = np.broadcast_to(place[0], mask.shape)[mask]
+        spread[mask] = np.broadcast_to(place[1], mask.shape)[mask]
+    return Contact(inverse, spread)
+
+
+def _hull(
+    columns: Integer[np.ndarray, " s"], rows: Integer[np.ndarray, " s"], wanted: Integer[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Rows at which wanted columns meet the lower convex hull of some points; level beyond its ends."""
+    points = np.stack([columns, rows], axis=1).astype(np.float32)
+    hull = cv2.convexHull(points)[:, 0]
+    first, last = hull[:, 0].min(), hull[:, 0].max()
+    if last - first < 1:
+        return np.full(len(wanted), float(rows.max()))
+    grid = np.arange(first, last + 1)
+    # The hull goes round: each of its edges covers some columns, and the lower of two edges is the contact.
+    line = np.full(len(grid), -np.inf)
+    for (x0, y0), (x1, y1) in zip(hull, np.roll(hull, -1, axis=0), strict=True):
+        low, high = sorted((x0, x1))
+        inside = (grid >= low) & (grid <= high)
+        share = (grid[inside] - x0) / (x1 - x0) if x1 != x0 else np.zeros(inside.sum())
+        line[inside] = np.maximum(line[inside], y0 + share * (y1 - y0))
+    return np.interp(wanted, grid, line)

@@ -1,0 +1,184 @@
+"""One depth from all that know something of it: stereo, the road, contact with it, and the street network."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Integer
+
+from dreamdrive.geometry.depth.contact import on_the_road
+from dreamdrive.geometry.depth.view import View, by_frame
+from dreamdrive.geometry.options import FusionOptions
+from dreamdrive.scene.look import Look
+from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
+
+_PAVED = (StreetClass.ROAD, StreetClass.MARKING)
+_GROUND = (*_PAVED, StreetClass.GROUND)
+_NEAREST_M, _FARTHEST_M = 0.5, 500.0
+_FAR_INVERSE = 1 / 150  # 1/m; farther away stereo anchors nothing
+_ROAD_INVERSE = 1 / 150
+_USUAL_HEIGHT_M = 1.5  # of a camera above the road
+_FEW = 50  # sure pixels, from which on the network can be aligned
+_ODD = 1.0  # of log depth: a pixel that far from all others anchors nothing
+_COARSE = 0.12  # of the image width
+_TRUSTED = 0.03  # spread of a depth that is as good as sure stereo
+_PRIOR = 0.03  # weight of the coarser ratio against that of sure pixels
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the street network says of one frame; depth along z in any unit, 0 where there is none."""
+
+    depth: Float[np.ndarray, "h w"]
+    spread: Float[np.ndarray, "h w"]
+    classes: Integer[np.ndarray, "h w"]
+    instances: Integer[np.ndarray, "h w"]
+
+    @property
+    def users(self) -> Bool[np.ndarray, "h w"]:
+        """Pixels of road users."""
+        return (self.instances > 0) | np.isin(self.classes, ROAD_USERS)
+
+
+def fused(
+    view: View,
+    look: Look,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
+    """Inverse depth in 1/m, trust in it, and its relative spread, of every used frame.
+
+    Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
+    """
+    height_m = _USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
+
+    def one(frame: int) -> Fused:
+        return fuse(
+            Seen(
+                look.depth[frame] * np.float32(height_m),
+                look.spread[frame],
+                look.classes[frame],
+                look.instances[frame],
+            ),
+            inverse[frame],
+            confidence[frame],
+            view.plane_inverse[frame],
+            view.usable[frame],
+            view.options.fusion,
+        )
+
+    found = by_frame(view, one)
+    depth, trust, spread = (np.zeros_like(inverse, dtype=np.float32) for _ in range(3))
+    for frame, each in found.items():
+        depth[frame], trust[frame], spread[frame] = each.inverse, each.confidence, each.spread
+    return depth, trust, spread
+
+
+@dataclass(frozen=True)
+class Fused:
+    """Inverse depth in 1/m, 0 where there is none; trust in [0, 1]; the depth's relative spread, 0 there."""
+
+    inverse: Float[np.ndarray, "h w"]
+    confidence: Float[np.ndarray, "h w"]
+    spread: Float[np.ndarray, "h w"]
+
+
+def fuse(
+    seen: Seen,
+    swept_inverse: Float[np.ndarray, "h w"],
+    confidence: Float[np.ndarray, "h w"],
+    plane_inverse: Float[np.ndarray, "h w"],
+    usable: Bool[np.ndarray, "h w"],
+    options: FusionOptions,
+) -> Fused:
+    """Depth of one frame.
+
+    The network's depth is aligned to sure stereo and to the road, region by region. Stereo counts where it
+    is sure, or less sure and near the aligned depth; the road has the depth of its plane; a road user that of
+    its contact with the road, or the aligned depth where its foot is hidden.
+    """
+    users = seen.users & usable
+    shown = usable & (seen.classes != StreetClass.SKY) & (seen.depth > 0)
+    road = np.isin(seen.classes, _PAVED) & (plane_inverse > _ROAD_INVERSE) & usable
+    swept, plane = _log_depth(swept_inverse), _log_depth(plane_inverse)
+    sure = np.where(
+        shown & ~users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0
+    )
+    weight = np.where(road & (sure == 0), 0.5, sure).astype(np.float32)
+    known = np.where(sure > 0, swept, plane)
+    network = np.log(np.clip(seen.depth, 1e-3, 1e6)).astype(np.float32)
+    aligned, spread = _align(network, seen, known, weight, users, options)
+    off = np.abs(swept - aligned)
+    stereo = shown & ~users & (swept_inverse > 1 / _FARTHEST_M)
+    believed = (confidence >= options.sure) & (off < options.sure_spreads * spread + 0.1)
+    believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
+    log_depth = np.where(stereo & believed, swept, aligned)
+    spread = np.where(stereo & believed, options.stereo_spread, spread)
+    flat = road & ~(stereo & believed)
+    log_depth[flat], spread[flat] = plane[flat], options.stereo_spread
+    ground = np.isin(seen.classes, _GROUND)
+    contact = on_the_road(seen.instances, ground, plane_inverse, options.contact_spread)
+    standing = (contact.inverse > 0) & shown
+    log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact.spread[standing]
+    matched = users & shown & (confidence >= options.sure) & (np.abs(swept - log_depth) < options.user_stereo)
+    log_depth[matched], spread[matched] = swept[matched], options.user_spread
+    depth = np.clip(np.exp(log_depth), _NEAREST_M, _FARTHEST_M)
+    trust = np.where(stereo & believed | matched, confidence, np.clip(_TRUSTED / spread, 0, 1))
+    maps = (np.where(shown, each, 0).astype(np.float32) for each in (1 / depth, trust, spread))
+    return Fused(*maps)
+
+
+def _log_depth(inverse: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    return -np.log(np.maximum(inverse, 1e-4)).astype(np.float32)
+
+
+def _align(
+    network: Float[np.ndarray, "h w"],
+    seen: Seen,
+    known: Float[np.ndarray, "h w"],
+    weight: Float[np.ndarray, "h w"],
+    users: Bool[np.ndarray, "h w"],
+    options: FusionOptions,
+) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
+    """The network's log depth in the unit of what is known, and its spread.
+
+    The ratio of both is carried from sure pixels to their surroundings: coarsely by all, then among pixels of
+    the ground and among those of what stands on it. Without enough of them the network's own unit is kept.
+    """
+    width = network.shape[1]
+    anchors = weight > 0
+    own = np.maximum(seen.spread, options.least_spread)
+    if anchors.sum() < _FEW:
+        return network, own
+    ratio = np.where(anchors, known - network, 0).astype(np.float32)
+    middle = _median(ratio[anchors], weight[anchors])
+    weight = np.where(np.abs(ratio - middle) < _ODD, weight, 0).astype(np.float32)
+    ratio = np.where(weight > 0, ratio, 0)
+    coarse = _carried(ratio, weight, np.full_like(ratio, middle), _COARSE * width)
+    shift, spread = coarse.copy(), own.copy()
+    reach = options.reach * width
+    ground = np.isin(seen.classes, _GROUND)
+    for region in (ground, ~ground & ~users):
+        inside = weight * region
+        fine = _carried(ratio, inside, coarse, reach)
+        # How well the network follows the sure pixels nearby, as far as there are any.
+        missed = _carried((ratio - fine) ** 2, inside, own**2, reach)
+        shift[region], spread[region] = fine[region], np.sqrt(missed)[region]
+    return network + shift, np.maximum(spread, options.least_spread)
+
+
+def _carried(
+    values: Float[np.ndarray, "h w"],
+    weight: Float[np.ndarray, "h w"],
+    prior: Float[np.ndarray, "h w"],
+    reach_px: float,
+) -> Float[np.ndarray, "h w"]:
+    """Weighted means of values around each pixel, which become the prior where there are none."""
+    total = cv2.GaussianBlur(weight * values, (0, 0), reach_px) + _PRIOR * prior
+    return np.asarray(total / (cv2.GaussianBlur(weight, (0, 0), reach_px) + _PRIOR))
+
+
+def _median(values: Float[np.ndarray, " n"], weight: Float[np.ndarray, " n"]) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(total, total[-1] / 2)])

@@ -1,0 +1,43 @@
+"""What the street network sees in a clip, and what that says of its cameras."""
+
+from dataclasses import replace
+
+from dreamdrive.knowledge.look import look
+from dreamdrive.knowledge.shipped import NO_KNOWLEDGE, load_knowledge
+from dreamdrive.progress import Work
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.look import CameraEstimate, Look
+
+
+def look_at(clip: Clip, knowledge: str, work: Work = Work()) -> tuple[Look, ...]:
+    """A look for each camera of the rig, with ``knowledge`` as of ``load_knowledge``; none without it.
+
+    Raises:
+        InputError: The weights cannot be used.
+    """
+    if knowledge == NO_KNOWLEDGE:
+        return ()
+    network, looks = load_knowledge(knowledge), list[Look]()
+    for index, camera in enumerate(clip.rig):
+        frames, before = clip.frames[clip.of_camera(index)], sum(map(len, looks))
+
+        def tell(done: int, _: int, before: int = before) -> None:
+            work(before + done, len(clip))
+
+        focal_px = camera.fx_px if clip.known.intrinsics else None
+        looks.append(look(frames, network, focal_px=focal_px, tell=tell))
+    return tuple(looks)
+
+
+def with_looks(clip: Clip, looks: tuple[Look, ...]) -> Clip:
+    """The clip with what is seen in it; cameras without calibration get the focal lengths that are seen."""
+    if not looks or clip.known.intrinsics:
+        return replace(clip, looks=looks)
+    rig = tuple(_guessed(camera, seen.camera) for camera, seen in zip(clip.rig, looks, strict=True))
+    return replace(clip, looks=looks, rig=rig)
+
+
+def _guessed(camera: Camera, seen: CameraEstimate) -> Camera:
+    stretch = camera.fy_px / camera.fx_px
+    return replace(camera, fx_px=seen.focal_px, fy_px=seen.focal_px * stretch)

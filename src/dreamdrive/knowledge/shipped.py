@@ -1,0 +1,35 @@
+"""The network by the name of the weights that ship, or by a file of others."""
+
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.knowledge.network import StreetNetwork
+from dreamdrive.knowledge.weights import EXPECTED, read_network
+
+SHIPPED = "street"
+"""The name of the weights that ship."""
+NO_KNOWLEDGE = "none"
+"""In place of weights: the street network is not asked."""
+_FILE = Path(__file__).with_name("street.safetensors")
+
+
+def load_knowledge(given: str | Path = SHIPPED) -> StreetNetwork:
+    """The network with the weights that ship, or those in a file, ready to look.
+
+    Raises:
+        InputError: There are none, or the file is of something else.
+    """
+    return read_network(weights_of(given))[0].folded()
+
+
+def weights_of(given: str | Path = SHIPPED) -> Path:
+    """The file of weights.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = _FILE if given == SHIPPED else Path(given)
+    if not path.is_file():
+        missing = "this installation has no weights" if given == SHIPPED else "there is no such file"
+        raise InputError(f"--knowledge {given}: {missing}; expected {SHIPPED}, or a file of {EXPECTED}")
+    return path

@@ -1,0 +1,60 @@
+"""Depth of what stands on the road, from where it touches it."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dreamdrive.geometry.depth.contact import on_the_road
+
+HEIGHT, WIDTH, HORIZON = 60, 80, 20.0
+
+
+def plane() -> np.ndarray:
+    """Inverse depth of a road 1.5 m below a camera of 100 px focal length, whose horizon is at a row."""
+    rows = np.arange(HEIGHT) + 0.5 - HORIZON
+    return np.repeat(np.maximum(rows, 0)[:, None] / 150, WIDTH, axis=1).astype(np.float32)
+
+
+def standing(bottom: int, columns: slice = slice(20, 40)) -> tuple[np.ndarray, np.ndarray]:
+    """A block that stands with its last row at ``bottom``, and the ground around it."""
+    instances = np.zeros((HEIGHT, WIDTH), np.int32)
+    instances[bottom - 12 : bottom + 1, columns] = 1
+    return instances, (instances == 0) & (plane() > 0)
+
+
+@given(bottom=st.integers(34, 55))
+def test_a_block_has_the_depth_of_the_road_at_its_foot(bottom: int) -> None:
+    instances, ground = standing(bottom)
+    found = on_the_road(instances, ground, plane(), 0.05)
+    assert np.allclose(found.inverse[instances == 1], plane()[bottom + 1, 0])
+    assert (found.inverse[instances == 0] == 0).all()
+
+
+def test_the_floor_between_wheels_is_not_taken_for_a_contact() -> None:
+    instances, ground = standing(45)
+    instances[42:46, 25:35] = 0  # wheels left and right of it
+    ground = (instances == 0) & (plane() > 0)
+    found = on_the_road(instances, ground, plane(), 0.05)
+    assert np.allclose(found.inverse[instances == 1], plane()[46, 0])
+
+
+def test_a_side_that_recedes_gets_farther() -> None:
+    instances = np.zeros((HEIGHT, WIDTH), np.int32)
+    for column in range(20, 60):
+        instances[25 : 50 - (column - 20) // 4, column] = 1
+    ground = (instances == 0) & (plane() > 0)
+    found = on_the_road(instances, ground, plane(), 0.05).inverse
+    assert found[30, 22] > 1.3 * found[30, 57] > 0
+
+
+def test_nothing_is_said_where_the_foot_is_hidden() -> None:
+    instances, _ = standing(45)
+    nowhere = np.zeros((HEIGHT, WIDTH), bool)
+    assert not on_the_road(instances, nowhere, plane(), 0.05).inverse.any()
+    cut_off, ground = standing(HEIGHT - 1)
+    assert not on_the_road(cut_off, ground, plane(), 0.05).inverse.any()
+
+
+def test_far_contacts_are_less_sure() -> None:
+    near, far = (on_the_road(*standing(bottom), plane(), 0.05) for bottom in (50, 34))
+    assert 0.05 < near.spread.max() < far.spread.max()

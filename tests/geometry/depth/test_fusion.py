@@ -1,0 +1,91 @@
+"""One depth from stereo, the road and the street network."""
+
+import numpy as np
+import pytest
+
+from dreamdrive.geometry.depth.fusion import Fused, Seen, fuse
+from dreamdrive.geometry.options import FusionOptions
+from dreamdrive.scene.street_class import StreetClass
+
+HEIGHT, WIDTH, HORIZON = 60, 96, 20
+
+
+class Street:
+    """A wall 20 m away above a road, a car on it; the network is off by a factor that bends across."""
+
+    def __init__(self) -> None:
+        rows = np.arange(HEIGHT)[:, None] + 0.5 - HORIZON
+        self.plane = np.repeat(np.maximum(rows, 0) / 150, WIDTH, axis=1).astype(np.float32)
+        self.inverse = np.maximum(self.plane, 1 / 20).astype(np.float32)
+        self.classes = np.full((HEIGHT, WIDTH), StreetClass.STRUCTURE, np.uint8)
+        self.classes[self.plane > 1 / 20] = StreetClass.ROAD
+        self.classes[:6] = StreetClass.SKY
+        self.instances = np.zeros((HEIGHT, WIDTH), np.uint16)
+        self.instances[25:45, 40:60] = 1
+        self.classes[self.instances == 1] = StreetClass.VEHICLE
+        self.inverse[self.instances == 1] = self.plane[45, 0]
+        bend = np.exp(np.linspace(-0.2, 0.3, WIDTH))[None]
+        self.network = np.where(self.classes > 0, 0.4 / self.inverse * bend, 0).astype(np.float32)
+        self.confidence = np.zeros((HEIGHT, WIDTH), np.float32)
+
+    def fused(self, swept: np.ndarray | None = None) -> Fused:
+        spread = np.full((HEIGHT, WIDTH), 0.2, np.float32)
+        seen = Seen(self.network, spread, self.classes, self.instances)
+        usable = np.ones((HEIGHT, WIDTH), bool)
+        swept = self.inverse if swept is None else swept
+        return fuse(seen, swept, self.confidence, self.plane, usable, FusionOptions())
+
+    def off(self, found: Fused, where: np.ndarray) -> float:
+        """Largest relative error of depth."""
+        return float(np.abs(self.inverse[where] / found.inverse[where] - 1).max())
+
+
+def test_the_road_and_sure_stereo_are_believed() -> None:
+    street = Street()
+    street.confidence[:, :30] = 0.9
+    found = street.fused()
+    assert street.off(found, street.classes == StreetClass.ROAD) < 0.02
+    assert street.off(found, (street.confidence > 0) & (street.classes > 0)) < 0.02
+    assert (found.inverse[street.classes == StreetClass.SKY] == 0).all()
+
+
+def test_the_network_takes_its_scale_from_what_is_sure_nearby() -> None:
+    street = Street()
+    wall = street.classes == StreetClass.STRUCTURE
+    street.confidence[wall & (np.arange(WIDTH) % 16 == 0)] = 0.9
+    found = street.fused()
+    unsure = wall & (street.confidence == 0) & (np.arange(WIDTH) <= 80)  # with sure pixels on both sides
+    assert street.off(found, unsure) < 0.12
+    assert found.spread[unsure].min() > found.spread[street.confidence > 0].max()
+
+
+def test_stereo_that_contradicts_its_surroundings_is_not_believed() -> None:
+    street = Street()
+    wall = street.classes == StreetClass.STRUCTURE
+    street.confidence[wall & (np.arange(WIDTH) % 8 == 0)] = 0.9
+    wrong = street.inverse.copy()
+    hole = np.zeros_like(wall)
+    hole[10:14, 20:30] = True
+    wrong[hole] = 1 / 4
+    street.confidence[hole] = 0.3
+    assert street.off(street.fused(wrong), hole) < 0.15
+
+
+def test_a_car_has_the_depth_of_its_contact_whatever_stereo_says() -> None:
+    street = Street()
+    street.confidence[:] = 0.9
+    wrong = street.inverse.copy()
+    wrong[street.instances == 1] = 1 / 60
+    assert street.off(street.fused(wrong), street.instances == 1) < 0.06
+
+
+@pytest.mark.parametrize("sure", [0.0, 0.9])
+def test_maps_are_finite_and_positive_where_something_is_seen(sure: float) -> None:
+    street = Street()
+    street.confidence[:] = sure
+    found = street.fused()
+    shown = street.classes != StreetClass.SKY
+    for each in (found.inverse, found.spread, found.confidence):
+        assert np.isfinite(each).all()
+        assert (each[shown] > 0).all()
+        assert (each[~shown] == 0).all()
