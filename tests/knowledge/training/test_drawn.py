@@ -11,7 +11,7 @@ from dreamdrive.knowledge.training.records import DEPTH_STEPS, FAR, Record, read
 from dreamdrive.knowledge.training.viewpoints import Viewpoints, draw_lens
 from dreamdrive.scene.layout import Lens, is_moving
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
-from dreamdrive.world import StreetOptions, World, draw_street, look
+from dreamdrive.world import StreetOptions, World, draw_street, picture_of
 from dreamdrive.world.edition2 import Looks, pinhole
 
 SEEDS = (1_000_031, 7)
@@ -112,7 +112,7 @@ def test_the_camera_sits_in_a_car_that_is_left_out_and_sees_something() -> None:
         at = places.draw()
         small = at.camera.resized(64, 36)
         changed = world.changed(world.layout.light, Lens(), at.ego)
-        seen = look(changed, places.moment, small, (at.time_s, small))
+        seen = picture_of(changed, places.moment, small, (at.time_s, small))
         assert (seen.depth_m[~seen.sky] > 0.3).all()
         assert places.seat is not None
         assert is_moving(places.seat.box.track)
