@@ -27,7 +27,7 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
         return made[name]
 
     scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted)
-    assert list(made) == ["geometry", "initialise", "static", "score", "group", "fit"]
+    assert list(made) == ["look", "geometry", "initialise", "static", "score", "group", "fit"]
     assert made["geometry"] is geometry
     assert scene is made["fit"]
     count = len(made["initialise"])  # type: ignore[arg-type]

@@ -45,18 +45,18 @@ class Given:
     """What is known of a clip already, in place of what its stage would find; each may be absent.
 
     Attributes:
-        looks: What the street network sees, a look for each camera of the rig.
         geometry: Cameras and depth.
         static: The fit as if nothing moved, of the seeds in their order.
         labels: Which seeds move, and with which others.
         tracks: What moves, in canonical places, and how it moves.
+        looks: What the street network sees, a look for each camera of the rig.
     """
 
-    looks: tuple[Look, ...] | None = None
     geometry: Geometry | None = None
     static: StaticFit | None = None
     labels: Grouping | None = None
     tracks: Cast | None = None
+    looks: tuple[Look, ...] | None = None
 
 
 def generate(
@@ -133,7 +133,13 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     o, seed = options, {name: stage_seed(options.seed, name) for name in ("geometry", "static", "fit")}
     device = torch.device(o.device)
     weights = None if o.knowledge == NO_KNOWLEDGE else file_digest(weights_of(o.knowledge))
-    looks = run("look", weights, lambda work: look_at(clip, o.knowledge, work), given=given.looks)
+    looks = run(
+        "look",
+        weights,
+        lambda work: look_at(clip, o.knowledge, work),
+        check=partial(check.looks, clip),
+        given=given.looks,
+    )
     clip = with_looks(clip, looks)
     geometry = run(
         "geometry",

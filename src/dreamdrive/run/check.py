@@ -11,6 +11,7 @@ from dreamdrive.fit import StaticFit
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.look import Look
 from dreamdrive.scene.scene import Scene
 
 
@@ -23,6 +24,16 @@ def clip(clip: object) -> None:
     for camera in range(len(clip.rig)):
         if (np.diff(clip.times_s[clip.of_camera(camera)]) <= 0).any():
             raise ValueError("the times run back")
+
+
+def looks(clip: Clip, looks: object) -> None:
+    """A look for each camera, with all its frames; none where nobody looked."""
+    if not isinstance(looks, tuple) or not all(isinstance(look, Look) for look in looks):
+        raise ValueError("it holds no looks")
+    width, height = clip.size
+    wanted = [(len(clip.of_camera(camera)), height, width) for camera in range(len(clip.rig))]
+    if looks and [look.depth.shape for look in looks] != wanted:
+        raise ValueError(f"its looks are not of the clip's frames, {wanted}")
 
 
 def geometry(clip: Clip, geometry: object) -> None:

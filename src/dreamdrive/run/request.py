@@ -124,7 +124,7 @@ def _with_lens(control: Control, geometry_files: Path | None) -> Control:
 
 
 def _digests(
-    control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None
+    control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None = None
 ) -> dict[str, str]:
     given = {
         "input": (control.path, "a video or a folder of images"),

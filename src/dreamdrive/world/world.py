@@ -13,14 +13,11 @@ from msgspec.structs import replace
 from dreamdrive.scene.layout import Box, Ego, Layout, Lens, Light, TrackPoint, is_moving, track_function
 from dreamdrive.world import bodies
 from dreamdrive.world.bodies import Part
-from dreamdrive.world.edition2.bodies import body as body2
-from dreamdrive.world.edition2.ground import paint_ground as paint_ground2
-from dreamdrive.world.edition2.lamps import Lamps
-from dreamdrive.world.edition2.relief import Hills, hills_of
-from dreamdrive.world.edition2.scenery import scenery as scenery2
-from dreamdrive.world.edition2.sky import make_sky as make_sky2
-from dreamdrive.world.edition2.textures import TextureLibrary
-from dreamdrive.world.edition2.tiles import grain
+from dreamdrive.world.edition2 import Hills, Lamps, TextureLibrary, grain, hills_of
+from dreamdrive.world.edition2 import body as body2
+from dreamdrive.world.edition2 import make_sky as make_sky2
+from dreamdrive.world.edition2 import paint_ground as paint_ground2
+from dreamdrive.world.edition2 import scenery as scenery2
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, upright

@@ -8,9 +8,17 @@ from jaxtyping import Float
 
 from dreamdrive.scene.layout import track_function
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
-from dreamdrive.world.edition2.glass import Bonnet, bloom, drops, falling, haloes, screen
-from dreamdrive.world.edition2.lamps import Lamps, headlights
-from dreamdrive.world.edition2.lens import bent
+from dreamdrive.world.edition2 import (
+    Bonnet,
+    Lamps,
+    bent,
+    bloom,
+    drops,
+    falling,
+    haloes,
+    headlights,
+    screen,
+)
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
 from dreamdrive.world.render import Eye, WorldView

@@ -1,0 +1,172 @@
+"""Recorded pictures as records: with lidar and its classes, or with depth that stereo is sure of."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int
+
+from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.street_class import StreetClass
+
+_LONG_SIDE_PX = 512
+_SURE = 0.7  # confidence from which classical depth teaches
+_STILL = 0.2  # evidence of motion from which it does not
+_LABELS = {
+    StreetClass.VEGETATION: ("Vegetation",),
+    StreetClass.ROAD: ("Road",),
+    StreetClass.MARKING: ("Lane Line Marking", "Stop Line Marking", "Other Road Marking"),
+    StreetClass.GROUND: ("Ground", "Sidewalk", "Driveway"),
+    StreetClass.VEHICLE: (
+        "Car",
+        "Pickup Truck",
+        "Medium-sized Truck",
+        "Semi-truck",
+        "Towed Object",
+        "Other Vehicle - Construction Vehicle",
+        "Other Vehicle - Uncommon",
+        "Emergency Vehicle",
+        "Bus",
+        "Train",
+        "Trolley",
+        "Tram / Subway",
+    ),
+    StreetClass.TWO_WHEELER: ("Motorcycle", "Personal Mobility Device", "Motorized Scooter", "Bicycle"),
+    StreetClass.PERSON: ("Pedestrian", "Pedestrian with Object"),
+    StreetClass.POLE: ("Signs", "Construction Signs"),
+    StreetClass.STRUCTURE: ("Road Barriers", "Building", "Temporary Construction Barriers"),
+}
+"""Classes of PandaSet's points; those of the others are not used."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """A picture and how it was taken: pinhole counted by integer index, ``world_from_camera`` with z up."""
+
+    picture: Path
+    focal_px: float
+    middle_px: tuple[float, float]
+    width_px: int
+    world_from_camera: Float[np.ndarray, "4 4"]
+    height_m: float
+
+
+def pandaset_records(recording: Path, front: Path, out: Path, camera_height_m: float) -> list[Record]:
+    """Every picture of PandaSet that has lidar: depth and classes of its points.
+
+    Args:
+        recording: Five cameras with ``cameras.json``, ``lidar_labels`` and ``semseg_classes.json``.
+        front: The front camera's frames and ``lidar_depth_front``.
+        out: Where pictures go.
+        camera_height_m: Height of the front camera above the road.
+    """
+    cameras = json.loads((recording / "cameras.json").read_text())["cameras"]
+    names = {name: int(number) for number, name in _read(recording / "semseg_classes.json").items()}
+    label = np.full(256, UNKNOWN, np.uint8)
+    for kind, points in _LABELS.items():
+        label[[names[name] for name in points]] = kind
+    level_m = np.array(cameras["front_camera"]["camera_to_world"])[:, 2, 3]
+    records: list[Record] = []
+    out.mkdir(parents=True, exist_ok=True)
+    for name, camera in cameras.items():
+        ahead = name == "front_camera"
+        lidar = front / "lidar_depth_front" if ahead else recording / "lidar_labels" / name
+        folder = front / name if ahead else recording / name
+        poses = np.array(camera["camera_to_world"])
+        for path in sorted(lidar.glob("*.npz")):
+            index = int(path.stem)
+            rise_m = float(poses[index, 2, 3] - level_m[index])
+            middle = camera["cx"], camera["cy"]
+            view = _View(
+                folder / f"{path.stem}.jpg",
+                camera["fx"],
+                middle,
+                camera["width"],
+                poses[index],
+                camera_height_m + rise_m,
+            )
+            records.append(_lidar_record(view, path, label, f"{name}-{path.stem}", out))
+    return records
+
+
+def _read(path: Path) -> dict[str, str]:
+    return json.loads(path.read_text())
+
+
+def _lidar_record(view: _View, lidar: Path, label: Int[np.ndarray, " 256"], name: str, out: Path) -> Record:
+    picture = cv2.imread(str(view.picture))
+    scale = _LONG_SIDE_PX / picture.shape[1]
+    size = _LONG_SIDE_PX, round(picture.shape[0] * scale)
+    labels = np.zeros((size[1], size[0], 3), np.uint8)
+    labels[..., 2], labels[..., 1] = UNKNOWN, UNKNOWN  # OpenCV writes blue first
+    depth = np.zeros(size[::-1], np.uint16)
+    with np.load(lidar) as points:
+        order = np.argsort(-points["depth"])  # the nearest last
+        column, row = (
+            np.floor((points[k][order] + 0.5) * scale).astype(int).clip(0, side - 1)
+            for k, side in zip("uv", size, strict=True)
+        )
+        depth[row, column] = depth_steps(points["depth"][order])
+        kind = label[points["sem"][order].astype(int)]
+        labels[row, column, 2] = kind
+        labels[row, column, 1] = np.where(kind <= StreetClass.POLE, 0, UNKNOWN)
+    cv2.imwrite(str(out / f"{name}.jpg"), cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    cv2.imwrite(str(out / f"{name}-labels.png"), labels)
+    cv2.imwrite(str(out / f"{name}-depth.png"), depth)
+    by_width = _LONG_SIDE_PX / view.width_px
+    horizon, roll = level_line(view.world_from_camera, view.focal_px * by_width)
+    moved = (view.middle_px[1] + 0.5) * by_width - size[1] / 2
+    return Record(
+        image=f"{name}.jpg",
+        source="pandaset",
+        group="pandaset_002",
+        labels=f"{name}-labels.png",
+        depth=f"{name}-depth.png",
+        focal_px=view.focal_px * by_width,
+        horizon_px=horizon + moved,
+        roll_rad=roll,
+        camera_height_m=view.height_m,
+        distorted=False,
+    )
+
+
+def level_line(world_from_camera: Float[np.ndarray, "4 4"], focal_px: float) -> tuple[float, float]:
+    """Row of the horizon below the principal point in the middle column, and roll; the world's z is up."""
+    up = world_from_camera[2, :3]  # in the camera
+    return float(-focal_px * up[2] / up[1]), float(np.arctan2(-up[0], -up[1]))
+
+
+def clip_records(clip: Clip, geometry: Geometry, source: str, group: str, out: Path) -> list[Record]:
+    """Frames of a clip of one camera, with the depth that its geometry is sure of.
+
+    What moves, and what stereo is not sure of, stays unknown; nothing is said of classes.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    records: list[Record] = []
+    for index in np.flatnonzero(~clip.held_out).tolist():
+        camera, name = geometry.cameras[index], f"{group}-{clip.source_index[index]:05d}"
+        sure = (geometry.confidence[index] >= _SURE) & (geometry.moving[index] < _STILL)
+        depth = np.where(sure, geometry.depth_m[index], 0)
+        cv2.imwrite(str(out / f"{name}.jpg"), clip.frames[index][..., ::-1])
+        cv2.imwrite(str(out / f"{name}-depth.png"), depth_steps(depth))
+        height_m = None if geometry.ground is None else _height_m(geometry, index)
+        records.append(
+            Record(
+                image=f"{name}.jpg",
+                source=source,
+                group=group,
+                depth=f"{name}-depth.png",
+                focal_px=camera.fx_px if geometry.focal.observed else None,
+                camera_height_m=height_m,
+            )
+        )
+    return records
+
+
+def _height_m(geometry: Geometry, index: int) -> float:
+    assert geometry.ground is not None
+    return float(geometry.ground.height_m(geometry.cameras[index].world_from_camera[:3, 3]))
