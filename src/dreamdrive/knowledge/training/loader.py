@@ -37,7 +37,7 @@ class LoaderOptions:
     sizes: tuple[tuple[int, int], ...] = ((320, 192), (384, 224), (448, 256), (288, 288))
     """Width and height of the pictures of a batch, one of them at random."""
     mirror_share: float = 0.5
-    closest: float = 0.55
+    closest: float = 0.7
     """Smallest part of the largest cut about the middle, along each side."""
     aside_share: float = 0.3
     """Cuts away from the middle, which leave the camera unknown."""
