@@ -13,8 +13,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.layout import BENCHMARK_EDITION, Layout, track_function
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.world.edition2.lens import level_from_camera, pinhole
-from dreamdrive.world.edition2.relief import hills_of
+from dreamdrive.world.edition2 import hills_of, level_from_camera, pinhole
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import pitched, upright
 from dreamdrive.world.options import StreetOptions

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
-from dreamdrive.world.edition2.lens import bent, unbent
+from dreamdrive.world.edition2 import bent, unbent
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.solid import Hits
 from dreamdrive.world.world import Moment, World
@@ -75,7 +75,7 @@ def _eye(world: World, moment: Moment, camera: Camera) -> "Eye":
     """The eye of the world's edition."""
     if world.layout.edition == 1:
         return Eye(world, moment, camera)
-    from dreamdrive.world.edition2.eye import Eye2  # which is made from the one below
+    from dreamdrive.world.eye2 import Eye2  # which is made from the one below
 
     return Eye2(world, moment, camera)
 

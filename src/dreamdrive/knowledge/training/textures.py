@@ -10,8 +10,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from dreamdrive.errors import InputError
-from dreamdrive.world.edition2 import Texture, TextureKind
-from dreamdrive.world.edition2.textures import INDEX
+from dreamdrive.world.edition2 import INDEX, Texture, TextureKind
 
 _LONGEST_PX = 384
 _QUALITY = 92
