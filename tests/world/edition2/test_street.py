@@ -8,7 +8,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.layout import Barrier, Layout, Lens, Light, Prop
 from dreamdrive.world import Semantic, World, WorldView, draw_street
 from dreamdrive.world.drive import ego_poses
-from dreamdrive.world.render import look
+from dreamdrive.world.render import picture_of
 
 SIZE = 96, 54
 DAY, LEVEL = Light(), Lens()
@@ -37,7 +37,7 @@ def seen(layout: Layout) -> WorldView:
     """What the recording camera sees at the start."""
     world = World(layout)
     camera = Camera(60, 60, 48, 27, *SIZE, ego_poses(layout, np.zeros(1))[0])
-    return look(world, world.at(0.0), camera, (0.1, camera))
+    return picture_of(world, world.at(0.0), camera, (0.1, camera))
 
 
 @pytest.mark.parametrize("weather", WEATHERS)
