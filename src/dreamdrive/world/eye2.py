@@ -8,17 +8,7 @@ from jaxtyping import Float
 
 from dreamdrive.scene.layout import track_function
 from dreamdrive.world.columns import by_columns, dot, outer, picked, turned
-from dreamdrive.world.edition2 import (
-    Bonnet,
-    Lamps,
-    bent,
-    bloom,
-    drops,
-    falling,
-    haloes,
-    headlights,
-    screen,
-)
+from dreamdrive.world.edition2 import Lamps, bent, glass, headlights
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
 from dreamdrive.world.render import Eye, WorldView
@@ -244,19 +234,19 @@ class Eye2(Eye):
             at, shine = self._shining()
             local = turned(at - self.centre, self.camera.world_from_camera[:3, :3].T)
             places = self.camera_px(local)
-            image += haloes(places, local[:, 2], light.night * shine, self.camera.fx_px, depth, rng)
-        image = image + bloom(image, 0.02 + 0.1 * light.night + 0.05 * light.rain)
+            image += glass.haloes(places, local[:, 2], light.night * shine, self.camera.fx_px, depth, rng)
+        image = image + glass.bloom(image, 0.02 + 0.1 * light.night + 0.05 * light.rain)
         if light.rain > 0 or light.snow > 0.5:
             moment = np.random.default_rng([seed, 43, round(100 * abs(self.moment.time_s))])
             flakes = float(np.clip(2 * light.snow - 1, 0, 1)) * (light.rain == 0)
-            image = falling(moment, image, light.rain, flakes)
+            image = glass.falling(moment, image, light.rain, flakes)
         if self.bonnet is not None:
             above = sky.skylight + 0.6 * sky.sunlight * sky.towards_sun[2]
             image = self.bonnet.drawn(image, self._horizon_row(), above.astype(np.float32) + 0.01)
         if light.rain > 0:
-            image = drops(rng, image, light.rain)
+            image = glass.drops(rng, image, light.rain)
         veil = light.glare * rng.uniform(0.1, 0.45) + rng.exponential(0.008)
-        return screen(rng, image, veil).reshape(-1, 3)
+        return glass.screen(rng, image, veil).reshape(-1, 3)
 
     def _horizon_row(self) -> float:
         """Row of the horizon in the middle of the picture."""
@@ -284,10 +274,10 @@ class Eye2(Eye):
         return np.array(at).reshape(-1, 3), np.array(colour).reshape(-1, 3)
 
     @cached_property
-    def bonnet(self) -> Bonnet | None:
+    def bonnet(self) -> glass.Bonnet | None:
         """The own bonnet in this picture."""
         look = self.world.layout.lens.bonnet
-        return None if look is None else Bonnet.of(look, (self.camera.height_px, self.camera.width_px))
+        return None if look is None else glass.Bonnet.of(look, (self.camera.height_px, self.camera.width_px))
 
     def completed(self, view: WorldView) -> WorldView:
         """With the own bonnet in front of the street: it has no depth and does not move in the picture."""

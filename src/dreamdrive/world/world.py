@@ -11,13 +11,9 @@ from jaxtyping import Float
 from msgspec.structs import replace
 
 from dreamdrive.scene.layout import Box, Ego, Layout, Lens, Light, TrackPoint, is_moving, track_function
-from dreamdrive.world import bodies
+from dreamdrive.world import bodies, edition2
 from dreamdrive.world.bodies import Part
-from dreamdrive.world.edition2 import Hills, Lamps, TextureLibrary, grain, hills_of
-from dreamdrive.world.edition2 import body as body2
-from dreamdrive.world.edition2 import make_sky as make_sky2
-from dreamdrive.world.edition2 import paint_ground as paint_ground2
-from dreamdrive.world.edition2 import scenery as scenery2
+from dreamdrive.world.edition2 import Hills, Lamps, TextureLibrary, hills_of
 from dreamdrive.world.ground import GroundMap, paint_ground
 from dreamdrive.world.materials import Materials, Semantic
 from dreamdrive.world.mesh import Mesh, upright
@@ -95,15 +91,15 @@ class World:
 
     def _still2(self) -> Mesh:
         """Those of edition 2, with its lamps."""
-        ground = paint_ground2(self.layout, _bounds(self.layout), self.textures)
+        ground = edition2.paint_ground(self.layout, _bounds(self.layout), self.textures)
         self.ground = self.ground2 = ground
-        self.sky = make_sky2(self.layout, self.textures)
+        self.sky = edition2.make_sky(self.layout, self.textures)
         self.ground_material = self.materials.add(ground.image, Semantic.ROAD)
         self.far_material = self.materials.add(ground.far.image, Semantic.ROAD)
-        self.detail_texture = self.materials.textures.add(grain(self.layout.seed % 8), repeats=True)
+        self.detail_texture = self.materials.textures.add(edition2.grain(self.layout.seed % 8), repeats=True)
         self.movers = [self._mover(i + 1, box) for i, box in enumerate(self.layout.boxes)]
         both = self.ground_material, self.far_material
-        made = scenery2(self.layout, ground, both, self.materials, self.textures)
+        made = edition2.scenery(self.layout, ground, both, self.materials, self.textures)
         self.lamps: Lamps = Lamps(self.hills.raised(made.lamps.at_m), made.lamps.colour, made.lamps.ahead)
         return made.mesh
 
@@ -130,7 +126,9 @@ class World:
         other = copy(self)
         other.layout = replace(self.layout, light=light, lens=lens, ego=ego)
         one = self.layout.edition == 1
-        other.sky = make_sky(light, self.layout.seed) if one else make_sky2(other.layout, self.textures)
+        other.sky = (
+            make_sky(light, self.layout.seed) if one else edition2.make_sky(other.layout, self.textures)
+        )
         return other
 
     @cached_property
@@ -144,7 +142,7 @@ class World:
         return 1 + self.layout.light.exposure_drift * float(np.sin(1.1 * t_s + phase))
 
     def _mover(self, instance: int, box: Box) -> Mover:
-        body = body2 if self.layout.edition == 2 else bodies.body
+        body = edition2.body if self.layout.edition == 2 else bodies.body
         parts = body(box.kind, box.size_m, box.look, self.materials)
         places = track_function(box.track)
         way = _way(box.track, places)

@@ -1,9 +1,9 @@
 """The second edition of drawn streets: far more various than the first, on hills, in every weather."""
 
+from dreamdrive.world.edition2 import glass
 from dreamdrive.world.edition2.bodies import body, size_of
 from dreamdrive.world.edition2.draw import is_kept_out
-from dreamdrive.world.edition2.glass import Bonnet, bloom, drops, falling, haloes, screen
-from dreamdrive.world.edition2.ground import paint_ground
+from dreamdrive.world.edition2.ground import Ground2, paint_ground
 from dreamdrive.world.edition2.lamps import Lamps, headlights
 from dreamdrive.world.edition2.lens import bent, level_from_camera, most_barrel, pinhole, unbent
 from dreamdrive.world.edition2.looks import FIRST_TRAINING_SEED, Looks
