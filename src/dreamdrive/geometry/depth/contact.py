@@ -52,9 +52,8 @@ def on_the_road(
         if seen.sum() < max(_SEEN_COLUMNS, _SEEN_SHARE * len(columns)):
             continue
         foot = _hull(columns[seen], lowest[seen] + 1, columns)
-        row = np.clip(np.rint(foot).astype(np.intp), 0, height - 1)
-        contact = plane_inverse[row, columns]
-        higher = plane_inverse[np.maximum(row - 1, 0), columns]
+        contact = _at_rows(plane_inverse, foot, columns)
+        higher = _at_rows(plane_inverse, foot - 1, columns)
         off = _ROW_PX * (contact - higher) / np.maximum(contact, 1e-6)
         near = contact > _LEAST_INVERSE
         place = np.zeros((2, width), np.float32)
@@ -63,6 +62,16 @@ def on_the_road(
         inverse[mask] = np.broadcast_to(place[0], mask.shape)[mask]
         spread[mask] = np.broadcast_to(place[1], mask.shape)[mask]
     return Contact(inverse, spread)
+
+
+def _at_rows(
+    image: Float[np.ndarray, "h w"], edge_px: Float[np.ndarray, " n"], columns: Integer[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Values between rows, at heights counted from the picture's upper edge."""
+    at = np.clip(edge_px - 0.5, 0, len(image) - 1)
+    above = np.minimum(np.floor(at).astype(np.intp), len(image) - 2)
+    share = at - above
+    return (1 - share) * image[above, columns] + share * image[above + 1, columns]
 
 
 def _hull(
