@@ -64,6 +64,10 @@ class FusionOptions:
         least_spread: Of the network, at least.
         contact_spread: Of the depth of a road user that its contact with the road gives, beside that of the
             row in which it is seen.
+        overhang_m: By how much the surface of a vehicle is nearer than its contact with the road, on average
+            over its front, rear and sides. On drawn streets 0-3 with true outlines the share of pixels more
+            than 10 % off is 0.24 of standing and 0.22 of moving vehicles with 0 m, 0.14 and 0.15 with 0.2 m,
+            0.11 and 0.09 with 0.4 m, 0.22 and 0.16 with 0.6 m.
         user_stereo: Log depth by which sure stereo on a road user may differ from its contact.
         user_spread: Of such stereo.
     """
@@ -76,6 +80,7 @@ class FusionOptions:
     stereo_spread: float = 0.02
     least_spread: float = 0.05
     contact_spread: float = 0.06
+    overhang_m: float = 0.4
     user_stereo: float = 0.12
     user_spread: float = 0.05
 

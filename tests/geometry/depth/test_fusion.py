@@ -76,7 +76,7 @@ def test_a_car_has_the_depth_of_its_contact_whatever_stereo_says() -> None:
     street.confidence[:] = 0.9
     wrong = street.inverse.copy()
     wrong[street.instances == 1] = 1 / 60
-    assert street.off(street.fused(wrong), street.instances == 1) < 0.06
+    assert street.off(street.fused(wrong), street.instances == 1) < 0.12  # with its bumper nearer
 
 
 @pytest.mark.parametrize("sure", [0.0, 0.9])

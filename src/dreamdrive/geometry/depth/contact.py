@@ -32,12 +32,16 @@ def on_the_road(
     ground: Bool[np.ndarray, "h w"],
     plane_inverse: Float[np.ndarray, "h w"],
     least_spread: float,
+    overhang_m: Float[np.ndarray, " n"],
 ) -> Contact:
     """Every column of a road user gets the depth at which it meets the road.
 
     Wheels touch the road, the floor between them does not: the line of contact is the lower convex hull of
     the outline, taken of those columns in which the ground is seen right below. Columns between these are on
     the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing.
+
+    ``overhang_m`` has for each label, 0 included, by how much its surface is nearer than its contact: bumpers
+    reach out beyond the wheels.
     """
     height, width = instances.shape
     inverse, spread = np.zeros((2, height, width), np.float32)
@@ -52,8 +56,8 @@ def on_the_road(
         if seen.sum() < max(_SEEN_COLUMNS, _SEEN_SHARE * len(columns)):
             continue
         foot = _hull(columns[seen], lowest[seen] + 1, columns)
-        contact = _at_rows(plane_inverse, foot, columns)
-        higher = _at_rows(plane_inverse, foot - 1, columns)
+        contact = _nearer(_at_rows(plane_inverse, foot, columns), overhang_m[label])
+        higher = _nearer(_at_rows(plane_inverse, foot - 1, columns), overhang_m[label])
         off = _ROW_PX * (contact - higher) / np.maximum(contact, 1e-6)
         near = contact > _LEAST_INVERSE
         place = np.zeros((2, width), np.float32)
@@ -72,6 +76,11 @@ def _at_rows(
     above = np.minimum(np.floor(at).astype(np.intp), len(image) - 2)
     share = at - above
     return (1 - share) * image[above, columns] + share * image[above + 1, columns]
+
+
+def _nearer(inverse: Float[np.ndarray, " n"], by_m: float) -> Float[np.ndarray, " n"]:
+    """Inverse depth of what is so many metres nearer, at most half of the way."""
+    return inverse / np.maximum(1 - by_m * inverse, 0.5)
 
 
 def _hull(

@@ -39,6 +39,12 @@ class Seen:
         """Pixels of road users."""
         return (self.instances > 0) | np.isin(self.classes, ROAD_USERS)
 
+    def is_vehicle(self) -> Bool[np.ndarray, " n"]:
+        """Whether most pixels of each label, 0 included, are a vehicle's."""
+        labels = self.instances.ravel().astype(np.intp)
+        of_vehicle = (self.classes == StreetClass.VEHICLE).ravel()
+        return 2 * np.bincount(labels, weights=of_vehicle) > np.bincount(labels)
+
 
 def fused(
     view: View,
@@ -117,7 +123,8 @@ def fuse(
     flat = road & ~(stereo & believed)
     log_depth[flat], spread[flat] = plane[flat], options.stereo_spread
     ground = np.isin(seen.classes, _GROUND)
-    contact = on_the_road(seen.instances, ground, plane_inverse, options.contact_spread)
+    overhang = np.where(seen.is_vehicle(), options.overhang_m, 0)
+    contact = on_the_road(seen.instances, ground, plane_inverse, options.contact_spread, overhang)
     standing = (contact.inverse > 0) & shown
     log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact.spread[standing]
     matched = users & shown & (confidence >= options.sure) & (np.abs(swept - log_depth) < options.user_stereo)
