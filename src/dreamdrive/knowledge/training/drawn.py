@@ -41,7 +41,8 @@ _STREET_CLASS = {
     Semantic.PEDESTRIAN: StreetClass.PERSON,
     Semantic.OWN_CAR: StreetClass.OWN_CAR,
 }
-_CLASS_OF = np.array([_STREET_CLASS[kind] for kind in Semantic], dtype=np.uint8)
+CLASS_OF = np.array([_STREET_CLASS[kind] for kind in Semantic], dtype=np.uint8)
+"""The network's class of each class of a drawn street."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def draw_street_records(
 
 
 def _write(view: WorldView, at: Viewpoint, folder: Path, name: str, group: str, quality: int) -> Record:
-    classes = _CLASS_OF[view.semantic]
+    classes = CLASS_OF[view.semantic]
     labels = np.stack([np.zeros_like(classes), view.instance.astype(np.uint8), classes], axis=-1)
     hidden = (view.semantic == Semantic.OWN_CAR) | (view.semantic == Semantic.SKY)
     depth = depth_steps(np.where(hidden, 0, view.depth_m))
