@@ -7,19 +7,21 @@ spans let the copies nearest in time speak loudest, see ``lives``.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+from torch import Tensor
 
 from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
-from dreamdrive.motion import Tracks
+from dreamdrive.decompose.placing import Carried, Placement, PlacingOptions, placed
+from dreamdrive.motion import Tracks, multiply_quaternions
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -40,10 +42,9 @@ class ActorOptions:
         untracked_frames: The same for what has no track: a copy that stays where it was seen is wrong soon.
         lasting: Whether copies of what no other frame sees live on, see ``lives``: without it novel views
             lose 0.11 dB, and standing things seem to move 14 mm less.
-        contact_weight: Trust in one frame's depth against that in the change of size between two frames; a
-            frame that shows more of the actor weighs more.
+        placing: How place, yaw and depth of a track are estimated.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
-        least_points: Flow vectors needed to measure a change of size and place.
+        least_points: Flow vectors needed to measure a change of place.
         opacity: Opacity to start from: what moves hides what it passes, and must not leave the static
             Gaussians behind it to take on its colours.
     """
@@ -52,7 +53,7 @@ class ActorOptions:
     lifespan_frames: float = 1.25
     untracked_frames: float = 0.5
     lasting: bool = True
-    contact_weight: float = 0.05
+    placing: PlacingOptions = field(default_factory=PlacingOptions)
     least_frames: int = 2
     least_points: int = 12
     opacity: float = 0.8
@@ -75,12 +76,23 @@ class Cast:
 
 @dataclass(frozen=True)
 class _Path:
-    """One cluster over the frames it was seen in."""
+    """One cluster over the frames it was seen in, in order; None where it gets no track."""
 
     frames: Int[np.ndarray, " k"]
-    anchor_px: Float[np.ndarray, "k 2"]
-    depth_m: Float[np.ndarray, " k"]
-    seen_depth_m: Float[np.ndarray, " k"]
+    placement: Placement
+
+    def world_from_canonical(self, at: int, up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:
+        """From where the thing is in the middle one of the frames to where it is in another."""
+        turn = Rotation.from_rotvec(self.placement.yaw_rad[at] * up).as_matrix()
+        moved = np.eye(4)
+        moved[:3, :3] = turn
+        moved[:3, 3] = self.placement.place_m[at] - turn @ self.pivot_m
+        return moved
+
+    @property
+    def pivot_m(self) -> Float[np.ndarray, "3"]:
+        """What it turns about, in its canonical place."""
+        return self.placement.place_m[len(self.frames) // 2]
 
 
 def cast(
@@ -107,87 +119,58 @@ def cast(
     cluster = grouping.cluster.numpy()[index]
     frames = chosen.source_frame.numpy()
     flows = cache(partial(neighbour_flow, clip))
+    means = chosen.means.numpy().astype(np.float64)
+    up = np.array([0.0, -1.0, 0.0]) if geometry.ground is None else geometry.ground.normal_world
     paths = [
-        _path(flows, pixels, frames, np.flatnonzero(cluster == c), options) for c in range(cluster.max() + 1)
+        _path(clip, geometry, flows, means, pixels, frames, np.flatnonzero(cluster == c), up, options, reach_px)
+        for c in range(cluster.max() + 1)
     ]
-    return _merge(clip, geometry, chosen, pixels, cluster, paths, options, reach_px)
+    return _merge(clip, geometry, chosen, pixels, cluster, paths, up, options, reach_px)
 
 
 def _path(
+    clip: Clip,
+    geometry: Geometry,
     flow_to: Callable[[int, int], Float[np.ndarray, "h w 2"]],
+    means: Float[np.ndarray, "m 3"],
     pixels: Float[np.ndarray, "m 3"],
     frames: Int[np.ndarray, " m"],
     rows: Int[np.ndarray, " k"],
+    up: Float[np.ndarray, "3"],
     options: ActorOptions,
-) -> _Path:
-    """Where one cluster's anchor is in each frame, and how deep.
-
-    Between two frames a rigid thing's image changes by a similarity; its scale is the inverse ratio of
-    depths, which flow measures far better than any single frame measures depth. The depths of single frames
-    fix the common factor.
-    """
+    reach_px: float,
+) -> _Path | None:
+    """Where one cluster is in each frame that saw it."""
     seen = np.unique(frames[rows])
-    centres = np.array([np.median(pixels[rows[frames[rows] == f], :2], axis=0) for f in seen])
-    contact = np.array([np.median(pixels[rows[frames[rows] == f], 2]) for f in seen])
-    anchors = centres.copy()
-    log_ratio, trust = np.zeros(max(len(seen) - 1, 0)), np.zeros(max(len(seen) - 1, 0))
-    for k in range(len(seen) - 1):
-        members = rows[frames[rows] == seen[k]]
-        flow = flow_to(int(seen[k]), int(seen[k + 1]))
-        similarity = _similarity(flow, pixels[members, :2], options)
-        if similarity is None:
-            continue
-        anchors[k + 1] = similarity[:, :2] @ anchors[k] + similarity[:, 2]
-        log_ratio[k] = -np.log(np.hypot(similarity[0, 0], similarity[1, 0]))
-        trust[k] = 1.0
-        drift = np.linalg.norm(anchors[k + 1] - centres[k + 1])
-        spread = pixels[rows[frames[rows] == seen[k + 1]], :2].std(axis=0).max()
-        if drift > 2 * spread + 4:
-            anchors[k + 1] = centres[k + 1]
-    # What shows little of a thing often misses where it stands.
-    shown = np.array([np.count_nonzero(frames[rows] == f) for f in seen])
-    weight = options.contact_weight * shown / shown.mean()
-    depth = np.exp(_smooth_logs(np.log(contact), log_ratio, trust, weight))
-    return _Path(seen, anchors, depth, contact)
-
-
-def _similarity(
-    flow: Float[np.ndarray, "h w 2"], points: Float[np.ndarray, "m 2"], options: ActorOptions
-) -> Float[np.ndarray, "2 3"] | None:
-    if len(points) < options.least_points:
+    if len(seen) < options.least_frames:
         return None
-    moved = carried(points, flow)
-    cv2.setRNGSeed(0)
-    result: Any = cv2.estimateAffinePartial2D(
-        points, moved, method=cv2.RANSAC, ransacReprojThreshold=1.0, maxIters=500, confidence=0.999
-    )
-    found, inliers = result
-    if found is None or int(inliers.sum()) < options.least_points:
+    shown = [pixels[rows[frames[rows] == frame]] for frame in seen]
+    cameras = [geometry.cameras[frame] for frame in seen]
+    middles = np.stack([np.median(means[rows[frames[rows] == frame]], axis=0) for frame in seen])
+    carried = [
+        found
+        for k in range(len(seen) - 1)
+        if (found := _carried(k, shown, flow_to(int(seen[k]), int(seen[k + 1])), options, reach_px))
+    ]
+    return _Path(seen, placed(cameras, clip.times_s[seen], middles, carried, up, options.placing))
+
+
+def _carried(
+    first: int,
+    shown: list[Float[np.ndarray, "n 3"]],
+    flow: Float[np.ndarray, "h w 2"],
+    options: ActorOptions,
+    reach_px: float,
+) -> Carried | None:
+    """What flow carries from a frame onto the same cluster in the next."""
+    chosen = shown[first][:: max(1, len(shown[first]) // options.placing.samples)]
+    moved = carried(chosen[:, :2], flow)
+    distance, nearest = KDTree(shown[first + 1][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
+    met = np.isfinite(distance)
+    if met.sum() < options.least_points:
         return None
-    scale = float(np.hypot(found[0, 0], found[1, 0]))
-    return found if 0.5 < scale < 2.0 else None
-
-
-def _smooth_logs(
-    seen: Float[np.ndarray, " k"],
-    ratio: Float[np.ndarray, " j"],
-    trust: Float[np.ndarray, " j"],
-    weight: Float[np.ndarray, " k"],
-) -> Float[np.ndarray, " k"]:
-    """Least squares: close to ``seen`` weakly, to the measured differences strongly, at an even pace."""
-    count = len(seen)
-    rows, right = [np.diag(np.sqrt(weight))], [np.sqrt(weight) * seen]
-    for k in range(count - 1):
-        row = np.zeros((1, count))
-        row[0, k], row[0, k + 1] = -1, 1
-        rows.append(row * np.sqrt(max(float(trust[k]), 1e-3)))
-        right.append(np.array([ratio[k] * np.sqrt(max(float(trust[k]), 1e-3))]))
-    for k in range(1, count - 1):
-        row = np.zeros((1, count))
-        row[0, k - 1 : k + 2] = 1, -2, 1
-        rows.append(0.5 * row)
-        right.append(np.zeros(1))
-    return np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
+    depth = shown[first + 1][np.asarray(nearest)[met], 2]
+    return Carried(first, first + 1, chosen[met, :2], chosen[met, 2], moved[met], depth)
 
 
 def _merge(
@@ -196,7 +179,8 @@ def _merge(
     chosen: Gaussians,
     pixels: Float[np.ndarray, "m 3"],
     cluster: Int[np.ndarray, " m"],
-    paths: list[_Path],
+    paths: list[_Path | None],
+    up: Float[np.ndarray, "3"],
     options: ActorOptions,
     reach_px: float,
 ) -> Cast:
@@ -205,38 +189,42 @@ def _merge(
     interval = float(np.median(np.diff(times)))
     means = chosen.means.numpy().astype(np.float64)
     log_scales = chosen.log_scales.numpy().copy()
+    quaternions = chosen.quaternions.clone()
     opacity = torch.full_like(chosen.logit_opacities, math.log(options.opacity / (1 - options.opacity)))
     actor = np.full(len(means), -1, dtype=np.int64)
     frames = chosen.source_frame.numpy()
     untracked_s = np.full(len(means), options.untracked_frames * interval)
     lifespan = np.column_stack([clip.times_s[frames], untracked_s])
     deviation_s = options.lifespan_frames * interval
-    translations, pivots, actors = [], [], []
+    translations, yaws, pivots, actors = [], [], [], []
     for c, path in enumerate(paths):
-        if len(path.frames) < options.least_frames:
+        if path is None:
             continue
         rows = np.flatnonzero(cluster == c)
-        places = _places(geometry, path)
-        canonical_m = places[len(path.frames) // 2]
-        offsets = _offsets_at(times, clip.times_s[path.frames], places - canonical_m)
+        placement, known_s = path.placement, clip.times_s[path.frames]
         where = np.searchsorted(path.frames, frames[rows])
-        stretch = path.depth_m[where] / path.seen_depth_m[where]
+        stretch = placement.factor[where]
         centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames[rows]])
-        means[rows] = centres + (means[rows] - centres) * stretch[:, None] - (places - canonical_m)[where]
+        seen_m = centres + (means[rows] - centres) * stretch[:, None]
+        back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * up)
+        means[rows] = path.pivot_m + back.apply(seen_m - placement.place_m[where])
+        quaternions[rows] = _turned(back, quaternions[rows])
         log_scales[rows] += np.log(stretch)[:, None]
         actor[rows] = len(actors)
         lifespan[rows, 1] = deviation_s
         if options.lasting:
-            glimpses = _glimpses(clip, geometry, path, places - canonical_m, pixels[rows], frames[rows])
+            glimpses = _glimpses(clip, geometry, path, up, pixels[rows], frames[rows])
             span_s = float(clip.times_s[0]), float(clip.times_s[-1])
             lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s, reach_px)
-        translations.append(offsets)
-        pivots.append(canonical_m)
+        translations.append(_at(times, known_s, placement.place_m - path.pivot_m))
+        yaws.append(_at(times, known_s, placement.yaw_rad[:, None])[:, 0])
+        pivots.append(path.pivot_m)
         name = f"actor {len(actors)}"
-        actors.append(Actor(len(actors), name, "unknown", len(rows), clip.times_s[path.frames], places))
+        actors.append(Actor(len(actors), name, "unknown", len(rows), known_s, placement.place_m))
     merged = replace(
         chosen,
         means=torch.tensor(means, dtype=torch.float32),
+        quaternions=quaternions,
         log_scales=torch.tensor(log_scales, dtype=torch.float32),
         logit_opacities=opacity,
         actor=torch.from_numpy(actor),
@@ -244,44 +232,38 @@ def _merge(
     )
     tracks = None
     if actors:
-        stacked = np.stack(translations)
-        tracks = Tracks(times, stacked, np.zeros(stacked.shape[:2]), np.stack(pivots))
+        tracks = Tracks(times, np.stack(translations), np.stack(yaws), np.stack(pivots))
     return Cast(merged, tracks, tuple(actors))
+
+
+def _turned(by: Rotation, quaternions: Float[Tensor, "n 4"]) -> Float[Tensor, "n 4"]:
+    turn = torch.from_numpy(by.as_quat(scalar_first=True)).to(quaternions)
+    return multiply_quaternions(turn, quaternions)
 
 
 def _glimpses(
     clip: Clip,
     geometry: Geometry,
     path: _Path,
-    offsets_m: Float[np.ndarray, "k 3"],
+    up: Float[np.ndarray, "3"],
     pixels: Float[np.ndarray, "m 3"],
     frames: Int[np.ndarray, " m"],
 ) -> list[Glimpse]:
     """What each frame of a path saw of its cluster, as deep as the path says."""
     found: list[Glimpse] = []
     for k, frame in enumerate(path.frames.tolist()):
-        copies = pixels[frames == frame] * [1, 1, path.depth_m[k] / path.seen_depth_m[k]]
-        time_s = float(clip.times_s[frame])
-        found.append(Glimpse(time_s, geometry.cameras[frame], offsets_m[k], copies, geometry.depth_m[frame]))
+        copies = pixels[frames == frame] * [1, 1, path.placement.factor[k]]
+        camera, moved = geometry.cameras[frame], path.world_from_canonical(k, up)
+        found.append(Glimpse(float(clip.times_s[frame]), camera, moved, copies, geometry.depth_m[frame]))
     return found
 
 
-def _places(geometry: Geometry, path: _Path) -> Float[np.ndarray, "k 3"]:
-    """The anchor in the world at each frame it was seen in."""
-    places = []
-    for frame, (u, v), depth in zip(path.frames.tolist(), path.anchor_px, path.depth_m, strict=True):
-        camera = geometry.cameras[frame]
-        local = np.array([(u - camera.cx_px) / camera.fx_px, (v - camera.cy_px) / camera.fy_px, 1.0]) * depth
-        places.append(camera.world_from_camera[:3, :3] @ local + camera.world_from_camera[:3, 3])
-    return np.array(places)
-
-
-def _offsets_at(
-    times: Float[np.ndarray, " t"], known_s: Float[np.ndarray, " k"], offsets: Float[np.ndarray, "k 3"]
-) -> Float[np.ndarray, "t 3"]:
-    """Offsets at all key times: linear between those known, constant velocity beyond them."""
-    out = np.stack([np.interp(times, known_s, offsets[:, axis]) for axis in range(3)], axis=1)
+def _at(
+    times: Float[np.ndarray, " t"], known_s: Float[np.ndarray, " k"], values: Float[np.ndarray, "k c"]
+) -> Float[np.ndarray, "t c"]:
+    """Values at all key times: linear between those known, at a constant rate beyond them."""
+    out = np.stack([np.interp(times, known_s, column) for column in values.T], axis=1)
     for beyond, a, b in ((times < known_s[0], 0, 1), (times > known_s[-1], -1, -2)):
-        velocity = (offsets[a] - offsets[b]) / (known_s[a] - known_s[b])
-        out[beyond] = offsets[a] + (times[beyond] - known_s[a])[:, None] * velocity
+        rate = (values[a] - values[b]) / (known_s[a] - known_s[b])
+        out[beyond] = values[a] + (times[beyond] - known_s[a])[:, None] * rate
     return out

@@ -23,14 +23,14 @@ _WIDTH = (
 
 @dataclass(frozen=True)
 class Glimpse:
-    """What one training frame saw of an actor that is ``offset_m`` from its canonical place, in the world.
+    """What one training frame saw of an actor; ``world_from_canonical`` tells where it was.
 
     It left copies (column, row, depth along z); ``depth_m`` is of all that it saw, 0 where that is unknown.
     """
 
     time_s: float
     camera: Camera
-    offset_m: Float[np.ndarray, "3"]
+    world_from_canonical: Float[np.ndarray, "4 4"]
     copies: Float[np.ndarray, "m 3"]
     depth_m: Float[np.ndarray, "h w"]
 
@@ -82,7 +82,8 @@ def _unseen(places: Float[np.ndarray, "n 3"], glimpse: Glimpse, reach_px: float)
 
     One that would stand in front of what the frame saw, or beside the actor, is misplaced: it counts as seen.
     """
-    projected = glimpse.camera.project(places + glimpse.offset_m)
+    moved = glimpse.world_from_canonical
+    projected = glimpse.camera.project(places @ moved[:3, :3].T + moved[:3, 3])
     in_view = glimpse.camera.shows(projected)
     unseen, where = ~in_view, projected[in_view, :2]
     shown_m = glimpse.depth_m[where[:, 1].astype(int), where[:, 0].astype(int)].astype(np.float64)

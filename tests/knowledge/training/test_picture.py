@@ -9,7 +9,7 @@ from tests.knowledge.training.folders import write_folder
 
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge.training.mixture import read_entries
-from dreamdrive.knowledge.training.picture import Picture, centred, cut, mirrored, read_entry, turned
+from dreamdrive.knowledge.training.picture import Picture, centred, continued, cut, mirrored, read_entry, turned
 from dreamdrive.knowledge.training.records import UNKNOWN
 
 WIDTH, HEIGHT = 320, 200
@@ -91,3 +91,18 @@ def test_what_is_not_known_stays_so() -> None:
     picture = replace(with_horizon(0, 0), focal=nan, horizon=nan, roll_rad=nan)
     part = mirrored(turned(centred(picture, (96, 64)), 3.0))
     assert np.isnan([part.focal, part.horizon, part.roll_rad]).all()
+
+
+def test_flat_pictures_are_continued_above_and_below() -> None:
+    picture = with_horizon(0.04, 0.0)
+    width, height = picture.size
+    square = continued(picture, (64, 64), 0.9)
+    assert square.size == (width, width)
+    rows = (width - height) // 2
+    assert (square.rgb[:rows] == picture.rgb[0]).all()
+    assert (square.rgb[rows:-rows] == picture.rgb).all()
+    assert (square.labels[:rows] == 255).all()
+    assert (square.depth[-rows:] == 0).all()
+    assert (square.focal, square.horizon) == (picture.focal, picture.horizon)
+    assert continued(picture, (64, 64), 0.2).size[1] == pytest.approx(height / 0.8, abs=1)
+    assert continued(picture, (640, 64), 0.2).size == picture.size

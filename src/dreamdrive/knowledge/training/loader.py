@@ -15,6 +15,7 @@ from dreamdrive.knowledge.training.picture import (
     Picture,
     camera_dropped,
     centred,
+    continued,
     cut,
     largest,
     mirrored,
@@ -34,10 +35,10 @@ class LoaderOptions:
 
     batch: int = 8
     """Pictures a step."""
-    sizes: tuple[tuple[int, int], ...] = ((320, 192), (384, 224), (448, 256), (288, 288))
+    sizes: tuple[tuple[int, int], ...] = ((320, 192), (384, 224), (448, 256), (288, 288), (512, 160))
     """Width and height of the pictures of a batch, one of them at random."""
     mirror_share: float = 0.5
-    closest: float = 0.7
+    closest: float = 0.8
     """Smallest part of the largest cut about the middle, along each side."""
     aside_share: float = 0.3
     """Cuts away from the middle, which leave the camera unknown."""
@@ -45,10 +46,11 @@ class LoaderOptions:
     turn_share: float = 0.4
     turn_deg: float = 2.5
     """Standard deviation of the turn about the camera's axis."""
-    continued_share: float = 0.15
-    """Pictures whose outermost rows are repeated, as those of other shapes are for the network."""
-    continued: float = 0.08
-    """Most such rows above and below, in shares of the height."""
+    continued_share: float = 0.6
+    """Pictures flatter than the batch whose outermost rows are repeated, as they are for the network; the
+    others lose their sides, and a wide lens looks narrow then."""
+    continued: float = 0.3
+    """Most such rows, in shares of the new height."""
     erase_share: float = 0.3
     erase: tuple[float, float] = (0.05, 0.3)
     """Sides of erased boxes in shares of the picture's."""
@@ -117,25 +119,10 @@ def placed_anew(
         corner = generator.uniform(0, width - across), generator.uniform(0, height - down)
         picture = camera_dropped(cut(picture, (*corner, across, down), size))
     else:
+        if generator.random() < options.continued_share:
+            picture = continued(picture, size, options.continued)
         picture = centred(picture, size, generator.uniform(options.closest, 1))
-    if generator.random() < options.continued_share:
-        picture = _continued(picture, round(generator.uniform(0, options.continued) * size[1] / 4))
     return mirrored(picture) if generator.random() < options.mirror_share else picture
-
-
-def _continued(picture: Picture, places: int) -> Picture:
-    """The outermost rows repeated over so many rows of places of stride 4, above and below."""
-    rows, first = 4 * places, 4 // STRIDE * places
-    if not places:
-        return picture
-    middle = picture.rgb[rows:-rows]
-    maps = {"labels": UNKNOWN, "instances": UNKNOWN, "depth": 0}
-    changed: dict[str, np.ndarray] = {}
-    for name, unknown in maps.items():
-        values = getattr(picture, name).copy()
-        values[:first] = values[-first:] = unknown
-        changed[name] = values
-    return replace(picture, rgb=cv2.copyMakeBorder(middle, rows, rows, 0, 0, cv2.BORDER_REPLICATE), **changed)
 
 
 def _erased(picture: Picture, generator: np.random.Generator, options: LoaderOptions) -> Picture:

@@ -117,6 +117,25 @@ def centred(picture: Picture, size: tuple[int, int], share: float = 1.0) -> Pict
     return cut(picture, ((width - across) / 2, (height - down) / 2, across, down), size)
 
 
+def continued(picture: Picture, shape: tuple[int, int], most: float) -> Picture:
+    """With the outermost rows repeated above and below until the picture is as high as a shape asks.
+
+    Nothing is known of these rows, and they are no larger share of the new height than ``most``.
+    """
+    width, height = picture.size
+    rows = min(width * shape[1] / shape[0], height / (1 - most)) - height
+    rows = max(0, round(rows / 2))
+    unknown = {"labels": UNKNOWN, "instances": UNKNOWN, "depth": 0}
+    maps = {
+        name: cv2.copyMakeBorder(
+            getattr(picture, name), rows, rows, 0, 0, cv2.BORDER_CONSTANT, value=float(value)
+        )
+        for name, value in unknown.items()
+    }
+    rgb = cv2.copyMakeBorder(picture.rgb, rows, rows, 0, 0, cv2.BORDER_REPLICATE)
+    return replace(picture, rgb=rgb, **maps)
+
+
 def largest(within: tuple[int, int], shape: tuple[int, int]) -> tuple[float, float]:
     """Width and height of the largest box of a shape inside a size."""
     across = min(within[0], within[1] * shape[0] / shape[1])
