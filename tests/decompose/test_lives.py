@@ -11,7 +11,9 @@ NONE = np.zeros((0, 3))
 
 def glimpse(k: int, copies: np.ndarray = NONE, behind_m: float = 50.0, offset_m: float = 0.0) -> Glimpse:
     depth = np.full((100, 100), behind_m, np.float32)
-    return Glimpse(TIMES[k], CAMERA, np.array([offset_m, 0.0, 0.0]), copies, depth)
+    moved = np.eye(4)
+    moved[0, 3] = offset_m
+    return Glimpse(TIMES[k], CAMERA, moved, copies, depth)
 
 
 def copy_at(x_m: float, z_m: float) -> np.ndarray:
@@ -71,3 +73,11 @@ def test_a_single_glimpse():
 def test_unknown_depth_counts_as_seen():
     seen = [glimpse(0, copy_at(0, 10)), glimpse(1, behind_m=0)]
     assert life((0, 0, 10), 0, seen) == (0.0, 0.125)
+
+
+def test_an_actor_that_turned_shows_another_side() -> None:
+    # A surface 1 m to the right of what it turns about is 1 m behind it after a quarter turn.
+    moved = np.array([[0, 0, 1.0, -10], [0, 1, 0, 0], [-1, 0, 0, 10], [0, 0, 0, 1]])
+    seen = [glimpse(0, copy_at(1, 10)), Glimpse(0.1, CAMERA, moved, copy_at(0, 9.0), glimpse(0).depth_m)]
+    assert life((1, 0, 10), 0, seen[:1])[0] == pytest.approx(0.0)
+    assert life((-2, 0, 10), 0, seen)[0] == pytest.approx(0.25)

@@ -6,21 +6,18 @@ spans let the copies nearest in time speak loudest, see ``lives``.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from dreamdrive.decompose.flow import carried, neighbour_flow
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
-from dreamdrive.decompose.placing import Carried, Placement, PlacingOptions, placed
+from dreamdrive.decompose.paths import Path, find_path
+from dreamdrive.decompose.placing import PlacingOptions
 from dreamdrive.motion import Tracks, multiply_quaternions
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
@@ -44,7 +41,6 @@ class ActorOptions:
             lose 0.11 dB, and standing things seem to move 14 mm less.
         placing: How place, yaw and depth of a track are estimated.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
-        least_points: Flow vectors needed to measure a change of place.
         opacity: Opacity to start from: what moves hides what it passes, and must not leave the static
             Gaussians behind it to take on its colours.
     """
@@ -55,7 +51,6 @@ class ActorOptions:
     lasting: bool = True
     placing: PlacingOptions = field(default_factory=PlacingOptions)
     least_frames: int = 2
-    least_points: int = 12
     opacity: float = 0.8
 
 
@@ -72,27 +67,6 @@ class Cast:
     gaussians: Gaussians
     tracks: Tracks | None
     actors: tuple[Actor, ...]
-
-
-@dataclass(frozen=True)
-class _Path:
-    """One cluster over the frames it was seen in, in order; None where it gets no track."""
-
-    frames: Int[np.ndarray, " k"]
-    placement: Placement
-
-    def world_from_canonical(self, at: int, up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4 4"]:
-        """From where the thing is in the middle one of the frames to where it is in another."""
-        turn = Rotation.from_rotvec(self.placement.yaw_rad[at] * up).as_matrix()
-        moved = np.eye(4)
-        moved[:3, :3] = turn
-        moved[:3, 3] = self.placement.place_m[at] - turn @ self.pivot_m
-        return moved
-
-    @property
-    def pivot_m(self) -> Float[np.ndarray, "3"]:
-        """What it turns about, in its canonical place."""
-        return self.placement.place_m[len(self.frames) // 2]
 
 
 def cast(
@@ -116,61 +90,15 @@ def cast(
     if not options.tracks:
         return Cast(chosen, None, ())
     pixels = source_pixels(geometry, gaussians, index)
-    cluster = grouping.cluster.numpy()[index]
-    frames = chosen.source_frame.numpy()
-    flows = cache(partial(neighbour_flow, clip))
-    means = chosen.means.numpy().astype(np.float64)
-    up = np.array([0.0, -1.0, 0.0]) if geometry.ground is None else geometry.ground.normal_world
-    paths = [
-        _path(clip, geometry, flows, means, pixels, frames, np.flatnonzero(cluster == c), up, options, reach_px)
-        for c in range(cluster.max() + 1)
-    ]
-    return _merge(clip, geometry, chosen, pixels, cluster, paths, up, options, reach_px)
-
-
-def _path(
-    clip: Clip,
-    geometry: Geometry,
-    flow_to: Callable[[int, int], Float[np.ndarray, "h w 2"]],
-    means: Float[np.ndarray, "m 3"],
-    pixels: Float[np.ndarray, "m 3"],
-    frames: Int[np.ndarray, " m"],
-    rows: Int[np.ndarray, " k"],
-    up: Float[np.ndarray, "3"],
-    options: ActorOptions,
-    reach_px: float,
-) -> _Path | None:
-    """Where one cluster is in each frame that saw it."""
-    seen = np.unique(frames[rows])
-    if len(seen) < options.least_frames:
-        return None
-    shown = [pixels[rows[frames[rows] == frame]] for frame in seen]
-    cameras = [geometry.cameras[frame] for frame in seen]
-    middles = np.stack([np.median(means[rows[frames[rows] == frame]], axis=0) for frame in seen])
-    carried = [
-        found
-        for k in range(len(seen) - 1)
-        if (found := _carried(k, shown, flow_to(int(seen[k]), int(seen[k + 1])), options, reach_px))
-    ]
-    return _Path(seen, placed(cameras, clip.times_s[seen], middles, carried, up, options.placing))
-
-
-def _carried(
-    first: int,
-    shown: list[Float[np.ndarray, "n 3"]],
-    flow: Float[np.ndarray, "h w 2"],
-    options: ActorOptions,
-    reach_px: float,
-) -> Carried | None:
-    """What flow carries from a frame onto the same cluster in the next."""
-    chosen = shown[first][:: max(1, len(shown[first]) // options.placing.samples)]
-    moved = carried(chosen[:, :2], flow)
-    distance, nearest = KDTree(shown[first + 1][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
-    met = np.isfinite(distance)
-    if met.sum() < options.least_points:
-        return None
-    depth = shown[first + 1][np.asarray(nearest)[met], 2]
-    return Carried(first, first + 1, chosen[met, :2], chosen[met, 2], moved[met], depth)
+    cluster, frames = grouping.cluster.numpy()[index], chosen.source_frame.numpy()
+    paths: list[Path | None] = []
+    for c in range(cluster.max() + 1):
+        rows = np.flatnonzero(cluster == c)
+        seen = np.unique(frames[rows])
+        shown = [pixels[rows[frames[rows] == frame]] for frame in seen]
+        tracked = len(seen) >= options.least_frames
+        paths.append(find_path(clip, geometry, seen, shown, options.placing, reach_px) if tracked else None)
+    return _merge(clip, geometry, chosen, pixels, cluster, paths, options, reach_px)
 
 
 def _merge(
@@ -179,8 +107,7 @@ def _merge(
     chosen: Gaussians,
     pixels: Float[np.ndarray, "m 3"],
     cluster: Int[np.ndarray, " m"],
-    paths: list[_Path | None],
-    up: Float[np.ndarray, "3"],
+    paths: list[Path | None],
     options: ActorOptions,
     reach_px: float,
 ) -> Cast:
@@ -206,14 +133,14 @@ def _merge(
         stretch = placement.factor[where]
         centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames[rows]])
         seen_m = centres + (means[rows] - centres) * stretch[:, None]
-        back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * up)
+        back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * path.up)
         means[rows] = path.pivot_m + back.apply(seen_m - placement.place_m[where])
         quaternions[rows] = _turned(back, quaternions[rows])
         log_scales[rows] += np.log(stretch)[:, None]
         actor[rows] = len(actors)
         lifespan[rows, 1] = deviation_s
         if options.lasting:
-            glimpses = _glimpses(clip, geometry, path, up, pixels[rows], frames[rows])
+            glimpses = _glimpses(clip, geometry, path, pixels[rows], frames[rows])
             span_s = float(clip.times_s[0]), float(clip.times_s[-1])
             lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s, reach_px)
         translations.append(_at(times, known_s, placement.place_m - path.pivot_m))
@@ -244,8 +171,7 @@ def _turned(by: Rotation, quaternions: Float[Tensor, "n 4"]) -> Float[Tensor, "n
 def _glimpses(
     clip: Clip,
     geometry: Geometry,
-    path: _Path,
-    up: Float[np.ndarray, "3"],
+    path: Path,
     pixels: Float[np.ndarray, "m 3"],
     frames: Int[np.ndarray, " m"],
 ) -> list[Glimpse]:
@@ -253,7 +179,7 @@ def _glimpses(
     found: list[Glimpse] = []
     for k, frame in enumerate(path.frames.tolist()):
         copies = pixels[frames == frame] * [1, 1, path.placement.factor[k]]
-        camera, moved = geometry.cameras[frame], path.world_from_canonical(k, up)
+        camera, moved = geometry.cameras[frame], path.world_from_canonical(k)
         found.append(Glimpse(float(clip.times_s[frame]), camera, moved, copies, geometry.depth_m[frame]))
     return found
 

@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.scene.clip import Clip
 
@@ -29,3 +29,44 @@ def neighbour_flow(
     method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     guess = np.zeros((*clip.frames.shape[1:3], 2), np.float32) if start is None else start.copy()
     return np.asarray(method.calc(grey(clip.frames[frame]), grey(clip.frames[other]), guess))
+
+
+_LEAST_SIDE_PX, _LARGEST = 64, 3.0  # of what flow is looked for in, and by how much it is enlarged for that
+_RETURNS_PX = 1.0  # flow there and back misses by less where it can be trusted
+
+
+def guided(
+    first: UInt8[np.ndarray, "h w"],
+    second: UInt8[np.ndarray, "h w"],
+    points: Float[np.ndarray, "m 2"],
+    expected: Float[np.ndarray, "m 2"],
+) -> tuple[Float[np.ndarray, "m 2"], Bool[np.ndarray, " m"]]:
+    """Where the points of a thing are in another picture, which is looked for around where they are expected.
+
+    The second picture is moved and scaled so that the thing should stay where it is; flow is then small, and
+    found in a cut around the thing. With the places it is told where the flow back leads to the start again.
+    """
+    middle, there = points.mean(axis=0), expected.mean(axis=0)
+    spread, shared = (float(((points - middle) * each).sum()) for each in (points - middle, expected - there))
+    scale = min(max(shared / spread, 0.3), 3.0) if spread > 0 else 1.0
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = np.maximum(0.3 * (high - low), 8.0)
+    corner, size = low - margin, high - low + 2 * margin
+    enlarged = min(max(_LEAST_SIDE_PX / float(size.min()), 1.0), _LARGEST)
+    shape = int(np.ceil(size[0] * enlarged)), int(np.ceil(size[1] * enlarged))
+    # From the cut to each picture, in coordinates in which the middle of the first pixel is 0.
+    to_first = np.array([[1 / enlarged, 0, corner[0] - 0.5], [0, 1 / enlarged, corner[1] - 0.5]])
+    moved = there + scale * (corner - middle)
+    to_second = np.array([[scale / enlarged, 0, moved[0] - 0.5], [0, scale / enlarged, moved[1] - 0.5]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    one, other = (
+        cv2.warpAffine(picture, way, shape, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        for picture, way in ((first, to_first), (second, to_second))
+    )
+    method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    still = np.zeros((*one.shape, 2), np.float32)
+    ahead, back = (np.asarray(method.calc(a, b, still.copy())) for a, b in ((one, other), (other, one)))
+    start = (points - corner) * enlarged
+    end = carried(start, ahead)
+    trusted = np.linalg.norm(carried(end, back) - start, axis=1) < _RETURNS_PX * enlarged
+    return moved + scale * end / enlarged, trusted & (end >= 0).all(axis=1) & (end < shape).all(axis=1)

@@ -8,16 +8,21 @@ as well as in depth. Motion is smooth.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import radians
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.camera import NEAR_M, Camera
 
-_PARAMETERS = 5  # a frame: place along three axes, yaw, logarithm of the factor of depth
+_STATE = 5  # of a frame: place along three axes, yaw, logarithm of the factor of depth
 _STEPS = 24
-_STEP = 1e-4  # of the differences that stand for derivatives
+_STILL_M = 1e-3  # by which the last step may still move a place
+_DIFFERENCE = 1e-4  # that stands for a derivative
+_MOST_FACTOR = 0.7  # of the logarithm
+_PLACE_M = 0.3  # beside the share of the distance
+_FREE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,7 @@ class PlacingOptions:
         yaw_rate_deg_s: Of its yaw.
         yaw_acceleration_deg_s2: Of the change of that.
         samples: Most points that are carried from one frame to the next.
+        independent: So many of them count, as neighbours err alike.
     """
 
     flow_px: float = 0.7
@@ -49,13 +55,15 @@ class PlacingOptions:
     yaw_rate_deg_s: float = 20.0
     yaw_acceleration_deg_s2: float = 40.0
     samples: int = 120
+    independent: float = 12.0
 
 
 @dataclass(frozen=True)
 class Carried:
-    """Points that flow carries from one frame of a thing to another: indices of the frames, and of N points
-    the place in the first image, their depth there, the place in the second image, and the depth there, not
-    a number where unknown.
+    """Points that flow carries from one frame of a thing to another.
+
+    Frames are told by their index among those that saw the thing. Each of the N points has its place and its
+    depth in the first picture and in the second.
     """
 
     first: int
@@ -91,105 +99,107 @@ def placed(
 ) -> Placement:
     """The motion that explains most.
 
-    ``cameras`` and ``times_s`` are those of the frames that saw the thing, in order, ``middles_m`` the middles
-    of what they saw, in the world; ``up`` is the axis of yaw.
+    Cameras and times are those of the frames that saw the thing, in order, ``middles_m`` the middles of what
+    they saw, in the world; ``up`` is the axis of yaw.
     """
     count = len(cameras)
-    if count == 1:
-        return Placement(middles_m.copy(), np.zeros(1), np.ones(1))
-    problem = _Problem(cameras, carried, up)
-    prior, wanted = _prior(cameras, times_s, middles_m, up, options)
-    state = np.zeros((count, _PARAMETERS))
+    flow = _Flow(cameras, carried, up, options) if carried else None
+    prior = _prior(cameras, times_s, middles_m, up, options)
+    state = np.zeros((count, _STATE))
     state[:, :3] = middles_m
-    # Without flow first: from far away robust weights would take the wrong points for lost.
     for step in range(_STEPS):
-        lost = options.flow_px * 3 + options.lost_px * max(0.0, 1 - step / (0.6 * _STEPS))
-        normal, gradient = _prior_terms(state, prior, wanted)
-        if step and len(carried):
-            n, g = problem.terms(state, lost, options)
-            normal, gradient = normal + n, gradient + g
-        normal[np.diag_indices_from(normal)] *= 1.001
-        change = np.linalg.solve(normal, -gradient).reshape(count, _PARAMETERS)
+        normal, gradient = prior.terms(state)
+        # The first step has none: from far away the wrong points would pass for lost.
+        if step and flow is not None:
+            narrowed = max(0.0, 1 - step / (0.6 * _STEPS))
+            more, pull = flow.terms(state, 3 * options.flow_px + narrowed * options.lost_px)
+            normal, gradient = normal + more, gradient + pull
+        change = np.linalg.solve(normal, -gradient).reshape(count, _STATE)
         state = state + change
-        state[:, 4] = state[:, 4].clip(-0.7, 0.7)
-        if step > 0.7 * _STEPS and np.abs(change[:, :3]).max() < 1e-3:
+        state[:, 4] = state[:, 4].clip(-_MOST_FACTOR, _MOST_FACTOR)
+        if step > 0.7 * _STEPS and np.abs(change[:, :3]).max() < _STILL_M:
             break
-    yaw = state[:, 3] - state[count // 2, 3]
-    return Placement(state[:, :3], yaw, np.exp(state[:, 4]))
+    return Placement(state[:, :3], state[:, 3] - state[count // 2, 3], np.exp(state[:, 4]))
 
 
-class _Problem:
+class _Flow:
     """What carried points say."""
 
-    def __init__(self, cameras: Sequence[Camera], carried: Sequence[Carried], up: np.ndarray) -> None:
-        self.up = up
-        self.centres = np.stack([camera.world_from_camera[:3, 3] for camera in cameras])
-        self.turns = np.stack([camera.world_from_camera[:3, :3] for camera in cameras])
-        self.lens = np.array([[c.fx_px, c.fy_px, c.cx_px, c.cy_px] for c in cameras])
-        self.pairs = [(each.first, each.second) for each in carried]
+    def __init__(
+        self,
+        cameras: Sequence[Camera],
+        carried: Sequence[Carried],
+        up: Float[np.ndarray, "3"],
+        options: PlacingOptions,
+    ) -> None:
+        self._up, self._options = up, options
         sizes = [len(each.first_m) for each in carried]
-        self.starts = np.cumsum([0, *sizes[:-1]]) if sizes else np.zeros(0, int)
-        self.first = np.repeat([each.first for each in carried], sizes).astype(int)
-        self.second = np.repeat([each.second for each in carried], sizes).astype(int)
-        self.share = np.repeat([1 / max(size, 1) for size in sizes], sizes)
-        if not carried:
-            return
-        fx, fy, cx, cy = self.lens[self.first].T
-        u, v = np.concatenate([each.first_px for each in carried]).T
-        rays = np.stack([(u - cx) / fx, (v - cy) / fy, np.ones_like(u)], axis=1)
-        depth = np.concatenate([each.first_m for each in carried])
-        self.arm = np.einsum("nij,nj->ni", self.turns[self.first], rays * depth[:, None])
-        self.target = np.concatenate([each.second_px for each in carried])
-        self.log_depth = np.log(np.concatenate([each.second_m for each in carried]))
+        self._pairs = [(each.first, each.second) for each in carried]
+        self._starts = np.cumsum([0, *sizes[:-1]])
+        self._first, self._second = (np.repeat(each, sizes) for each in zip(*self._pairs, strict=True))
+        self._share = np.repeat([options.independent / size for size in sizes], sizes)[:, None]
+        poses = np.stack([camera.world_from_camera for camera in cameras])
+        self._centre = poses[self._first, :3, 3]
+        seen = [cameras[each.first].lift(np.column_stack([each.first_px, each.first_m])) for each in carried]
+        self._arm = np.concatenate(seen) - self._centre
+        self._other = np.linalg.inv(poses)[self._second]
+        lens = np.array([[c.fx_px, c.fy_px, c.cx_px, c.cy_px] for c in cameras])[self._second]
+        self._focal, self._middle = lens[:, :2], lens[:, 2:]
+        self._target = np.concatenate([each.second_px for each in carried])
+        self._log_depth = np.log(np.concatenate([each.second_m for each in carried]))
 
-    def residuals(self, one: Float[np.ndarray, "n 5"], other: Float[np.ndarray, "n 5"]) -> np.ndarray:
-        """Of each point two in pixels and one of log depth, by the state of its first and second frame."""
-        seen = self.centres[self.first] + np.exp(one[:, 4:]) * self.arm
-        body = _about(self.up, seen - one[:, :3], other[:, 3] - one[:, 3])
-        there = body + other[:, :3] - self.centres[self.second]
-        local = np.einsum("nji,nj->ni", self.turns[self.second], there)
-        z = np.maximum(local[:, 2], 0.1)
-        fx, fy, cx, cy = self.lens[self.second].T
-        u, v = fx * local[:, 0] / z + cx, fy * local[:, 1] / z + cy
-        return np.stack(
-            [u - self.target[:, 0], v - self.target[:, 1], np.log(z) - other[:, 4] - self.log_depth], axis=1
-        )
+    def _off(
+        self, one: Float[np.ndarray, "n 5"], other: Float[np.ndarray, "n 5"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """By how much each point misses, in pixels and in log depth, by the state of both its frames."""
+        seen = self._centre + np.exp(one[:, 4:]) * self._arm
+        there = _about(self._up, seen - one[:, :3], other[:, 3] - one[:, 3]) + other[:, :3]
+        local = np.einsum("nij,nj->ni", self._other[:, :3, :3], there) + self._other[:, :3, 3]
+        z = np.maximum(local[:, 2:], NEAR_M)
+        missed = self._focal * local[:, :2] / z + self._middle - self._target
+        return np.column_stack([missed, np.log(z[:, 0]) - other[:, 4] - self._log_depth])
 
     def terms(
-        self, state: Float[np.ndarray, "k 5"], lost_px: float, options: PlacingOptions
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, state: Float[np.ndarray, "k 5"], lost_px: float
+    ) -> tuple[Float[np.ndarray, "m m"], Float[np.ndarray, " m"]]:
         """Normal matrix and gradient of the robust squares."""
-        one, other = state[self.first], state[self.second]
-        here = self.residuals(one, other)
-        slopes = np.empty((len(here), 3, 2 * _PARAMETERS))
-        for k in range(_PARAMETERS):
-            step = np.zeros(_PARAMETERS)
-            step[k] = _STEP
-            slopes[..., k] = (self.residuals(one + step, other) - here) / _STEP
-            slopes[..., _PARAMETERS + k] = (self.residuals(one, other + step) - here) / _STEP
-        unsure = ~np.isfinite(here[:, 2])
-        here[unsure, 2] = 0.0
-        off = np.hypot(here[:, 0], here[:, 1])
-        weight = np.empty_like(here)
-        weight[:, :2] = (1 / (1 + (off / lost_px) ** 2) ** 2 / options.flow_px**2)[:, None]
-        far = here[:, 2] / options.depth
-        weight[:, 2] = np.where(unsure, 0.0, 1 / (1 + (far / 3) ** 2) ** 2 / options.depth**2)
-        # Neighbouring points err alike: those of one pair of frames together count as a few.
-        weight *= (_INDEPENDENT * self.share)[:, None]
-        slopes[unsure, 2] = 0.0
-        weighted = slopes * weight[..., None]
-        blocks = np.add.reduceat(np.einsum("nri,nrj->nij", weighted, slopes), self.starts)
-        pulls = np.add.reduceat(np.einsum("nri,nr->ni", weighted, here), self.starts)
-        count = len(state)
-        normal, gradient = np.zeros((count * _PARAMETERS,) * 2), np.zeros(count * _PARAMETERS)
-        for (a, b), block, pull in zip(self.pairs, blocks, pulls, strict=True):
-            rows = np.concatenate([_PARAMETERS * a + np.arange(5), _PARAMETERS * b + np.arange(5)])
+        one, other = state[self._first], state[self._second]
+        off = self._off(one, other)
+        slopes = np.empty((*off.shape, 2 * _STATE))
+        for k, step in enumerate(_DIFFERENCE * np.eye(_STATE)):
+            slopes[..., k] = (self._off(one + step, other) - off) / _DIFFERENCE
+            slopes[..., _STATE + k] = (self._off(one, other + step) - off) / _DIFFERENCE
+        weight = np.empty_like(off)
+        weight[:, :2] = _trust(np.hypot(off[:, 0], off[:, 1]) / lost_px)[:, None] / self._options.flow_px**2
+        weight[:, 2] = _trust(off[:, 2] / self._options.depth / 3) / self._options.depth**2
+        weighted = slopes * (weight * self._share)[..., None]
+        blocks = np.add.reduceat(np.einsum("nri,nrj->nij", weighted, slopes), self._starts)
+        pulls = np.add.reduceat(np.einsum("nri,nr->ni", weighted, off), self._starts)
+        normal, gradient = np.zeros((state.size, state.size)), np.zeros(state.size)
+        for pair, block, pull in zip(self._pairs, blocks, pulls, strict=True):
+            rows = np.concatenate([_STATE * frame + np.arange(_STATE) for frame in pair])
             normal[np.ix_(rows, rows)] += block
             gradient[rows] += pull
         return normal, gradient
 
 
-_INDEPENDENT = 12.0  # points of a pair of frames, as far as their errors go
+@dataclass(frozen=True)
+class _Prior:
+    """Linear equations of the state; the first, by threes, are of the places, which may be wrong."""
+
+    rows: Float[np.ndarray, "r m"]
+    wanted: Float[np.ndarray, " r"]
+
+    def terms(
+        self, state: Float[np.ndarray, "k 5"]
+    ) -> tuple[Float[np.ndarray, "m m"], Float[np.ndarray, " m"]]:
+        """Normal matrix and gradient."""
+        off = self.rows @ state.ravel() - self.wanted
+        weight, places = np.ones(len(off)), 3 * len(state)
+        weight[:places] = np.repeat(_trust(np.linalg.norm(off[:places].reshape(-1, 3), axis=1) / 3), 3)
+        weighted = self.rows.T * weight
+        # Nothing tells the yaw that all frames share.
+        return weighted @ self.rows + _FREE * np.eye(state.size), weighted @ off
 
 
 def _prior(
@@ -198,65 +208,46 @@ def _prior(
     middles_m: Float[np.ndarray, "k 3"],
     up: Float[np.ndarray, "3"],
     options: PlacingOptions,
-) -> tuple[list[tuple[int, Float[np.ndarray, "r n"]]], list[Float[np.ndarray, " r"]]]:
-    """Linear equations, of so many rows each that are robust together, and what they shall give."""
-    count = len(times_s)
-    rows: list[tuple[int, np.ndarray]] = []
-    wanted: list[np.ndarray] = []
-
-    def add(row: Float[np.ndarray, "r n"], value: Float[np.ndarray, " r"], *, robust: bool = False) -> None:
-        rows.append((int(robust), row.reshape(len(value), -1)))
-        wanted.append(value)
-
-    level = np.eye(3) - np.outer(up, up)
-    for k, (camera, middle) in enumerate(zip(cameras, middles_m, strict=True)):
-        arm = middle - camera.world_from_camera[:3, 3]
-        off = options.place * float(np.linalg.norm(arm)) + 0.3
-        place = np.zeros((3, count, _PARAMETERS))
-        place[:, k, :3] = np.eye(3) / off
-        place[:, k, 4] = -arm / off
-        add(place, middle / off, robust=True)
-        factor = np.zeros((1, count, _PARAMETERS))
-        factor[0, k, 4] = 1 / options.factor
-        add(factor, np.zeros(1))
-    for k in range(count - 1):
-        turn = np.zeros((1, count, _PARAMETERS))
-        seconds = float(times_s[k + 1] - times_s[k])
-        turn[0, k, 3], turn[0, k + 1, 3] = -1, 1
-        add(turn / (radians(options.yaw_rate_deg_s) * seconds), np.zeros(1))
-    for k in range(1, count - 1):
-        before, after = times_s[k] - times_s[k - 1], times_s[k + 1] - times_s[k]
-        second = 2 * np.array([1 / before, -1 / before - 1 / after, 1 / after]) / (before + after)
-        bend = np.zeros((4, count, _PARAMETERS))
-        for at, weight in zip((k - 1, k, k + 1), second, strict=True):
-            bend[:3, at, :3] = weight * (
-                level / options.acceleration_m_s2 + np.outer(up, up) / options.climb_m_s2
-            )
-            bend[3, at, 3] = weight / radians(options.yaw_acceleration_deg_s2)
-        add(bend, np.zeros(4))
-    return rows, wanted
+) -> _Prior:
+    """What is known without flow: about the places, and that motion is smooth."""
+    count = len(cameras)
+    arm = middles_m - np.stack([camera.world_from_camera[:3, 3] for camera in cameras])
+    off = options.place * np.linalg.norm(arm, axis=1) + _PLACE_M
+    place, factor = np.zeros((count, 3, count, _STATE)), np.zeros((count, count, _STATE))
+    for k in range(count):
+        place[k, :, k, :3] = np.eye(3) / off[k]
+        place[k, :, k, 4] = -arm[k] / off[k]
+        factor[k, k, 4] = 1 / options.factor
+    gaps_s = np.diff(times_s)
+    turn = np.zeros((count - 1, count, _STATE))
+    for k, gap_s in enumerate(gaps_s):
+        turn[k, k : k + 2, 3] = np.array([-1, 1]) / gap_s / radians(options.yaw_rate_deg_s)
+    across = np.outer(up, up)
+    hard = (np.eye(3) - across) / options.acceleration_m_s2 + across / options.climb_m_s2
+    bend, twist = (
+        np.zeros((max(count - 2, 0), 3, count, _STATE)),
+        np.zeros((max(count - 2, 0), count, _STATE)),
+    )
+    for k, (before_s, after_s) in enumerate(pairwise(gaps_s)):
+        second = np.array([1 / before_s, -1 / before_s - 1 / after_s, 1 / after_s]) * 2 / (before_s + after_s)
+        bend[k, :, k : k + 3, :3] = second[:, None] * hard[:, None]
+        twist[k, k : k + 3, 3] = second / radians(options.yaw_acceleration_deg_s2)
+    parts = [each.reshape(-1, count * _STATE) for each in (place, factor, turn, bend, twist)]
+    rows = np.concatenate(parts)
+    wanted = np.zeros(len(rows))
+    wanted[: 3 * count] = (middles_m / off[:, None]).ravel()
+    return _Prior(rows, wanted)
 
 
-def _prior_terms(
-    state: Float[np.ndarray, "k 5"],
-    rows: list[tuple[int, Float[np.ndarray, "r n"]]],
-    wanted: list[Float[np.ndarray, " r"]],
-) -> tuple[np.ndarray, np.ndarray]:
-    flat = state.ravel()
-    normal, gradient = np.zeros((flat.size, flat.size)), np.zeros(flat.size)
-    for (robust, row), value in zip(rows, wanted, strict=True):
-        off = row @ flat - value
-        weight = 1 / (1 + float(off @ off) / 9) ** 2 if robust else 1.0
-        normal += weight * row.T @ row
-        gradient += weight * row.T @ off
-    normal[np.diag_indices_from(normal)] += 1e-6
-    return normal, gradient
+def _trust(off: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Weights of squares that lose what is far off (Geman and McClure 1985)."""
+    return 1 / (1 + off**2) ** 2
 
 
 def _about(
     axis: Float[np.ndarray, "3"], vectors: Float[np.ndarray, "n 3"], angle_rad: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, "n 3"]:
-    """Rodrigues' formula."""
+    """Vectors turned about an axis (Rodrigues' formula)."""
     cosine, sine = np.cos(angle_rad)[:, None], np.sin(angle_rad)[:, None]
     along = (vectors @ axis)[:, None] * axis
     return along + (vectors - along) * cosine + np.cross(axis, vectors) * sine

@@ -63,7 +63,7 @@ class Recorded:
         moving = np.zeros(len(depth_m), dtype=bool)
         if self.boxes is not None and self.pinhole is not None:
             camera = self.pinhole.at(self.world_from_camera[frame])
-            points = _lifted(camera, place_px, depth_m)
+            points = camera.lift(np.column_stack([place_px, depth_m]))
             for box in self.boxes[frame]:
                 moving |= _inside(points, box)
         return Points(place_px, depth_m, moving)
@@ -117,16 +117,6 @@ def _inside(points: Float[np.ndarray, "n 3"], box: Cuboid) -> Bool[np.ndarray, "
     local = (points - np.asarray(box.position)) @ world_from_box
     within = np.abs(local) <= np.asarray(box.size_wlh) / 2
     return within[:, 0] & within[:, 1] & within[:, 2]
-
-
-def _lifted(
-    camera: Camera, place_px: Float[np.ndarray, "n 2"], depth_m: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, "n 3"]:
-    """Points in the world from their places in the picture."""
-    x = (place_px[:, 0] - camera.cx_px) / camera.fx_px
-    y = (place_px[:, 1] - camera.cy_px) / camera.fy_px
-    local = np.column_stack([x, y, np.ones_like(x)]) * depth_m[:, None]
-    return local @ camera.world_from_camera[:3, :3].T + camera.world_from_camera[:3, 3]
 
 
 def _table(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

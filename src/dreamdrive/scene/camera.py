@@ -117,6 +117,13 @@ class Camera:
         row = local[:, 1] / z * self.fy_px + self.cy_px
         return np.column_stack([column, row, local[:, 2]])
 
+    def lift(self, pixels: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Points in the world (N, 3) of what ``project`` gives: columns, rows and depths along z."""
+        x = (pixels[:, 0] - self.cx_px) / self.fx_px
+        y = (pixels[:, 1] - self.cy_px) / self.fy_px
+        local = np.column_stack([x, y, np.ones_like(x)]) * pixels[:, 2:]
+        return local @ self.world_from_camera[:3, :3].T + self.world_from_camera[:3, 3]
+
     def shows(self, projected: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         """Which of the points that ``project`` gives lie in the picture and not before the near plane."""
         column, row, z = projected.T

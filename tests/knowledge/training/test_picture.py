@@ -9,7 +9,15 @@ from tests.knowledge.training.folders import write_folder
 
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge.training.mixture import read_entries
-from dreamdrive.knowledge.training.picture import Picture, centred, continued, cut, mirrored, read_entry, turned
+from dreamdrive.knowledge.training.picture import (
+    Picture,
+    centred,
+    continued,
+    cut,
+    mirrored,
+    read_entry,
+    turned,
+)
 from dreamdrive.knowledge.training.records import UNKNOWN
 
 WIDTH, HEIGHT = 320, 200

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int
 
+from dreamdrive.data.picture_file import read_picture
+from dreamdrive.errors import InputError
 from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -98,7 +100,7 @@ def _read(path: Path) -> dict[str, str]:
 
 
 def _lidar_record(view: _View, lidar: Path, label: Int[np.ndarray, " 256"], name: str, out: Path) -> Record:
-    picture = cv2.imread(str(view.picture))
+    picture = read_picture(view.picture)
     scale = _LONG_SIDE_PX / picture.shape[1]
     size = _LONG_SIDE_PX, round(picture.shape[0] * scale)
     labels = np.zeros((size[1], size[0], 3), np.uint8)
@@ -144,7 +146,12 @@ def clip_records(clip: Clip, geometry: Geometry, source: str, group: str, out: P
     """Frames of a clip of one camera, with the depth that its geometry is sure of.
 
     What moves, and what stereo is not sure of, stays unknown; nothing is said of classes.
+
+    Raises:
+        InputError: The geometry is a fallback.
     """
+    if geometry.fallback is not None:
+        raise InputError(f"{group}: {geometry.fallback}; expected a clip whose depth was measured")
     out.mkdir(parents=True, exist_ok=True)
     records: list[Record] = []
     for index in np.flatnonzero(~clip.held_out).tolist():

@@ -1,0 +1,96 @@
+"""The path of a moving thing: where it is in each frame that saw it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from dreamdrive.decompose.flow import grey, guided
+from dreamdrive.decompose.placing import Carried, Placement, PlacingOptions, placed
+from dreamdrive.scene.camera import NEAR_M
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+_ROUNDS = 2  # flow starts from the path that the flow before has given
+_LEAST_POINTS = 12  # that flow carries from frame to frame
+_UP = np.array([0.0, -1.0, 0.0])  # where no road tells it
+
+
+@dataclass(frozen=True)
+class Path:
+    """Places of a rigid thing in the frames that saw it, in order; ``up`` is the axis of yaw."""
+
+    frames: Int[np.ndarray, " k"]
+    placement: Placement
+    up: Float[np.ndarray, "3"]
+
+    @property
+    def pivot_m(self) -> Float[np.ndarray, "3"]:
+        """What it turns about, in its canonical place: where it is in the middle one of the frames."""
+        return self.placement.place_m[len(self.frames) // 2]
+
+    def world_from_canonical(self, at: int) -> Float[np.ndarray, "4 4"]:
+        """From the canonical place to that in one of the frames."""
+        moved = np.eye(4)
+        moved[:3, :3] = Rotation.from_rotvec(self.placement.yaw_rad[at] * self.up).as_matrix()
+        moved[:3, 3] = self.placement.place_m[at] - moved[:3, :3] @ self.pivot_m
+        return moved
+
+
+def find_path(
+    clip: Clip,
+    geometry: Geometry,
+    frames: Int[np.ndarray, " k"],
+    shown: list[Float[np.ndarray, "_ 3"]],
+    options: PlacingOptions,
+    reach_px: float,
+) -> Path:
+    """The path of a thing, of which frames show places (column, row, depth along z).
+
+    The depth alone gives a first path. From there flow is looked for where the path leads, for between two
+    frames oncoming traffic moves farther than flow finds by itself. Places at most ``reach_px`` apart are
+    neighbours.
+    """
+    cameras, times_s = [geometry.cameras[frame] for frame in frames], clip.times_s[frames]
+    middles_m = np.stack(
+        [np.median(camera.lift(each), axis=0) for camera, each in zip(cameras, shown, strict=True)]
+    )
+    up = _UP if geometry.ground is None else geometry.ground.normal_world
+    path = Path(frames, placed(cameras, times_s, middles_m, (), up, options), up)
+    for _ in range(_ROUNDS):
+        steps = range(len(frames) - 1)
+        found = [_carried(k, clip, geometry, path, shown, options, reach_px) for k in steps]
+        known = [each for each in found if each is not None]
+        path = Path(frames, placed(cameras, times_s, middles_m, known, up, options), up)
+    return path
+
+
+def _carried(
+    k: int,
+    clip: Clip,
+    geometry: Geometry,
+    path: Path,
+    shown: list[Float[np.ndarray, "_ 3"]],
+    options: PlacingOptions,
+    reach_px: float,
+) -> Carried | None:
+    """What flow carries from a frame onto the same thing in the next one."""
+    frame, other = path.frames[k : k + 2].tolist()
+    chosen = shown[k][:: max(1, len(shown[k]) // options.samples)]
+    if len(chosen) < _LEAST_POINTS:
+        return None
+    step = path.world_from_canonical(k + 1) @ np.linalg.inv(path.world_from_canonical(k))
+    points = geometry.cameras[frame].lift(chosen * [1, 1, path.placement.factor[k]])
+    expected = geometry.cameras[other].project(points @ step[:3, :3].T + step[:3, 3])
+    if (expected[:, 2] <= NEAR_M).any():
+        return None
+    one, two = (grey(clip.frames[each]) for each in (frame, other))
+    moved, kept = guided(one, two, chosen[:, :2], expected[:, :2])
+    distance, nearest = KDTree(shown[k + 1][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
+    kept &= np.isfinite(distance)
+    if kept.sum() < _LEAST_POINTS:
+        return None
+    depth_m = shown[k + 1][np.asarray(nearest)[kept], 2]
+    return Carried(k, k + 1, chosen[kept, :2], chosen[kept, 2], moved[kept], depth_m)

@@ -1,0 +1,115 @@
+"""A rigid cloud of points that drives and turns, seen by a camera that drives too."""
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+
+from dreamdrive.decompose.placing import Carried, PlacingOptions, placed
+from dreamdrive.scene.camera import Camera
+
+UP = np.array([0.0, -1.0, 0.0])
+FRAMES = 9
+
+
+@dataclass(frozen=True)
+class Street:
+    """Cameras, times, places, yaws and surfaces of a thing in the world."""
+
+    cameras: list[Camera]
+    times_s: np.ndarray
+    place_m: np.ndarray
+    yaw_rad: np.ndarray
+    surface_m: list[np.ndarray]
+
+    def carried(self, factor: np.ndarray, lost: float = 0.0, seed: int = 0) -> list[Carried]:
+        """What flow finds, with wrong factors of depth; of a share it is lost."""
+        rng = np.random.default_rng(seed)
+        found: list[Carried] = []
+        for k in range(len(self.cameras) - 1):
+            one, two = (self.cameras[k + i].project(self.surface_m[k + i]) for i in (0, 1))
+            target = two[:, :2] + rng.normal(0, 0.3, (len(two), 2))
+            wrong = rng.random(len(two)) < lost
+            target[wrong] = one[wrong, :2]
+            first_m, second_m = one[:, 2] * factor[k], two[:, 2] * factor[k + 1]
+            found.append(Carried(k, k + 1, one[:, :2], first_m, target, second_m))
+        return found
+
+    def middles_m(self, factor: np.ndarray) -> np.ndarray:
+        """The middles of what the frames see."""
+        seen = [
+            camera.lift(camera.project(points) * [1, 1, each])
+            for camera, points, each in zip(self.cameras, self.surface_m, factor, strict=True)
+        ]
+        return np.stack([np.median(points, axis=0) for points in seen])
+
+
+def turn(yaw_rad: float) -> np.ndarray:
+    """About the axis that points up, which is -y."""
+    c, s = cos(yaw_rad), sin(yaw_rad)
+    return np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+
+
+def street(speed_m_s: float, yaw_rate: float = 0.0, interval_s: float = 0.1) -> Street:
+    times = interval_s * np.arange(FRAMES)
+    rng = np.random.default_rng(1)
+    body = rng.uniform([-0.9, -1.2, -2], [0.9, 0.2, 2], (150, 3))
+    place = np.stack(
+        [2.5 + 0 * times, 0.8 + 0 * times, (24 if speed_m_s < 0 else 14) + speed_m_s * times], axis=1
+    )
+    yaw = yaw_rate * times
+    cameras: list[Camera] = []
+    for t in times:
+        pose = np.eye(4)
+        pose[2, 3] = 5 * t
+        cameras.append(Camera(250, 250, 160, 96, 320, 192, pose))
+    surfaces = [body @ turn(a).T + p for a, p in zip(yaw, place, strict=True)]
+    return Street(cameras, times, place, yaw, surfaces)
+
+
+def moved(place_m: np.ndarray, at: int = FRAMES // 2) -> np.ndarray:
+    return place_m - place_m[at]
+
+
+@pytest.mark.parametrize("speed_m_s", [-12.0, 0.5, 6.0])
+@pytest.mark.parametrize("yaw_rate", [0.0, 0.4])
+def test_place_and_yaw_are_found_though_depth_is_off(speed_m_s: float, yaw_rate: float) -> None:
+    true = street(speed_m_s, yaw_rate)
+    factor = np.exp(np.random.default_rng(2).normal(0, 0.06, FRAMES))
+    found = placed(
+        true.cameras, true.times_s, true.middles_m(factor), true.carried(factor), UP, PlacingOptions()
+    )
+    scale = 1 / np.mean(found.factor * factor)  # no frame tells the common factor
+    assert scale == pytest.approx(1, abs=0.06)
+    assert np.abs(found.factor * factor * scale - 1).max() < 0.02
+    assert np.abs(moved(found.place_m) - moved(true.place_m)).max() < 0.25
+    assert np.abs(moved(found.yaw_rad) - moved(true.yaw_rad)).max() < radians(2)
+
+
+def test_flow_that_is_lost_does_not_count() -> None:
+    true, right = street(-12.0), np.ones(FRAMES)
+    flow = true.carried(right, lost=0.4)
+    found = placed(true.cameras, true.times_s, true.middles_m(right), flow, UP, PlacingOptions())
+    assert np.abs(moved(found.place_m) - moved(true.place_m)).max() < 0.25
+
+
+def test_without_flow_motion_is_smooth() -> None:
+    true = street(6.0)
+    middles = true.place_m + np.random.default_rng(3).normal(0, 0.3, (FRAMES, 3))
+    middles[3] += [0, 0, 9.0]  # one frame has it all wrong
+    found = placed(true.cameras, true.times_s, middles, (), UP, PlacingOptions())
+    rough = np.abs(np.diff(middles, n=2, axis=0)).max()
+    assert np.abs(np.diff(found.place_m, n=2, axis=0)).max() < 0.02 * rough
+    assert np.abs(found.place_m - true.place_m).max() < 0.6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_or_two_frames_are_enough(count: int) -> None:
+    true = street(3.0)
+    cameras, times = true.cameras[:count], true.times_s[:count]
+    flow = true.carried(np.ones(FRAMES))[: count - 1]
+    found = placed(cameras, times, true.middles_m(np.ones(FRAMES))[:count], flow, UP, PlacingOptions())
+    assert found.place_m.shape == (count, 3)
+    assert np.allclose(np.diff(found.place_m, axis=0), np.diff(true.place_m[:count], axis=0), atol=0.1)
+    assert found.yaw_rad[count // 2] == 0
