@@ -1,0 +1,1 @@
+"""What the street network brings: drawn streets and recordings."""
