@@ -4,4 +4,5 @@ from dreamdrive.decompose.actors import ActorOptions, Cast, cast
 from dreamdrive.decompose.errors import error_maps
 from dreamdrive.decompose.flow import neighbour_flow
 from dreamdrive.decompose.group import Grouping, GroupOptions, group
+from dreamdrive.decompose.placing import PlacingOptions
 from dreamdrive.decompose.score import ScoreNetwork, ScoreOptions, score

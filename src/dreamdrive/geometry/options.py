@@ -77,7 +77,7 @@ class FusionOptions:
     sure_spreads: float = 4.0
     hinted_spreads: float = 1.5
     reach: float = 0.05
-    stereo_spread: float = 0.02
+    stereo_spread: float = 0.013
     least_spread: float = 0.05
     contact_spread: float = 0.06
     overhang_m: float = 0.4
