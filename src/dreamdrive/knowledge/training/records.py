@@ -84,4 +84,5 @@ def read_records(folder: Path) -> Iterator[Record]:
 
 def depth_steps(depth_m: np.ndarray) -> np.ndarray:
     """Depth in metres, 0 where unknown, as the 16-bit numbers of a depth picture."""
-    return np.where(depth_m > 0, np.clip(np.rint(depth_m * DEPTH_STEPS), 1, FAR), 0).astype(np.uint16)
+    steps = np.rint(np.asarray(depth_m, np.float64) * DEPTH_STEPS)  # half precision would overflow
+    return np.where(depth_m > 0, np.clip(steps, 1, FAR), 0).astype(np.uint16)
