@@ -1,16 +1,16 @@
 """Recorded pictures as records: with lidar and its classes, or with depth that stereo is sure of."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import UInt8
 
 from dreamdrive.data.picture_file import read_picture
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.street_class import StreetClass
@@ -45,18 +45,6 @@ _LABELS = {
 """Classes of PandaSet's points; those of the others are not used."""
 
 
-@dataclass(frozen=True)
-class _View:
-    """A picture and how it was taken: pinhole counted by integer index, ``world_from_camera`` with z up."""
-
-    picture: Path
-    focal_px: float
-    middle_px: tuple[float, float]
-    width_px: int
-    world_from_camera: Float[np.ndarray, "4 4"]
-    height_m: float
-
-
 def pandaset_records(recording: Path, front: Path, out: Path, camera_height_m: float) -> list[Record]:
     """Every picture of PandaSet that has lidar: depth and classes of its points.
 
@@ -67,43 +55,54 @@ def pandaset_records(recording: Path, front: Path, out: Path, camera_height_m: f
         camera_height_m: Height of the front camera above the road.
     """
     cameras = json.loads((recording / "cameras.json").read_text())["cameras"]
-    names = {name: int(number) for number, name in _read(recording / "semseg_classes.json").items()}
+    names = json.loads((recording / "semseg_classes.json").read_text())
+    number = {name: int(key) for key, name in names.items()}
     label = np.full(256, UNKNOWN, np.uint8)
     for kind, points in _LABELS.items():
-        label[[names[name] for name in points]] = kind
+        label[[number[name] for name in points]] = kind
     level_m = np.array(cameras["front_camera"]["camera_to_world"])[:, 2, 3]
     records: list[Record] = []
     out.mkdir(parents=True, exist_ok=True)
-    for name, camera in cameras.items():
+    for name, k in cameras.items():
         ahead = name == "front_camera"
         lidar = front / "lidar_depth_front" if ahead else recording / "lidar_labels" / name
         folder = front / name if ahead else recording / name
-        poses = np.array(camera["camera_to_world"])
+        # The file counts pixels by integer index.
+        pinhole = Camera(k["fx"], k["fy"], k["cx"] + 0.5, k["cy"] + 0.5, k["width"], k["height"])
+        pinhole = pinhole.resized(_LONG_SIDE_PX, round(pinhole.height_px * _LONG_SIDE_PX / pinhole.width_px))
         for path in sorted(lidar.glob("*.npz")):
             index = int(path.stem)
-            rise_m = float(poses[index, 2, 3] - level_m[index])
-            middle = camera["cx"], camera["cy"]
-            view = _View(
-                folder / f"{path.stem}.jpg",
-                camera["fx"],
-                middle,
-                camera["width"],
-                poses[index],
-                camera_height_m + rise_m,
+            camera = pinhole.at(np.array(k["camera_to_world"][index]))
+            stem, size = f"{name}-{path.stem}", (camera.width_px, camera.height_px)
+            _write_lidar(read_picture(folder / f"{path.stem}.jpg"), path, label, size, out / stem)
+            horizon_px, roll_rad = level_line(camera)
+            records.append(
+                Record(
+                    image=f"{stem}.jpg",
+                    source="pandaset",
+                    group=recording.name,
+                    labels=f"{stem}-labels.png",
+                    depth=f"{stem}-depth.png",
+                    focal_px=camera.fx_px,
+                    horizon_px=horizon_px,
+                    roll_rad=roll_rad,
+                    camera_height_m=camera_height_m + float(camera.world_from_camera[2, 3] - level_m[index]),
+                    distorted=False,
+                )
             )
-            records.append(_lidar_record(view, path, label, f"{name}-{path.stem}", out))
     return records
 
 
-def _read(path: Path) -> dict[str, str]:
-    return json.loads(path.read_text())
-
-
-def _lidar_record(view: _View, lidar: Path, label: Int[np.ndarray, " 256"], name: str, out: Path) -> Record:
-    picture = read_picture(view.picture)
-    scale = _LONG_SIDE_PX / picture.shape[1]
-    size = _LONG_SIDE_PX, round(picture.shape[0] * scale)
-    labels = np.zeros((size[1], size[0], 3), np.uint8)
+def _write_lidar(
+    picture: UInt8[np.ndarray, "_ _ 3"],
+    lidar: Path,
+    label: UInt8[np.ndarray, " 256"],
+    size: tuple[int, int],
+    out: Path,
+) -> None:
+    """Write a picture at a width and height, and the nearest of the points that lie in each pixel."""
+    scale = size[0] / picture.shape[1]
+    labels = np.zeros((*size[::-1], 3), np.uint8)
     labels[..., 2], labels[..., 1] = UNKNOWN, UNKNOWN  # OpenCV writes blue first
     depth = np.zeros(size[::-1], np.uint16)
     with np.load(lidar) as points:
@@ -113,33 +112,20 @@ def _lidar_record(view: _View, lidar: Path, label: Int[np.ndarray, " 256"], name
             for k, side in zip("uv", size, strict=True)
         )
         depth[row, column] = depth_steps(points["depth"][order])
-        kind = label[points["sem"][order].astype(int)]
+        kind = label[points["sem"][order]]
         labels[row, column, 2] = kind
         labels[row, column, 1] = np.where(kind <= StreetClass.POLE, 0, UNKNOWN)
-    cv2.imwrite(str(out / f"{name}.jpg"), cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
-    cv2.imwrite(str(out / f"{name}-labels.png"), labels)
-    cv2.imwrite(str(out / f"{name}-depth.png"), depth)
-    by_width = _LONG_SIDE_PX / view.width_px
-    horizon, roll = level_line(view.world_from_camera, view.focal_px * by_width)
-    moved = (view.middle_px[1] + 0.5) * by_width - size[1] / 2
-    return Record(
-        image=f"{name}.jpg",
-        source="pandaset",
-        group="pandaset_002",
-        labels=f"{name}-labels.png",
-        depth=f"{name}-depth.png",
-        focal_px=view.focal_px * by_width,
-        horizon_px=horizon + moved,
-        roll_rad=roll,
-        camera_height_m=view.height_m,
-        distorted=False,
-    )
+    cv2.imwrite(f"{out}.jpg", cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    cv2.imwrite(f"{out}-labels.png", labels)
+    cv2.imwrite(f"{out}-depth.png", depth)
 
 
-def level_line(world_from_camera: Float[np.ndarray, "4 4"], focal_px: float) -> tuple[float, float]:
-    """Row of the horizon below the principal point in the middle column, and roll; the world's z is up."""
-    up = world_from_camera[2, :3]  # in the camera
-    return float(-focal_px * up[2] / up[1]), float(np.arctan2(-up[0], -up[1]))
+def level_line(camera: Camera) -> tuple[float, float]:
+    """``horizon_px`` and ``roll_rad`` of ``Record``; the world's z is up."""
+    up = camera.world_from_camera[2, :3]  # in the camera
+    aside = (camera.width_px / 2 - camera.cx_px) / camera.fx_px
+    row = camera.cy_px - camera.fy_px * (aside * up[0] + up[2]) / up[1]
+    return float(row - camera.height_px / 2), float(np.arctan2(-up[0], -up[1]))
 
 
 def clip_records(clip: Clip, geometry: Geometry, source: str, group: str, out: Path) -> list[Record]:
