@@ -35,7 +35,7 @@ def test_a_file_of_weights_sees(weights: Path) -> None:
 
 def test_missing_weights_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shipped, "_FILE", tmp_path / "street.safetensors")
-    with pytest.raises(InputError, match="--knowledge street: this installation has no weights"):
+    with pytest.raises(InputError, match="this installation has no weights; give a file of weights"):
         load_knowledge()
     with pytest.raises(InputError, match="there is no such file; expected street, or a file of weights"):
         load_knowledge(tmp_path / "other.safetensors")

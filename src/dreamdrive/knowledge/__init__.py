@@ -6,4 +6,3 @@ from dreamdrive.knowledge.network import StreetNetwork
 from dreamdrive.knowledge.of_clip import look_at, with_looks
 from dreamdrive.knowledge.prediction import Prediction
 from dreamdrive.knowledge.shipped import NO_KNOWLEDGE, SHIPPED, load_knowledge, weights_of
-from dreamdrive.knowledge.weights import load_network

@@ -30,6 +30,8 @@ def weights_of(given: str | Path = SHIPPED) -> Path:
     """
     path = _FILE if given == SHIPPED else Path(given)
     if not path.is_file():
-        missing = "this installation has no weights" if given == SHIPPED else "there is no such file"
-        raise InputError(f"--knowledge {given}: {missing}; expected {SHIPPED}, or a file of {EXPECTED}")
+        wrong = "there is no such file; expected street, or"
+        if given == SHIPPED:
+            wrong = "this installation has no weights; give"
+        raise InputError(f"--knowledge {given}: {wrong} a file of {EXPECTED}")
     return path

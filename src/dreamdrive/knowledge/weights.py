@@ -12,7 +12,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
 from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
 from dreamdrive.knowledge.network import StreetNetwork
-from dreamdrive.models import fill_network, find_weights, read_state
+from dreamdrive.models import fill_network, read_state
 
 EXPECTED = "weights of the street network, as dreamdrive train street writes them"
 _KIND = "dreamdrive street network"
@@ -51,11 +51,6 @@ def read_network(path: Path) -> tuple[StreetNetwork, Training]:
     """A network and what it comes from, for training or to be folded."""
     training = _training(path)
     return fill_network(StreetNetwork, read_state(path, EXPECTED), str(path), EXPECTED), training
-
-
-def load_network(given: str | Path) -> StreetNetwork:
-    """The network in a file, or of a name in the hub's cache, for inference: its norms are folded."""
-    return read_network(find_weights(given))[0].folded()
 
 
 def _training(path: Path) -> Training:
