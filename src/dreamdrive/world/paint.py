@@ -1,5 +1,7 @@
 """Painted surfaces of the procedural street: facades, vehicles, clothes, leaves."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from jaxtyping import UInt8
@@ -68,10 +70,10 @@ def _bricks(rng: np.random.Generator, image: np.ndarray, texel_m: float) -> None
     image[::course] += 14
 
 
-def _write(
-    image: np.ndarray, text: str, origin: tuple[int, int], scale: float, ink: list[float], thick: int
+def write(
+    image: np.ndarray, text: str, origin: tuple[int, int], scale: float, ink: Sequence[float], thick: int
 ) -> None:
-    """Letters on a float image; OpenCV writes on bytes only."""
+    """Letters on colours in 0..255, in place; OpenCV writes on bytes only. The origin is bottom left."""
     mask = np.zeros(image.shape[:2], dtype=np.uint8)
     cv2.putText(mask, text, origin, cv2.FONT_HERSHEY_DUPLEX, scale, (255,), thick, cv2.LINE_AA)
     image += (mask[..., None] / np.float32(255)) * (np.array(ink, np.float32) - image)
@@ -104,7 +106,7 @@ def _shop(rng: np.random.Generator, image: np.ndarray, height_px: float) -> None
     letters = "".join(rng.choice(list("ABCDEFGHIKLMNOPRSTUVXYZ"), max(3, width // 45)))
     ink = 250.0 if sum(sign) < 420 else 30.0
     scale = board / 30
-    _write(image, letters, (12, top + board - 5), scale, [ink, ink, ink], 2)
+    write(image, letters, (12, top + board - 5), scale, [ink, ink, ink], 2)
     left = 8
     while left < width - 20:
         span = int(rng.uniform(24, 75))
@@ -148,7 +150,7 @@ def _print(rng: np.random.Generator, image: np.ndarray) -> None:
         cv2.fillPoly(image, [band], inks[0].tolist())
     letters = "".join(rng.choice(list("ABCDEFGHIKLMNOPRSTUVXYZ"), int(rng.integers(4, 8))))
     at = (int(0.1 * width), int(0.8 * height))
-    _write(image, letters, at, height / 45, inks[1].tolist(), max(2, height // 30))
+    write(image, letters, at, height / 45, inks[1].tolist(), max(2, height // 30))
     for _ in range(3):
         centre = rng.uniform((0.5 * width, 0.1 * height), (0.95 * width, 0.8 * height)).astype(int)
         radius = int(rng.uniform(0.05, 0.2) * height)
@@ -170,7 +172,7 @@ def end(rng: np.random.Generator, width_m: float, height_m: float, paint: Colour
     patch(0.28, 0.72, 0.25, 0.36, (30, 30, 34))
     patch(0.36, 0.64, 0.5, 0.66, (238, 238, 230))
     plate = "".join(rng.choice(list("ABCDEFHKLMNPRSTUVXYZ0123456789"), 6))
-    _write(image, plate, (int(0.38 * width), int(0.63 * height)), 0.28, [20, 20, 30], 1)
+    write(image, plate, (int(0.38 * width), int(0.63 * height)), 0.28, [20, 20, 30], 1)
     patch(0.0, 1.0, 0.8, 1.0, (32, 32, 34))
     return finished(image)
 
@@ -234,7 +236,7 @@ def sign(rng: np.random.Generator) -> Image:
     ink = _SIGNS[int(rng.integers(len(_SIGNS)))]
     cv2.rectangle(image, (2, 2), (61, 61), tuple(float(c) for c in ink), 7)
     text = "".join(rng.choice(list("ABCEHKPRSTX0123456789"), 2))
-    _write(image, text, (13, 42), 0.9, [float(c) for c in ink], 2)
+    write(image, text, (13, 42), 0.9, [float(c) for c in ink], 2)
     return finished(image)
 
 

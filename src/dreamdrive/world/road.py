@@ -54,6 +54,13 @@ class Curve:
         right, left = self.at(stations, right_m)[:, :2], self.at(stations, left_m)[:, :2]
         return shapely.Polygon(np.concatenate([right, left[::-1]]))
 
+    def block(self, station_m: float, wide_m: float, near_m: float, far_m: float) -> shapely.Polygon:
+        """A rectangle beside it, its front along it."""
+        front = self.at(np.array([station_m, station_m + wide_m]), near_m)[:, :2]
+        along = (front[1] - front[0]) / np.linalg.norm(front[1] - front[0])
+        out = np.array([-along[1], along[0]]) * (far_m - near_m)
+        return shapely.Polygon([front[0], front[1], front[1] + out, front[0] + out])
+
     def line(self, left_m: float) -> shapely.LineString:
         """A line beside it."""
         stations = np.linspace(self.start_m, self.end_m, len(self.points))

@@ -112,7 +112,7 @@ def _houses(rng: np.random.Generator, net: RoadNet) -> list[Building]:
             while station < road.end_m - 20:
                 wide, deep = float(rng.uniform(9, 17)), float(rng.uniform(8, 13))
                 near = side * (road.half_m + SIDEWALK_M + setback)
-                outline = _block(road, station, wide, near, near + side * deep)
+                outline = road.block(station, wide, near, near + side * deep)
                 station += wide + (0.0 if rng.random() < dense else float(rng.uniform(4, 12)))
                 height, look = float(rng.uniform(6, 18)), int(rng.integers(looks))
                 if outline.intersects(open_ground) or any(outline.overlaps(other) for other in taken):
@@ -122,14 +122,6 @@ def _houses(rng: np.random.Generator, net: RoadNet) -> list[Building]:
                 look += 100 * net.roads[0].lanes
                 houses.append(Building(polygon=ring, height_m=round(height, 1), look=look))
     return houses
-
-
-def _block(road: Road, station_m: float, wide_m: float, near_m: float, far_m: float) -> shapely.Polygon:
-    """A rectangle beside the road, its front along the road."""
-    front = road.at(np.array([station_m, station_m + wide_m]), near_m)[:, :2]
-    along = (front[1] - front[0]) / np.linalg.norm(front[1] - front[0])
-    out = np.array([-along[1], along[0]]) * (far_m - near_m)
-    return shapely.Polygon([front[0], front[1], front[1] + out, front[0] + out])
 
 
 def _props(

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.world.edition2.tiles import between
-from dreamdrive.world.paint import Image, finished, noise
+from dreamdrive.world.paint import Image, finished, noise, write
 
 TEXEL_M = 0.05
 VARIANTS = 24
@@ -311,9 +311,7 @@ def _shops(paper: _Paper) -> None:
         paper.rect(x, top, x + wide, top + 15, board)
         text = "".join(rng.choice(list("ABCDEFGHIKLMNOPRSTUVXYZ"), max(3, int(wide // 14))))
         ink = [245.0] * 3 if board.mean() < 130 else [20.0] * 3
-        mask = np.zeros(paper.shape, np.uint8)
-        cv2.putText(mask, text, (int(x + 5), top + 12), cv2.FONT_HERSHEY_DUPLEX, 0.42, (255,), 1, cv2.LINE_AA)
-        paper.image += (mask[..., None] / np.float32(255)) * (np.array(ink, np.float32) - paper.image)
+        write(paper.image, text, (int(x + 5), top + 12), 0.42, ink, 1)
         if rng.random() < 0.7:
             paper.glow[top + 1 : top + 14, int(x + 1) : int(x + wide - 1)] = np.clip(board * 1.2 + 40, 0, 255)
             paper.glow[top + 18 : height - 8, int(x + 4) : int(x + wide - 4)] = rng.uniform(

@@ -25,22 +25,23 @@ def _steel(rng: np.random.Generator, paints: Paints) -> int:
     return paints.plain(("steel",), Semantic.POLE, _STEEL[int(rng.integers(len(_STEEL)))], 0.03)
 
 
-def _light(paints: Paints, colour: tuple[float, float, float], day: float = 1.0) -> int:
-    """A surface that shines at night."""
+def _light(
+    paints: Paints, kind: Semantic, colour: tuple[float, float, float], day: float, night: float = 1.0
+) -> int:
+    """A surface that shines at night; shares of its colour by day and by night."""
     image = np.full((8, 8, 3), colour, np.float32)
     return paints.get(
-        ("light", colour),
-        Semantic.POLE,
+        ("light", colour, night),
+        kind,
         lambda: paint.finished(day * image),
-        glow=lambda: paint.finished(image),
+        glow=lambda: paint.finished(night * image),
     )
 
 
 def lamp_head(prop: Prop) -> np.ndarray:
     """Where the light of a lamp is, in its own frame."""
     rng = np.random.default_rng([prop.look, 82])
-    sort = int(rng.integers(4))
-    arm = float(rng.uniform(0.8, 3.0))
+    sort, arm = int(rng.integers(4)), float(rng.uniform(0.8, 3.0))
     out = (arm, 0.0, 0.4 * arm, arm)[sort]
     return np.array([out, 0.0, prop.height_m + (0.12 if sort != 1 else 0.2)])
 
@@ -48,9 +49,9 @@ def lamp_head(prop: Prop) -> np.ndarray:
 def lamp(prop: Prop, paints: Paints) -> Mesh:
     """A street lamp: an arm, a lantern on top, two arms, or a bent tube."""
     rng = np.random.default_rng([prop.look, 82])
-    sort, arm = int(rng.integers(4)), 0.0
-    arm = float(rng.uniform(0.8, 3.0))
-    steel, glow, top = _steel(rng, paints), _light(paints, (255.0, 235.0, 195.0), 0.8), prop.height_m
+    sort, arm = int(rng.integers(4)), float(rng.uniform(0.8, 3.0))
+    steel, top = _steel(rng, paints), prop.height_m
+    glow = _light(paints, Semantic.POLE, (255.0, 235.0, 195.0), 0.8)
     post = cylinder((0, 0, 0), (0, 0, top), (rng.uniform(0.07, 0.14), 0.05), steel, None, 8)
     if sort == 1:
         lantern = frustum(
@@ -106,7 +107,7 @@ def traffic_light(prop: Prop, paints: Paints) -> Mesh:
     )
     on = int(rng.integers(3))
     lamps = [(255.0, 40.0, 30.0), (255.0, 180.0, 40.0), (40.0, 240.0, 150.0)]
-    discs = [_signal(paints, lamps[k], k == on) for k in range(3)]
+    discs = [_light(paints, Semantic.SIGN, lamps[k], *((1, 1) if k == on else (0.18, 0))) for k in range(3)]
     top = prop.height_m
     parts = [cylinder((0, 0, 0), (0, 0, top), (0.07, 0.06), steel, None, 8)]
     places = [(0.0, 0.0, min(top, 3.2) - 0.5)]
@@ -125,17 +126,6 @@ def traffic_light(prop: Prop, paints: Paints) -> Mesh:
             middle = z + 0.31 * (1 - k)
             parts.append(cylinder((x + 0.2, y, middle), (x + 0.24, y, middle), (0.11, 0.11), shell, disc, 10))
     return Mesh.joined(parts)
-
-
-def _signal(paints: Paints, colour: tuple[float, float, float], on: bool) -> int:
-    image = np.full((8, 8, 3), colour, np.float32)
-    shown = image if on else 0.18 * image
-    return paints.get(
-        ("signal", colour, on),
-        Semantic.SIGN,
-        lambda: paint.finished(shown),
-        glow=lambda: paint.finished(image if on else 0 * image),
-    )
 
 
 def bin_(prop: Prop, paints: Paints) -> Mesh:
@@ -255,22 +245,6 @@ def _plate(corners: int, start: float, radius: float, at: tuple[float, float], m
     return Mesh(triangles, places, np.full(corners, material))
 
 
-def _write(
-    image: np.ndarray,
-    text: str,
-    at: tuple[int, int],
-    font: int,
-    scale: float,
-    ink: tuple[float, ...],
-    thick: int,
-    kind: int,
-) -> None:
-    """Letters on an image of numbers; OpenCV writes on bytes only."""
-    mask = np.zeros(image.shape[:2], np.uint8)
-    cv2.putText(mask, text, at, font, scale, (255,), thick, kind)
-    image += (mask[..., None] / np.float32(255)) * (np.array(ink, np.float32) - image)
-
-
 def _face(rng: np.random.Generator, shape: str) -> paint.Image:
     """What is on a sign: a rim and a field with a symbol, or lines of letters."""
     colours = {
@@ -318,7 +292,7 @@ def _board(rng: np.random.Generator, ink: dict[str, np.ndarray]) -> paint.Image:
         text = "".join(
             rng.choice(list("ABCDEFGHIJKLMNOPRSTUVabcdeghiklmnorstu 0123456789"), int(rng.integers(4, 10)))
         )
-        _write(image, text, (8, 18 + 18 * row), cv2.FONT_HERSHEY_DUPLEX, 0.5, (letter,) * 3, 1, cv2.LINE_AA)
+        paint.write(image, text, (8, 18 + 18 * row), 0.5, (letter,) * 3, 1)
     return paint.finished(image)
 
 
@@ -333,16 +307,7 @@ def _symbol(rng: np.random.Generator, image: np.ndarray, shape: str, *, dark: bo
             else "STOP"
         )
         scale = 0.9 if len(text) < 3 else 0.55
-        _write(
-            image,
-            text,
-            (14 if len(text) < 3 else 11, 41),
-            cv2.FONT_HERSHEY_DUPLEX,
-            scale,
-            symbol,
-            2,
-            cv2.LINE_AA,
-        )
+        paint.write(image, text, (14 if len(text) < 3 else 11, 41), scale, symbol, 2)
     elif kind == 1:
         cv2.arrowedLine(
             image, (32, 46), (32 + int(rng.integers(-10, 11)), 18), symbol, 5, cv2.LINE_AA, 0, 0.5

@@ -70,7 +70,7 @@ class Sides:
                 while dense > 0 and station < way.end_m - kind.wide_m[0]:
                     wide, deep = float(rng.uniform(*kind.wide_m)), float(rng.uniform(8, 14))
                     near = side * (way.walk_m(side)[1] + setback * rng.uniform(0.8, 1.2))
-                    outline = _block(way, station, wide, near, near + side * deep)
+                    outline = way.block(station, wide, near, near + side * deep)
                     attached = rng.random() < dense
                     station += wide + (0.0 if attached else float(rng.uniform(2, 25)))
                     low, high = kind.height_m
@@ -244,11 +244,3 @@ class Sides:
         yaw = float(np.arctan2(np.sin(yaw_rad), np.cos(yaw_rad)))
         self.props.append(Prop(kind, at, round(float(height_m), 2), round(yaw, 3), look))
         return True
-
-
-def _block(way: Way, station_m: float, wide_m: float, near_m: float, far_m: float) -> shapely.Polygon:
-    """A rectangle beside the road, its front along the road."""
-    front = way.at(np.array([station_m, station_m + wide_m]), near_m)[:, :2]
-    along = (front[1] - front[0]) / np.linalg.norm(front[1] - front[0])
-    out = np.array([-along[1], along[0]]) * (far_m - near_m)
-    return shapely.Polygon([front[0], front[1], front[1] + out, front[0] + out])
