@@ -19,7 +19,7 @@ Size = Annotated[float, Meta(gt=0, le=1000)]
 Seconds = Annotated[float, Meta(ge=-1_000_000, le=1_000_000)]
 Angle = Annotated[float, Meta(ge=-1000, le=1000)]
 Share = Annotated[float, Meta(ge=0, le=1)]
-Look = Annotated[
+Appearance = Annotated[
     int, Meta(ge=0, le=1_000_000, description="Appearance: equal numbers of one kind look the same.")
 ]
 Point = Annotated[tuple[Metres, Metres], Meta(description="x and y in metres.")]
@@ -95,7 +95,7 @@ class Box(_Part, frozen=True):
     kind: BoxKind
     size_m: tuple[Size, Size, Size]
     track: Track
-    look: Look = 0
+    look: Appearance = 0
 
 
 class Building(_Part, frozen=True):
@@ -103,7 +103,7 @@ class Building(_Part, frozen=True):
 
     polygon: Ring
     height_m: Size
-    look: Look = 0
+    look: Appearance = 0
 
 
 class Prop(_Part, frozen=True):
@@ -113,7 +113,7 @@ class Prop(_Part, frozen=True):
     at_m: Point
     height_m: Size
     yaw_rad: Angle = 0.0
-    look: Look = 0
+    look: Appearance = 0
 
 
 class Barrier(_Part, frozen=True):
@@ -122,7 +122,7 @@ class Barrier(_Part, frozen=True):
     kind: BarrierKind
     points: Annotated[list[Point], Meta(min_length=2, max_length=10_000)]
     height_m: Size
-    look: Look = 0
+    look: Appearance = 0
 
 
 class Relief(_Part, frozen=True):
@@ -143,14 +143,14 @@ class Lens(_Part, frozen=True):
         pitch_rad: Positive looks down.
         roll_rad: Positive turns the camera clockwise, seen from behind it.
         distortion: k1 of the radial model x (1 + k1 r^2) on the image plane; negative bends like a barrel.
-        bonnet: Look of the own bonnet at the bottom of the picture; None shows none.
+        bonnet: Appearance of the own bonnet at the bottom of the picture; None shows none.
     """
 
     hfov_rad: Annotated[float, Meta(gt=0.2, lt=2.8)] = 1.117
     pitch_rad: Angle = 0.0
     roll_rad: Angle = 0.0
     distortion: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0
-    bonnet: Look | None = None
+    bonnet: Appearance | None = None
 
 
 class Light(_Part, frozen=True):
