@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import torch
 from tests.knowledge.answers import FOCAL, HORIZON, LEVEL, ROLL, reading
 
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import LookOptions, look
+from dreamdrive.knowledge.prediction import Prediction
 from dreamdrive.scene.street_class import StreetClass
 
 SIZE = 256, 144
@@ -40,6 +42,35 @@ def test_depth_classes_and_road_users_are_those_of_the_answers() -> None:
     assert np.allclose(seen.spread[0][~sky], np.expm1(1.148 * np.exp(-2)), rtol=2e-3)
     assert (seen.confidence > 0.9).mean() > 0.98
     assert seen.features is None
+
+
+def test_an_own_car_that_comes_in_from_no_border_is_what_is_next_likely() -> None:
+    frame = street(users=False)
+    frame[130:] = LEVEL * StreetClass.OWN_CAR, 30, 0
+    whole = look(frame[None], reading, options=LookOptions(width_px=256))
+    frame[48:96, 32:128] = LEVEL * StreetClass.OWN_CAR, 10, 1
+    frame[50:80, 180:200] = LEVEL * StreetClass.OWN_CAR, 12, 0
+
+    def mistaken(pictures: torch.Tensor) -> Prediction:
+        """The next likely of an own car is a vehicle on the left and a wall on the right."""
+        said = reading(pictures)
+        half = said.classes.shape[-1] // 2
+        said.classes[:, StreetClass.VEHICLE, :, :half] += 10
+        said.classes[:, StreetClass.STRUCTURE, :, half:] += 10
+        said.centre[0, 0, 18, 20] = 3
+        return said
+
+    seen = look(frame[None], mistaken, options=LookOptions(width_px=256))
+    assert np.array_equal(seen.own_car, whole.own_car)
+    assert seen.own_car[0, 131:].all()
+    car, wall = (slice(50, 94), slice(34, 126)), (slice(52, 78), slice(182, 198))
+    for place, kind, depth in ((car, StreetClass.VEHICLE, 10), (wall, StreetClass.STRUCTURE, 12)):
+        assert (seen.classes[0][place] == kind).all()
+        assert np.allclose(seen.depth[0][place], depth)
+        assert (seen.confidence[0][place] < 1e-3).all()
+    (user,) = seen.road_users[0]
+    assert user.kind == StreetClass.VEHICLE
+    assert (seen.instances[0][car] == 1).all()
 
 
 @pytest.mark.parametrize("size", [(256, 144), (512, 288), (1024, 576), (512, 768)])

@@ -7,6 +7,7 @@ from functools import partial
 from math import log
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, Int, Shaped, UInt8, UInt16
@@ -136,7 +137,7 @@ def _see(
 ) -> _Seen:
     """What the network says of one frame, on the frame's pixels."""
     said = network(fitting.taken(frame[None]))
-    chance, classes = torch.softmax(fitting.on_pixels(said.classes[0]), dim=0).max(dim=0)
+    chance, classes = _classes(torch.softmax(fitting.on_pixels(said.classes[0]), dim=0))
     peaks = torch.sigmoid(fitting.shown(said.centre[0]))
     # Between two road users a mean of their offsets would point to neither.
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
@@ -156,6 +157,25 @@ def _see(
         camera=said.camera[0].double().numpy(),
         features=kept,
     )
+
+
+def _classes(chances: Float[Tensor, "c h w"]) -> tuple[Float[Tensor, "h w"], Int[Tensor, "h w"]]:
+    """The class of each pixel and its probability.
+
+    The own car is fixed to the camera and comes in from the picture's border: what is taken for it and hangs
+    together with none of the border has the second most likely class.
+    """
+    chance, classes = chances.max(dim=0)
+    count, found = cv2.connectedComponents((classes == StreetClass.OWN_CAR).byte().numpy())
+    parts = np.asarray(found, np.int32)
+    inside = np.ones(count, bool)
+    inside[np.concatenate([[0], parts[0], parts[-1], parts[:, 0], parts[:, -1]])] = False
+    if inside.any():
+        island = torch.from_numpy(np.flatnonzero(inside[parts]))
+        others = chances.flatten(1)[:, island]
+        others[StreetClass.OWN_CAR] = 0
+        chance.view(-1)[island], classes.view(-1)[island] = others.max(dim=0)
+    return chance, classes
 
 
 def _depth(
