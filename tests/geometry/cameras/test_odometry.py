@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
-from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive
+from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive, levelled
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.geometry import Ground
 
@@ -58,3 +58,15 @@ def test_a_tilted_camera_measures_its_steps_on_the_road_below_its_horizon() -> N
     np.testing.assert_allclose(
         found.world_from_camera[:, :3, 3] @ tilt[:3, :3].T @ LEVEL.normal_world, 0, atol=0.05
     )
+
+
+def test_a_levelled_path_keeps_its_height_and_tilt_and_turns_as_it_did() -> None:
+    path = turning(8)
+    up = np.array([0.05, -1.0, 0.1]) / np.linalg.norm([0.05, -1.0, 0.1])
+    found = levelled(path, up)
+    np.testing.assert_allclose(found[:, :3, 3] @ up, 0, atol=1e-9)
+    np.testing.assert_allclose(found[:, :3, :3] @ up, np.tile(up, (8, 1)), atol=1e-9)
+    np.testing.assert_allclose(found[0], path[0], atol=1e-9)
+    np.testing.assert_allclose(found[-1, :3, 2], path[-1, :3, 2], atol=0.1)
+    again = levelled(found, up)
+    np.testing.assert_allclose(again, found, atol=1e-9)

@@ -6,6 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.evidence import track
 from dreamdrive.geometry.road import Pair, Road
@@ -63,6 +64,18 @@ def drive(
         move[:3, :3], move[:3, 3] = turns[step], directions[step] * lengths[step]
         poses[step + 1] = poses[step] @ move
     return Odometry(poses, lengths, measured)
+
+
+def levelled(
+    world_from_camera: Float[np.ndarray, "f 4 4"], up: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "f 4 4"]:
+    """Poses as tilted as the first, whose ``up`` is given, and at its height: their errors add up to none."""
+    found = world_from_camera.copy()
+    for pose in found:
+        upright, _ = Rotation.align_vectors(up, pose[:3, :3] @ up)
+        pose[:3, :3] = upright.as_matrix() @ pose[:3, :3]
+        pose[:3, 3] -= (pose[:3, 3] @ up) * up
+    return found
 
 
 def _relative(

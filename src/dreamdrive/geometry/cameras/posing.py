@@ -189,9 +189,8 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
         of_depth = Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
         metric = replace(metric, ground=ground, scale=of_depth)
-    posed = as_posed(
-        clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason, *metric.notes], {}
-    )
+    notes = [reason] if plane is not None else [reason, *metric.notes]
+    posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, notes, {})
     return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
 
@@ -203,6 +202,9 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
         path = odometry.Odometry(np.eye(4)[None], np.zeros(0), True)
     else:
         path = odometry.drive(evidence.grey, evidence.street, evidence.small, clip.times_s, metric.ground)
+    poses = path.world_from_camera
+    if clip.look is not None:
+        poses = odometry.levelled(poses, metric.ground.normal_world)
     reason = "structure from motion was refused: " + "; ".join(outcome.reasons)
     notes = [reason, "the path comes from frame-to-frame odometry and is rough", *metric.notes]
     if not path.measured:
@@ -212,7 +214,7 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
         metric = replace(metric, scale=Scale(words, scale.SPEED_SPREAD, basis="usual speed"))
     details = {**outcome.figures, "odometry_measured": path.measured}
     observed = clip.known.intrinsics
-    posed = as_posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
+    posed = as_posed(clip, evidence, poses, clip.rig[0], metric, observed, notes, details)
     return replace(posed, fallback=reason, fallback_kind=outcome.refusal)
 
 
