@@ -72,7 +72,7 @@ def levelled(
     """Poses as tilted as the first, whose ``up`` is given, and at its height: their errors add up to none."""
     found = world_from_camera.copy()
     for pose in found:
-        upright, _ = Rotation.align_vectors(up, pose[:3, :3] @ up)
+        upright = Rotation.align_vectors(up, pose[:3, :3] @ up)[0]
         pose[:3, :3] = upright.as_matrix() @ pose[:3, :3]
         pose[:3, 3] -= (pose[:3, 3] @ up) * up
     return found
