@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.street_class import StreetClass
 
@@ -38,6 +39,18 @@ def test_metres_need_the_height_of_the_camera() -> None:
     assert small_look(camera_height_m=1.5).depth_m.max() == 6
     with pytest.raises(ValueError, match="give the camera's height"):
         _ = small_look().depth_m
+
+
+def test_up_is_that_of_the_level_rays() -> None:
+    camera = Camera(400.0, 420.0, 250.0, 130.0, 480, 270)
+    up = CAMERA.up_in(camera)
+    columns = np.array([0.0, 100.0, 480.0])
+    pixels = np.stack([columns, CAMERA.horizon_rows(columns), np.ones(3)], axis=1)
+    np.testing.assert_allclose(pixels @ np.linalg.inv(camera.matrix).T @ up, 0, atol=1e-12)
+    assert np.linalg.norm(up) == pytest.approx(1)
+    assert up[1] < -0.99
+    level = replace(CAMERA, horizon_px=0.0, roll_rad=0.0)
+    np.testing.assert_array_equal(level.up_in(Camera(400.0, 400.0, 240.0, 135.0, 480, 270)), [0, -1, 0])
 
 
 def test_masks_are_those_of_the_classes() -> None:

@@ -61,9 +61,10 @@ def densify(
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
     as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
     which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
-    m, little trusted. What moves is found against the parallax of a moving camera or against the temporal
-    median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for each frame
-    of at most ``PASSES``.
+    m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
+    the place of the backdrop. What moves is found against the parallax of a moving camera or against the
+    temporal median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for
+    each frame of at most ``PASSES``.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None

@@ -6,6 +6,7 @@ from math import atan, cos, tan
 import numpy as np
 from jaxtyping import Bool, Float, UInt8, UInt16
 
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 
@@ -49,6 +50,14 @@ class CameraEstimate:
         """Rows, from the top of the picture, at which level rays cross columns, from its left."""
         middle = self.height_px / 2 + self.horizon_px
         return middle - (columns_px - self.width_px / 2) * tan(self.roll_rad)
+
+    def up_in(self, camera: Camera) -> Float[np.ndarray, "3"]:
+        """Up from a level road (3,), of length 1, in the frame of a pinhole of the picture's size."""
+        slope = tan(self.roll_rad)
+        middle = self.height_px / 2 + self.horizon_px + slope * self.width_px / 2
+        # The level plane through the camera is seen as the line of the horizon.
+        up = -camera.matrix.T @ [slope, 1.0, -middle]
+        return up / np.linalg.norm(up)
 
 
 @dataclass(frozen=True)

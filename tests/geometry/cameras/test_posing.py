@@ -13,10 +13,25 @@ from dreamdrive.geometry.cameras.paths import fill, rebase
 from dreamdrive.geometry.cameras.posing import Posed, pose_clip
 from dreamdrive.geometry.road.known_depth import in_metres
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.look import CameraEstimate, Look
 
 
 def stack(posed: Posed) -> np.ndarray:
     return np.stack([camera.world_from_camera for camera in posed.cameras])
+
+
+def tilted(clip: Clip, up_deg: float, roll_deg: float) -> Clip:
+    """The clip with a look by which its camera looks up and is rolled clockwise."""
+    horizon_px = clip.rig[0].fy_px * np.tan(np.radians(up_deg)) / np.cos(np.radians(roll_deg))
+    focal_px = clip.rig[0].fx_px
+    camera = CameraEstimate(WIDTH, HEIGHT, focal_px, 0.1, horizon_px, 2.0, np.radians(roll_deg), 0.01, 0.0)
+    blank = np.zeros(clip.valid.shape, np.uint8)
+    shown = np.ones(clip.valid.shape, np.float32)
+    count = len(clip)
+    users = blank.astype(np.uint16)
+    return replace(
+        clip, looks=(Look(shown, shown, blank + 1, shown, users, ((),) * count, (camera,) * count, camera),)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -178,3 +193,34 @@ def test_the_kind_of_a_fallback_and_of_the_metre_are_told(clip: Clip) -> None:
     assert (black.fallback_kind, black.scale.basis) == ("blank", "usual height")
     assert pose_clip(make_clip(straight([0.5]))).fallback_kind == "few"
     assert pose_clip(make_clip(straight([]))).fallback_kind is not None
+
+
+@pytest.mark.parametrize("steps", [[], [0.0] * 7], ids=["single", "standing"])
+def test_without_motion_the_road_lies_below_the_horizon_that_is_seen(steps: list[float]) -> None:
+    clip = make_clip(straight(steps))
+    posed = pose_clip(tilted(clip, 3, -2), GeometryOptions(camera_height_m=1.2))
+    assert posed.fallback is not None
+    assert posed.ground is not None
+    level_from_camera = Rotation.from_euler("zx", [-2, 3], degrees=True)
+    np.testing.assert_allclose(
+        posed.ground.normal_world, level_from_camera.inv().apply([0, -1, 0]), atol=1e-9
+    )
+    assert posed.ground.offset_m == 1.2
+    assert "looks up by 3.0 degrees and leans to the left by 2.0" in " ".join(posed.detected)
+    assert any(sentence.startswith("depth is what the street network sees") for sentence in posed.detected)
+    assert posed.scale.source.startswith("level road below the horizon")
+    level = pose_clip(clip)
+    assert level.ground is not None
+    np.testing.assert_array_equal(level.ground.normal_world, [0, -1, 0])
+    assert level.scale.source == "level road assumed, camera height 1.50 m (assumed)"
+    assert not any("street network" in sentence for sentence in level.detected)
+
+
+def test_given_poses_that_stand_get_the_road_below_the_horizon_that_is_seen() -> None:
+    still = make_clip(straight([0.0] * 7))
+    known = Known(world_from_camera=np.tile(np.eye(4), (8, 1, 1)), intrinsics=True)
+    posed = pose_clip(tilted(replace(still, known=known), 3, 0))
+    assert posed.ground is not None
+    assert posed.ground.normal_world[2] == pytest.approx(np.sin(np.radians(3)))
+    assert posed.scale.source == "poses"
+    assert pose_clip(replace(still, known=known)).ground is None

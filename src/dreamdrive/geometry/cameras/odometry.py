@@ -6,10 +6,12 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.evidence import track
 from dreamdrive.geometry.road import Pair, Road
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Ground
 
 STILL_PX, MOVING_PX = 0.35, 1.0
 ESSENTIAL_PX = 0.8
@@ -39,18 +41,22 @@ def drive(
     usable: Bool[np.ndarray, "f h w"],
     camera: Camera,
     times_s: Float[np.ndarray, " f"],
-    height_m: float,
+    ground: Ground,
 ) -> Odometry:
     """Rotation and direction from the essential matrix of tracked corners, step length from the road.
 
-    Frames and pinhole are 320 px wide; the camera is ``height_m`` above a level road.
+    Frames and pinhole are 320 px wide; ``ground`` is the road under each camera, in its frame, along which it
+    moves where corners tell no direction.
     """
-    count = len(grey)
+    count, up = len(grey), ground.normal_world
+    ahead = np.array([0.0, 0.0, 1.0])
+    ahead = ahead - (ahead @ up) * up
+    ahead /= np.linalg.norm(ahead)
     turns, directions = np.tile(np.eye(3), (count - 1, 1, 1)), np.zeros((count - 1, 3))
     flow = np.zeros(count - 1)
     for step in range(count - 1):
-        turns[step], directions[step], flow[step] = _relative(grey, usable, camera, step)
-    scores, ladder = _road_scores(grey, usable, camera, times_s, height_m, turns, directions)
+        turns[step], directions[step], flow[step] = _relative(grey, usable, camera, step, ahead)
+    scores, ladder = _road_scores(grey, usable, camera, times_s, ground, turns, directions)
     lengths, measured = _lengths(scores, ladder, flow, np.diff(times_s))
     poses = np.tile(np.eye(4), (count, 1, 1))
     for step in range(count - 1):
@@ -60,11 +66,22 @@ def drive(
     return Odometry(poses, lengths, measured)
 
 
+def levelled(
+    world_from_camera: Float[np.ndarray, "f 4 4"], up: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "f 4 4"]:
+    """Poses as tilted as the first, whose ``up`` is given, and at its height: their errors add up to none."""
+    found = world_from_camera.copy()
+    for pose in found:
+        upright = Rotation.align_vectors(up, pose[:3, :3] @ up)[0]
+        pose[:3, :3] = upright.as_matrix() @ pose[:3, :3]
+        pose[:3, 3] -= (pose[:3, 3] @ up) * up
+    return found
+
+
 def _relative(
-    grey: np.ndarray, usable: np.ndarray, camera: Camera, step: int
+    grey: np.ndarray, usable: np.ndarray, camera: Camera, step: int, ahead: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Pose of the next camera in this one: rotation, unit direction; and the 70th percentile of the flow."""
-    ahead = np.array([0.0, 0.0, 1.0])
     here, there = track(grey[step], grey[step + 1], usable[step])
     if len(here) < 12:
         return np.eye(3), ahead, np.nan
@@ -80,7 +97,7 @@ def _relative(
         return np.eye(3), ahead, flow
     _, rotation, shift, _ = cv2.recoverPose(essential, pixels, moved, camera.matrix, mask=inliers)
     turn, direction = rotation.T, (-rotation.T @ shift)[:, 0]
-    if direction[2] < np.cos(np.radians(MAX_OFF_AXIS_DEG)):
+    if direction @ ahead < np.cos(np.radians(MAX_OFF_AXIS_DEG)):
         direction = ahead
     return turn, direction / np.linalg.norm(direction), flow
 
@@ -90,7 +107,7 @@ def _road_scores(
     usable: np.ndarray,
     camera: Camera,
     times_s: np.ndarray,
-    height_m: float,
+    ground: Ground,
     turns: np.ndarray,
     directions: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +115,6 @@ def _road_scores(
     interval = np.diff(times_s)
     ladder = np.concatenate([[0.0], np.geomspace(*SPEEDS_M_S, STEPS)])
     scores = np.zeros((len(interval), len(ladder)))
-    normal = np.array([0.0, -1.0, 0.0])
     for step, seconds in enumerate(interval):
         poses = np.tile(np.eye(4), (2, 1, 1))
         poses[1, :3, :3], poses[1, :3, 3] = turns[step], directions[step]
@@ -106,7 +122,7 @@ def _road_scores(
         road.telling(Pair(0, 1))
         for index, speed in enumerate(ladder):
             poses[1, :3, 3] = directions[step] * speed * seconds
-            value = road.agreement(Pair(0, 1), normal, height_m)
+            value = road.agreement(Pair(0, 1), ground.normal_world, ground.offset_m)
             scores[step, index] = value if np.isfinite(value) else 0.0
     return scores, ladder
 

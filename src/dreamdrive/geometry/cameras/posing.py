@@ -127,7 +127,7 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
     else:
         ground = clip.known.ground.seen_from(clip.known.world_from_camera[0])
         metric = Metric(1.0, ground, Scale("poses", 0.0), ())
-    return _with_known(clip, evidence, metric, ["the given poses are used", *metric.notes])
+    return _with_known(clip, evidence, metric, ["the given poses are used", *metric.notes], height_m)
 
 
 def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed: int) -> Posed:
@@ -145,7 +145,7 @@ def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed:
     focal_spread = scale.focal_spread_of(clip.known.intrinsics)
     metric = scale.from_ground(street, height_m, focal_spread, seed)
     notes = ["the given poses are used; their unit is not known and scaled to metres", *metric.notes]
-    posed = _with_known(clip, evidence, metric, notes)
+    posed = _with_known(clip, evidence, metric, notes, height_m)
     return replace(posed, metres_per_unit=metric.factor)
 
 
@@ -159,45 +159,54 @@ def _known_street(clip: Clip, evidence: Evidence) -> Street:
     return Street.of(clip, evidence, clip.rig[0], poses, points)
 
 
-def _with_known(clip: Clip, evidence: Evidence, metric: Metric, notes: list[str]) -> Posed:
+def _with_known(
+    clip: Clip, evidence: Evidence, metric: Metric, notes: list[str], height_m: float | None
+) -> Posed:
     assert clip.known.world_from_camera is not None
     poses, _ = rebase(clip.known.world_from_camera.astype(np.float64), np.zeros((0, 3)))
     poses[:, :3, 3] *= metric.factor
     details = {} if clip.known.metric else {"metres_per_unit": metric.factor}
     standing = evidence.motion.standing and path_length(poses) < 0.5
+    guessed = standing and clip.known.depth_m is None
+    if guessed and clip.look is not None and metric.ground is None:
+        level = _level_road(clip, height_m, STANDING_SPREAD)
+        metric, notes = replace(metric, ground=level.ground), [*notes, *level.notes]
     if standing:
         notes = [*notes, "the camera stands still: depth cannot be seen from motion"]
     posed = as_posed(clip, evidence, poses, clip.rig[0], metric, clip.known.intrinsics, notes, details)
-    guessed = standing and clip.known.depth_m is None
     return replace(posed, standing=standing, fallback_kind="standing" if guessed else None)
 
 
 def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:
-    """One pose for all frames above an assumed level road."""
+    """One pose for all frames above a road that is taken to be level."""
     poses = np.tile(np.eye(4), (len(clip), 1, 1))
     points = depth_points(clip)
     camera = clip.rig[0]
     street = Street.of(clip, evidence, camera, poses, points)
     plane = scale.find_ground(street, 0)[0] if len(points) else None
-    metric = _level_road(height_m, STANDING_SPREAD)
+    metric = _level_road(clip, height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:
         ground = metric.ground if plane is None else Ground(plane.normal, plane.offset)
         of_depth = Scale("depth", 0.0, scale.by_height(plane, 1.0, height_m))
         metric = replace(metric, ground=ground, scale=of_depth)
-    posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, [reason], {})
+    notes = [reason] if plane is not None else [reason, *metric.notes]
+    posed = as_posed(clip, evidence, poses, camera, metric, clip.known.intrinsics, notes, {})
     return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
 
 def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None) -> Posed:
-    """Frame-to-frame odometry over an assumed level road."""
-    metric = _level_road(height_m, FALLBACK_SPREAD)
-    wanted = scale.USUAL_HEIGHT_M if height_m is None else height_m
+    """Frame-to-frame odometry over a road that is taken to be level."""
+    metric = _level_road(clip, height_m, FALLBACK_SPREAD)
+    assert metric.ground is not None
     if len(clip) == 1:
         path = odometry.Odometry(np.eye(4)[None], np.zeros(0), True)
     else:
-        path = odometry.drive(evidence.grey, evidence.street, evidence.small, clip.times_s, wanted)
+        path = odometry.drive(evidence.grey, evidence.street, evidence.small, clip.times_s, metric.ground)
+    poses = path.world_from_camera
+    if clip.look is not None:
+        poses = odometry.levelled(poses, metric.ground.normal_world)
     reason = "structure from motion was refused: " + "; ".join(outcome.reasons)
-    notes = [reason, "the path comes from frame-to-frame odometry and is rough"]
+    notes = [reason, "the path comes from frame-to-frame odometry and is rough", *metric.notes]
     if not path.measured:
         speed = odometry.DEFAULT_SPEED_M_S
         notes.append(f"the road shows no clear motion: a constant speed of {speed:.0f} m/s is assumed")
@@ -205,14 +214,26 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
         metric = replace(metric, scale=Scale(words, scale.SPEED_SPREAD, basis="usual speed"))
     details = {**outcome.figures, "odometry_measured": path.measured}
     observed = clip.known.intrinsics
-    posed = as_posed(clip, evidence, path.world_from_camera, clip.rig[0], metric, observed, notes, details)
+    posed = as_posed(clip, evidence, poses, clip.rig[0], metric, observed, notes, details)
     return replace(posed, fallback=reason, fallback_kind=outcome.refusal)
 
 
-def _level_road(height_m: float | None, spread: float) -> Metric:
-    ground = Ground(np.array([0.0, -1.0, 0.0]), scale.USUAL_HEIGHT_M if height_m is None else height_m)
-    source = f"level road assumed, {scale.height_words(height_m)}"
-    return Metric(1.0, ground, Scale(source, spread, basis=scale.height_basis(height_m)), ())
+def _level_road(clip: Clip, height_m: float | None, spread: float) -> Metric:
+    """A level road under a level camera, or under one that is tilted as the horizon shows that is seen."""
+    up, how, notes = np.array([0.0, -1.0, 0.0]), "assumed", tuple[str, ...]()
+    if clip.look is not None:
+        seen = clip.look.camera
+        up, how = seen.up_in(clip.rig[0]), "below the horizon that the street network sees"
+        pitch, roll = np.degrees([seen.pitch_rad, seen.roll_rad])
+        notes = (
+            f"the road is taken to be level {how}: the camera looks {'up' if pitch > 0 else 'down'} by "
+            f"{abs(pitch):.1f} degrees and leans to the {'right' if roll > 0 else 'left'} by {abs(roll):.1f}",
+        )
+        if clip.known.depth_m is None:
+            notes += ("depth is what the street network sees in single frames, fitted to that road",)
+    ground = Ground(up, scale.USUAL_HEIGHT_M if height_m is None else height_m)
+    source = f"level road {how}, {scale.height_words(height_m)}"
+    return Metric(1.0, ground, Scale(source, spread, basis=scale.height_basis(height_m)), notes)
 
 
 def as_posed(
