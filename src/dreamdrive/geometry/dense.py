@@ -85,7 +85,9 @@ def densify(
         else:
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
         if look is not None and not given:
-            inverse, confidence, spread = fused(view, look, inverse, confidence)
+            # Where no motion shows the road, its tilt is that of the horizon that the network sees.
+            tilt_rad = look.camera.horizon_spread_px / look.camera.focal_px if rough else 0.0
+            inverse, confidence, spread = fused(view, look, inverse, confidence, tilt_rad)
         flows: dict[int, list[PairFlow]] = {}
         if posed.standing:
             moving = standing_evidence(view)

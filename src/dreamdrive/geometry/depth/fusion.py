@@ -51,10 +51,12 @@ def fused(
     look: Look,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
+    tilt_rad: float = 0.0,
 ) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
     """Inverse depth in 1/m, trust in it, and its relative spread, of every used frame.
 
     Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
+    ``tilt_rad`` is the standard deviation of the tilt of the road's plane.
     """
     height_m = _USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
 
@@ -68,7 +70,7 @@ def fused(
             ),
             inverse[frame],
             confidence[frame],
-            view.plane_inverse[frame],
+            Plane(view.plane_inverse[frame], tilt_rad / height_m),
             view.usable[frame],
             view.options.fusion,
         )
@@ -78,6 +80,19 @@ def fused(
     for frame, each in found.items():
         depth[frame], trust[frame], spread[frame] = each.inverse, each.confidence, each.spread
     return depth, trust, spread
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The road's plane in one frame: inverse depth in 1/m, and its relative spread a metre of depth."""
+
+    inverse: Float[np.ndarray, "h w"]
+    spread_per_m: float = 0.0
+
+    @property
+    def spread(self) -> Float[np.ndarray, "h w"]:
+        """Relative spread of the depth that comes from the tilt."""
+        return self.spread_per_m / np.maximum(self.inverse, 1e-4)
 
 
 @dataclass(frozen=True)
@@ -93,7 +108,7 @@ def fuse(
     seen: Seen,
     swept_inverse: Float[np.ndarray, "h w"],
     confidence: Float[np.ndarray, "h w"],
-    plane_inverse: Float[np.ndarray, "h w"],
+    plane: Plane,
     usable: Bool[np.ndarray, "h w"],
     options: FusionOptions,
 ) -> Fused:
@@ -105,13 +120,15 @@ def fuse(
     """
     users = seen.users & usable
     shown = usable & (seen.classes != StreetClass.SKY) & (seen.depth > 0)
-    road = np.isin(seen.classes, _PAVED) & (plane_inverse > _ROAD_INVERSE) & usable
-    swept, plane = _log_depth(swept_inverse), _log_depth(plane_inverse)
+    road = np.isin(seen.classes, _PAVED) & (plane.inverse > _ROAD_INVERSE) & usable
+    swept, level = _log_depth(swept_inverse), _log_depth(plane.inverse)
+    level_spread = np.hypot(options.stereo_spread, plane.spread)
     sure = np.where(
         shown & ~users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0
     )
-    weight = np.where(road & (sure == 0), 0.5, sure).astype(np.float32)
-    known = np.where(sure > 0, swept, plane)
+    believable = 0.5 * (options.stereo_spread / level_spread) ** 2
+    weight = np.where(road & (sure == 0), believable, sure).astype(np.float32)
+    known = np.where(sure > 0, swept, level)
     network = np.log(np.clip(seen.depth, 1e-3, 1e6)).astype(np.float32)
     aligned, spread = _align(network, seen, known, weight, users, options)
     off = np.abs(swept - aligned)
@@ -120,13 +137,14 @@ def fuse(
     believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
     log_depth = np.where(stereo & believed, swept, aligned)
     spread = np.where(stereo & believed, options.stereo_spread, spread)
-    flat = road & ~(stereo & believed)
-    log_depth[flat], spread[flat] = plane[flat], options.stereo_spread
+    flat = road & ~(stereo & believed) & (level_spread < spread)
+    log_depth[flat], spread[flat] = level[flat], level_spread[flat]
     ground = np.isin(seen.classes, _GROUND)
     overhang = np.where(seen.is_vehicle(), options.overhang_m, 0)
-    contact = on_the_road(seen.instances, ground, plane_inverse, options.contact_spread, overhang)
-    standing = (contact.inverse > 0) & shown
-    log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact.spread[standing]
+    contact = on_the_road(seen.instances, ground, plane.inverse, options.contact_spread, overhang)
+    contact_spread = np.hypot(contact.spread, plane.spread_per_m / np.maximum(contact.inverse, 1e-4))
+    standing = (contact.inverse > 0) & shown & ((plane.spread_per_m == 0) | (contact_spread < spread))
+    log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact_spread[standing]
     matched = users & shown & (confidence >= options.sure) & (np.abs(swept - log_depth) < options.user_stereo)
     log_depth[matched], spread[matched] = swept[matched], options.user_spread
     depth = np.clip(np.exp(log_depth), _NEAREST_M, _FARTHEST_M)
