@@ -1,10 +1,10 @@
 """The benchmark of queues: its clips and its table."""
 
 import numpy as np
-import queues
-from queues import Row, table, told
 
+import queues
 from dreamdrive.world import make_street
+from queues import Row, table, told
 
 
 def test_outlines_tell_of_road_users_and_nothing_of_the_lens() -> None:

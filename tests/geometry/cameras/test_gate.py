@@ -44,6 +44,14 @@ def test_a_wobbling_path_is_judged_over_stretches(sideways_m: float, jumps: bool
     assert any("jumps" in reason for reason in wobbling.reasons) == jumps
 
 
+def test_what_shows_little_of_the_street_needs_fewer_points() -> None:
+    sparse = replace(drive(0.2), points=np.zeros((40, 3)), seen=np.ones((FRAMES, 40), bool))
+    assert any("only 40 points" in reason for reason in judge(sparse, MOVING).reasons)
+    assert judge(sparse, MOVING, little=True).reasons == ()
+    poorer = replace(drive(0.2), points=np.zeros((20, 3)), seen=np.ones((FRAMES, 20), bool))
+    assert any("only 20 points" in reason for reason in judge(poorer, MOVING, little=True).reasons)
+
+
 def test_a_drive_backwards_is_one() -> None:
     model = drive(0.7)
     back = replace(model, world_from_camera=model.world_from_camera[::-1].copy())

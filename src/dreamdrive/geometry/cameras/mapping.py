@@ -11,7 +11,7 @@ from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Evidence, Features, features, find_features
+from dreamdrive.geometry.evidence import Evidence, Features, features, find_features, shows_little
 from dreamdrive.geometry.options import GateOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -56,6 +56,7 @@ def reconstruct(
     if typical < MIN_FEATURES:
         return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
     square, found = _square_pixels(evidence.working, found)
+    little = shows_little(clip, evidence)
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
     figures: dict[str, Any] = {"features": typical}
@@ -70,7 +71,7 @@ def reconstruct(
                 failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
             else:
                 settled = settle(database, model, square, clip.known.intrinsics, seed)
-                verdict = gate.judge(settled.model, evidence.motion.moving, options)
+                verdict = gate.judge(settled.model, evidence.motion.moving, options, little=little)
                 failed = verdict.reasons
                 figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
                 if not failed:

@@ -9,5 +9,6 @@ from dreamdrive.geometry.evidence.observation import (
     free_pixels,
     observe,
     resized,
+    shows_little,
     working_frames,
 )

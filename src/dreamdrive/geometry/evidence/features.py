@@ -2,17 +2,18 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 MAX_FEATURES = 1024
-CONTRAST = 0.01
+CONTRAST, FAINT = 0.01, 0.0025
 MIN_WIDTH_PX, MAX_WIDTH_PX = 480, 640
 MASK_MARGIN_PX = 4
 LITTLE = 0.4
-"""Usable share of a typical frame below which features are sought in pictures of twice the size."""
+"""Usable share of a picture below which it is looked at more closely."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +42,9 @@ def to_grey(frames: UInt8[np.ndarray, "f h w 3"], size: tuple[int, int]) -> UInt
     return np.stack([cv2.resize(frame, size, interpolation=how) for frame in grey])
 
 
-def magnification(usable: Bool[np.ndarray, "f h w"]) -> int:
-    """How many times as large as the working size pictures are in which features are sought: 1 or 2.
-
-    Where traffic fills most of the picture, what is left shows too few features: on drawn queues, a quarter
-    of whose picture is street at most, 114 to 354 a frame, and the path folded or was refused. At twice the
-    size there are 880 and more, and the path is within 0.2 % of its length.
-    """
-    return 2 if np.median(usable.mean(axis=(1, 2))) < LITTLE else 1
+def is_little(usable: Bool[np.ndarray, "h w"]) -> bool:
+    """Whether so little of a picture is usable, as in a queue, that it shows few features."""
+    return float(usable.mean()) < LITTLE
 
 
 def scaled(found: Features, factor: float | Float[np.ndarray, "2"]) -> Features:
@@ -56,22 +52,24 @@ def scaled(found: Features, factor: float | Float[np.ndarray, "2"]) -> Features:
     return Features((found.keypoints_px * np.float32(factor)).astype(np.float32), found.descriptors)
 
 
-def extract(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"]) -> list[Features]:
-    """SIFT (Lowe 2004) of each frame, away from unusable pixels.
+def extract(
+    grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], contrast: float = CONTRAST
+) -> list[Features]:
+    """SIFT (Lowe 2004) of each frame, away from unusable pixels, of a contrast or more.
 
     OpenCV's detector is six times as fast as COLMAP's and gives the same path to a tenth of a per cent; the
     precise upscaling avoids its quarter-pixel shift. Each frame is done by one thread, so the number of
     threads does not show in the result.
     """
     with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(_extract_one, grey, usable))
+        return list(pool.map(partial(_extract_one, contrast=contrast), grey, usable))
 
 
-def _extract_one(grey: np.ndarray, usable: np.ndarray) -> Features:
+def _extract_one(grey: np.ndarray, usable: np.ndarray, contrast: float) -> Features:
     kernel = np.ones((2 * MASK_MARGIN_PX + 1, 2 * MASK_MARGIN_PX + 1), np.uint8)
     mask = cv2.erode(usable.astype(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=1)
     sift = cv2.SIFT.create(
-        nfeatures=0, contrastThreshold=CONTRAST, edgeThreshold=10, sigma=1.6, enable_precise_upscale=True
+        nfeatures=0, contrastThreshold=contrast, edgeThreshold=10, sigma=1.6, enable_precise_upscale=True
     )
     found, descriptors = sift.detectAndCompute(grey, mask)
     if len(found) == 0:
