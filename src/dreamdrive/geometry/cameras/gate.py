@@ -35,7 +35,8 @@ def judge(
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
     steady length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise
     and its length is far below the mean. Where the frames wobble, their poses do: the direction is then that
-    of stretches of three steps. Frames that show little of the street need fewer points.
+    of stretches of three steps. Frames that show little of the street need fewer
+    points, but each of them some: on a drawn queue 425 points, 10 in the poorest frame, were 1.2 % off.
     """
     registered = model.registered
     share = float(registered.mean())
@@ -62,7 +63,8 @@ def judge(
         reasons.append(f"only {registered.sum()} of {len(registered)} frames could be placed")
     part = options.little if little else 1.0
     enough = part * min(options.points, options.points_a_frame * len(registered))
-    if len(model.points) < enough and seen.min() < part * options.seen:
+    poor = len(model.points) < enough, seen.min() < part * options.seen
+    if any(poor) if little else all(poor):
         reasons.append(f"only {len(model.points)} points, {seen.min()} in the poorest frame")
     if model.reprojection_px > options.reprojection_px:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")
