@@ -17,6 +17,7 @@ class GateOptions:
         points: Points that have to be there ...
         points_a_frame: ... or so many for each frame, if these are fewer ...
         seen: ... or else so many in the poorest frame.
+        little: Part of these numbers that is enough, of both, where traffic leaves little of the picture.
         wobbling_px: Mean reprojection error above which frames are not quite pictures of one street, as
             generated ones are not: recorded drives stay below 0.4.
         reprojection_px: Mean reprojection error above which the model is refused.
@@ -28,6 +29,7 @@ class GateOptions:
     points: int = 600
     points_a_frame: int = 25
     seen: int = 60
+    little: float = 0.5
     wobbling_px: float = 0.5
     reprojection_px: float = 1.0
     forward: float = 0.9

@@ -44,6 +44,18 @@ def test_a_wobbling_path_is_judged_over_stretches(sideways_m: float, jumps: bool
     assert any("jumps" in reason for reason in wobbling.reasons) == jumps
 
 
+def test_what_shows_little_of_the_street_needs_fewer_points_but_some_in_each_frame() -> None:
+    seen = np.zeros((FRAMES, 200), bool)
+    seen[:, :40] = True
+    sparse = replace(drive(0.2), points=np.zeros((200, 3)), seen=seen)
+    assert any("only 200 points, 40 in" in reason for reason in judge(sparse, MOVING).reasons)
+    assert judge(sparse, MOVING, little=True).reasons == ()
+    seen = seen.copy()
+    seen[3, 10:] = False
+    poorer = replace(sparse, seen=seen)
+    assert any("10 in the poorest" in reason for reason in judge(poorer, MOVING, little=True).reasons)
+
+
 def test_a_drive_backwards_is_one() -> None:
     model = drive(0.7)
     back = replace(model, world_from_camera=model.world_from_camera[::-1].copy())

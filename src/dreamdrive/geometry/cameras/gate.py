@@ -23,13 +23,20 @@ class Verdict:
     wobbling: bool = False  # the frames are not quite pictures of one street, as generated ones are not
 
 
-def judge(model: Model, moving: Bool[np.ndarray, " s"], options: GateOptions = GateOptions()) -> Verdict:
+def judge(
+    model: Model,
+    moving: Bool[np.ndarray, " s"],
+    options: GateOptions = GateOptions(),
+    *,
+    little: bool = False,
+) -> Verdict:
     """Test registration, support, fit and the plausibility of the steps.
 
     Only steps (F - 1,) in which the picture moves are held to one direction along the optical axis and to a
     steady length, a steady gain or loss of speed aside: from a standstill the direction of a step is noise
     and its length is far below the mean. Where the frames wobble, their poses do: the direction is then that
-    of stretches of three steps.
+    of stretches of three steps. Frames that show little of the street need fewer
+    points, but each of them some: on a drawn queue 425 points, 10 in the poorest frame, were 1.2 % off.
     """
     registered = model.registered
     share = float(registered.mean())
@@ -54,8 +61,10 @@ def judge(model: Model, moving: Bool[np.ndarray, " s"], options: GateOptions = G
     reasons: list[str] = []
     if share < options.registered:
         reasons.append(f"only {registered.sum()} of {len(registered)} frames could be placed")
-    enough = min(options.points, options.points_a_frame * len(registered))
-    if len(model.points) < enough and seen.min() < options.seen:
+    part = options.little if little else 1.0
+    enough = part * min(options.points, options.points_a_frame * len(registered))
+    poor = len(model.points) < enough, seen.min() < part * options.seen
+    if any(poor) if little else all(poor):
         reasons.append(f"only {len(model.points)} points, {seen.min()} in the poorest frame")
     if model.reprojection_px > options.reprojection_px:
         reasons.append(f"points miss their pixels by {model.reprojection_px:.2f} px on average")

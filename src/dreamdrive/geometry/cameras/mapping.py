@@ -11,7 +11,7 @@ from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
 from dreamdrive.geometry.cameras.sfm import Model
 from dreamdrive.geometry.depth import Tell, unheard
-from dreamdrive.geometry.evidence import Evidence, Features, features, working_frames
+from dreamdrive.geometry.evidence import Evidence, Features, features, find_features, shows_little
 from dreamdrive.geometry.options import GateOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -50,12 +50,13 @@ def reconstruct(
     """
     if len(clip) < MIN_FRAMES:
         return _refused(f"{len(clip)} frames are too few for structure from motion", "few")
-    found = features.extract(*working_frames(clip, evidence))
+    found = find_features(clip, evidence)
     tell()
     typical = int(np.median([len(entry.keypoints_px) for entry in found]))
     if typical < MIN_FEATURES:
         return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
     square, found = _square_pixels(evidence.working, found)
+    little = shows_little(clip, evidence)
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
     figures: dict[str, Any] = {"features": typical}
@@ -70,7 +71,7 @@ def reconstruct(
                 failed: tuple[str, ...] = (f"{name} mapping placed too few frames",)
             else:
                 settled = settle(database, model, square, clip.known.intrinsics, seed)
-                verdict = gate.judge(settled.model, evidence.motion.moving, options)
+                verdict = gate.judge(settled.model, evidence.motion.moving, options, little=little)
                 failed = verdict.reasons
                 figures |= verdict.figures | {"mapper": name, "focal_ladder": settled.ladder}
                 if not failed:
@@ -106,5 +107,5 @@ def _square_pixels(camera: Camera, found: list[Features]) -> tuple[Camera, list[
     stretch = camera.fx_px / camera.fy_px
     height_px = max(1, round(camera.height_px * stretch))
     square = replace(camera, fy_px=camera.fx_px, cy_px=camera.cy_px * stretch, height_px=height_px)
-    factor = np.array([1.0, stretch], np.float32)
-    return square, [Features(entry.keypoints_px * factor, entry.descriptors) for entry in found]
+    factor = np.array([1.0, stretch])
+    return square, [features.scaled(entry, factor) for entry in found]

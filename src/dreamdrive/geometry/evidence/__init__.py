@@ -3,4 +3,12 @@
 from dreamdrive.geometry.evidence import features
 from dreamdrive.geometry.evidence.features import Features
 from dreamdrive.geometry.evidence.motion import track
-from dreamdrive.geometry.evidence.observation import Evidence, free_pixels, observe, resized, working_frames
+from dreamdrive.geometry.evidence.observation import (
+    Evidence,
+    find_features,
+    free_pixels,
+    observe,
+    resized,
+    shows_little,
+    working_frames,
+)

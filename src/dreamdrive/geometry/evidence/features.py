@@ -2,15 +2,18 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 MAX_FEATURES = 1024
-CONTRAST = 0.01
+CONTRAST, FAINT = 0.01, 0.0025
 MIN_WIDTH_PX, MAX_WIDTH_PX = 480, 640
 MASK_MARGIN_PX = 4
+LITTLE = 0.4
+"""Usable share of a picture below which it is looked at more closely."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +42,34 @@ def to_grey(frames: UInt8[np.ndarray, "f h w 3"], size: tuple[int, int]) -> UInt
     return np.stack([cv2.resize(frame, size, interpolation=how) for frame in grey])
 
 
-def extract(grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"]) -> list[Features]:
-    """SIFT (Lowe 2004) of each frame, away from unusable pixels.
+def is_little(usable: Bool[np.ndarray, "h w"]) -> bool:
+    """Whether so little of a picture is usable, as in a queue, that it shows few features."""
+    return float(usable.mean()) < LITTLE
+
+
+def scaled(found: Features, factor: float | Float[np.ndarray, "2"]) -> Features:
+    """The features at places x and y times a factor."""
+    return Features((found.keypoints_px * np.float32(factor)).astype(np.float32), found.descriptors)
+
+
+def extract(
+    grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], contrast: float = CONTRAST
+) -> list[Features]:
+    """SIFT (Lowe 2004) of each frame, away from unusable pixels, of a contrast or more.
 
     OpenCV's detector is six times as fast as COLMAP's and gives the same path to a tenth of a per cent; the
     precise upscaling avoids its quarter-pixel shift. Each frame is done by one thread, so the number of
     threads does not show in the result.
     """
     with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(_extract_one, grey, usable))
+        return list(pool.map(partial(_extract_one, contrast=contrast), grey, usable))
 
 
-def _extract_one(grey: np.ndarray, usable: np.ndarray) -> Features:
+def _extract_one(grey: np.ndarray, usable: np.ndarray, contrast: float) -> Features:
     kernel = np.ones((2 * MASK_MARGIN_PX + 1, 2 * MASK_MARGIN_PX + 1), np.uint8)
     mask = cv2.erode(usable.astype(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=1)
     sift = cv2.SIFT.create(
-        nfeatures=0, contrastThreshold=CONTRAST, edgeThreshold=10, sigma=1.6, enable_precise_upscale=True
+        nfeatures=0, contrastThreshold=contrast, edgeThreshold=10, sigma=1.6, enable_precise_upscale=True
     )
     found, descriptors = sift.detectAndCompute(grey, mask)
     if len(found) == 0:

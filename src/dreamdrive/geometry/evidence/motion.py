@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive.geometry.evidence.features import is_little
+
 WIDTH_PX = 320
 WINDOW_S = 0.2
 STANDING_PX = 1.0
@@ -31,9 +33,14 @@ class Motion:
 def track(
     first: UInt8[np.ndarray, "h w"], second: UInt8[np.ndarray, "h w"], usable: Bool[np.ndarray, "h w"]
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
-    """Corners of ``first`` followed into ``second`` by pyramidal Lucas-Kanade, checked both ways."""
+    """Corners of ``first`` followed into ``second`` by pyramidal Lucas-Kanade, checked both ways.
+
+    Where little is usable they are weaker, relative to the clearest, and lie closer.
+    """
     none = np.zeros((0, 2), np.float32)
-    corners: Any = cv2.goodFeaturesToTrack(first, CORNERS, 0.01, 6, mask=usable.astype(np.uint8) * 255)
+    quality, apart_px = (0.001, 3) if is_little(usable) else (0.01, 6)
+    mask = usable.astype(np.uint8) * 255
+    corners: Any = cv2.goodFeaturesToTrack(first, CORNERS, quality, apart_px, mask=mask)
     if corners is None or len(corners) == 0:
         return none, none
     there, found = _follow(first, second, corners)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from dreamdrive.geometry.evidence import features, masks, motion
+from dreamdrive.geometry.evidence.features import Features
 from dreamdrive.geometry.evidence.masks import Fixed
 from dreamdrive.geometry.evidence.motion import Motion
 from dreamdrive.scene.camera import Camera
@@ -38,7 +39,10 @@ def observe(clip: Clip) -> Evidence:
     grey = features.to_grey(clip.frames, size)
     valid = resized(clip.valid, size)
     users = resized(road_users(clip), size)
-    moves = motion.measure(grey, valid & ~users, clip.times_s)
+    of_street = valid & ~users
+    if clip.look is not None:
+        of_street &= ~resized(clip.look.own_car, size)
+    moves = motion.measure(grey, of_street, clip.times_s)
     in_motion = np.zeros(len(clip), bool)
     if not moves.standing:
         in_motion[:-1] |= moves.moving
@@ -65,11 +69,29 @@ def observe(clip: Clip) -> Evidence:
 
 
 def working_frames(
-    clip: Clip, evidence: Evidence
+    clip: Clip, evidence: Evidence, times: int = 1
 ) -> tuple[UInt8[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
-    """Grey frames at the working size and the pixels in which features may lie."""
-    size = (evidence.working.width_px, evidence.working.height_px)
+    """Grey frames at a multiple of the working size and the pixels in which features may lie."""
+    size = (times * evidence.working.width_px, times * evidence.working.height_px)
     return features.to_grey(clip.frames, size), resized(free_pixels(clip, evidence), size)
+
+
+def shows_little(clip: Clip, evidence: Evidence) -> bool:
+    """Whether most frames show so little of the street that they have to be looked at more closely."""
+    return float(np.mean([features.is_little(each) for each in free_pixels(clip, evidence)])) > 0.5
+
+
+def find_features(clip: Clip, evidence: Evidence) -> list[Features]:
+    """Features of each frame in pixels of the working size.
+
+    Where frames show little of the street these are few: on drawn queues, a quarter of whose picture is
+    street at most, 55 to 430 a frame, and paths folded. There they are sought at twice the size, and faint
+    ones, too: 800 and more.
+    """
+    if not shows_little(clip, evidence):
+        return features.extract(*working_frames(clip, evidence))
+    found = features.extract(*working_frames(clip, evidence, 2), features.FAINT)
+    return [features.scaled(each, 0.5) for each in found]
 
 
 def free_pixels(clip: Clip, evidence: Evidence) -> Bool[np.ndarray, "f h w"]:
