@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.consistency import GAPS, Consistency, evaluate_consistency
+from dreamdrive.geometry.cameras import sfm
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world import Drive, make_street
 from dreamdrive.world.corruption import Corruption, corrupt, parse_corruption
@@ -62,6 +63,16 @@ def test_the_truth_scores_well(clean: Consistency) -> None:
 def test_a_corrupted_video_scores_worse_on_every_figure(street: Drive, clean: Consistency) -> None:
     frames = corrupt(street.frames, Corruption(1, 1, 1, 1, 1), street.depth_m)
     assert worse(evaluate(street, frames, street.trajectory, moving=street.moving), clean) == []
+
+
+def test_without_structure_from_motion_the_path_is_that_of_odometry(
+    street: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sfm, "map_globally", lambda *_: None)
+    found = evaluate(street, street.frames, street.trajectory, moving=street.moving)
+    assert found.found_by == "odometry"
+    assert found.path is not None
+    assert found.path.rotation_deg_per_m < 0.1
 
 
 @pytest.mark.slow

@@ -63,6 +63,8 @@ def test_an_own_car_that_comes_in_from_no_border_is_what_is_next_likely() -> Non
     seen = look(frame[None], mistaken, options=LookOptions(width_px=256))
     assert np.array_equal(seen.own_car, whole.own_car)
     assert seen.own_car[0, 131:].all()
+    # What is only taken for the own car keeps its depth.
+    assert np.allclose(seen.depth[0, 132:], 30)
     car, wall = (slice(50, 94), slice(34, 126)), (slice(52, 78), slice(182, 198))
     for place, kind, depth in ((car, StreetClass.VEHICLE, 10), (wall, StreetClass.STRUCTURE, 12)):
         assert (seen.classes[0][place] == kind).all()

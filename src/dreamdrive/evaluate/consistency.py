@@ -17,13 +17,14 @@ from dreamdrive.geometry.cameras import MIN_TRACKS, fill, odometry, settle, sfm
 from dreamdrive.geometry.evidence import Evidence, Features, features, observe, resized, working_frames
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.trajectory import Trajectory
 
 GAPS = (1, 4, 8)
 MIN_PLACED = 0.9
 """Share of the frames that structure from motion has to place."""
-_HEIGHT_M = 1.5
-"""Camera height for odometry; it sets no more than the unit, which a comparison of paths leaves free."""
+_ROAD = Ground(np.array([0.0, -1.0, 0.0]), 1.5)
+"""For odometry; its height sets no more than the unit, which a comparison of paths leaves free."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def _recovered(
     mapped = _mapped(clip, seen, found, seed)
     if mapped is not None:
         return mapped
-    path = odometry.drive(seen.grey, street, seen.small, clip.times_s, _HEIGHT_M)
+    path = odometry.drive(seen.grey, street, seen.small, clip.times_s, _ROAD)
     return Recovered(path.world_from_camera, camera, "odometry") if path.measured else None
 
 

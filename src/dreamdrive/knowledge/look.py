@@ -31,7 +31,6 @@ _WITHIN_68 = -log(1 - 0.6827)
 """Half width of the interval that holds 68 % of a Laplace distribution of scale 1."""
 _FLAT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND)
 """One surface, as far as depth goes."""
-_EMPTY = (StreetClass.SKY, StreetClass.OWN_CAR)
 
 
 @dataclass(frozen=True)
@@ -143,10 +142,10 @@ def _see(
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
     instances, users = group(classes, chance, peaks, offset_px, options.grouping)
     depth, spread = _depth(said, fitting, _regions(classes, instances))
-    empty = torch.isin(classes, torch.tensor(_EMPTY))
+    sky = classes == StreetClass.SKY
     maps = {
-        "depth": depth.masked_fill(empty, 0),
-        "spread": spread.masked_fill(empty, 0),
+        "depth": depth.masked_fill(sky, 0),
+        "spread": spread.masked_fill(sky, 0),
         "classes": classes.byte(),
         "confidence": chance,
     }

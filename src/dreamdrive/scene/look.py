@@ -86,7 +86,8 @@ class Look:
     """What is seen in F frames of H x W pixels of one camera.
 
     Attributes:
-        depth: Along z, in heights of the camera above the road (F, H, W); 0 in the sky and on the own car.
+        depth: Along z, in heights of the camera above the road (F, H, W); 0 in the sky. On the own
+            car it is a guess: what is only taken for it keeps its depth.
         spread: Relative half width of the interval that holds the depth with 68 % (F, H, W); 0 without depth.
         classes: ``StreetClass`` of each pixel (F, H, W).
         confidence: Probability of that class, in [0, 1] (F, H, W).
