@@ -21,6 +21,7 @@ from common.options import parser_of
 from common.pandaset_truth import camera_path, moving_masks
 from common.places import DATA, DREAMDRIVE
 from common.report import as_json, exit_code, write
+from common.twin import TWIN
 from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.splat.scene_view import render_scene
 from dreamdrive.stored import load_scene
@@ -103,7 +104,7 @@ def main() -> int:
 def measure(name: str, run: Run, out: Path) -> dict:
     """Generate a scene, unless it is there already, and compare it with what is known of the clip."""
     source = DATA / "clips" / run.clip / run.source
-    command = [*DREAMDRIVE, "generate", str(source), *run.options, "-o", str(out)]
+    command = [*DREAMDRIVE, "generate", str(source), *run.options, "--knowledge", TWIN, "-o", str(out)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     report = json.loads((out / "report.json").read_text())
     row = {

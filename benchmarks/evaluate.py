@@ -18,6 +18,7 @@ from common.markdown import replace_section
 from common.options import parser_of
 from common.places import DATA, DREAMDRIVE
 from common.report import as_json, write
+from common.twin import TWIN
 
 PAGE = Path("docs/results/figures_of_evaluate.md")
 PANDASET = DATA / "clips/pandaset_002"
@@ -48,7 +49,7 @@ def world(runs: Path, seed: int, size: str, frames: int, *more: str) -> Path:
 def scene(runs: Path, name: str, source: list[str]) -> Path:
     """A draft of a scene."""
     out = runs / f"scene-{name}"
-    told("generate", *source, "--force", "-o", str(out))
+    told("generate", *source, "--knowledge", TWIN, "--force", "-o", str(out))
     return out
 
 

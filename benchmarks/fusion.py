@@ -1,6 +1,6 @@
 """What the street network brings to depth, motion and views: the same scenes without it and with it.
 
-    python benchmarks/fusion.py [street|FILE ...] [--seeds SEED ...] [--poses true estimated]
+    python benchmarks/fusion.py [FILE|street ...] [--seeds SEED ...] [--poses true estimated]
                                 [--clips pandaset kitti04] [--runs DIR] [--json FILE] [--markdown FILE]
 
 Drawn streets (edition 1, clean references, 320x192, ``draft``): shares of pixels whose depth is more than
@@ -20,6 +20,7 @@ from common.machine import COMMIT, describe_machine
 from common.markdown import grid, number
 from common.options import parser_of
 from common.report import publish
+from common.twin import TWIN, name_of
 from common.worlds import DEVELOPMENT, set_of
 from dreamdrive.knowledge import NO_KNOWLEDGE, weights_of
 from dreamdrive.run import digest, file_digest
@@ -33,7 +34,7 @@ Row = dict[str, Any]
 def main() -> int:
     """Measure, print the tables and write all as JSON."""
     parser = parser_of(__doc__, runs="runs/fusion", markdown=True)
-    parser.add_argument("knowledge", nargs="*", default=["street"], metavar="street|FILE")
+    parser.add_argument("knowledge", nargs="*", default=[TWIN], metavar="street|FILE")
     parser.add_argument("--seeds", type=int, nargs="*", default=list(DEVELOPMENT))
     parser.add_argument("--poses", nargs="+", choices=("true", "estimated"), default=["true", "estimated"])
     parser.add_argument("--clips", nargs="*", choices=sorted(CLIPS), default=sorted(CLIPS))
@@ -41,17 +42,18 @@ def main() -> int:
     worlds: list[Row] = []
     clips: list[Row] = []
     for knowledge in (NO_KNOWLEDGE, *args.knowledge):
+        name = name_of(knowledge)
         known = "" if knowledge == NO_KNOWLEDGE else file_digest(weights_of(knowledge))
         for case in (Case(seed, poses, "clean") for poses in args.poses for seed in args.seeds):
             key = digest([COMMIT, known, case_digest(case)])
             path = args.runs / f"{case.name}-{known[:8]}.json"
             found = kept(path, key, partial(judge_world, case, knowledge, args.runs))
-            worlds.append({"knowledge": knowledge, "poses": case.geometry, "seed": case.seed, **found})
+            worlds.append({"knowledge": name, "poses": case.geometry, "seed": case.seed, **found})
             print(worlds[-1], file=sys.stderr, flush=True)
-        for name in args.clips:
-            path, key = args.runs / f"{name}-{known[:8]}.json", digest([COMMIT, known, name])
-            found = kept(path, key, partial(judge_clip, name, knowledge))
-            clips.append({"knowledge": knowledge, "clip": name, **found})
+        for clip in args.clips:
+            path, key = args.runs / f"{clip}-{known[:8]}.json", digest([COMMIT, known, clip])
+            found = kept(path, key, partial(judge_clip, clip, knowledge))
+            clips.append({"knowledge": name, "clip": clip, **found})
             print(clips[-1], file=sys.stderr, flush=True)
     report = {
         "machine": describe_machine(),

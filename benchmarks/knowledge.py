@@ -1,11 +1,11 @@
 """How well the street network sees: against lidar, known cameras, and the truth of drawn streets.
 
-    python benchmarks/knowledge.py [street|FILE] [--parts lidar kitti cameras drawn cost] [--json FILE]
+    python benchmarks/knowledge.py [FILE|street] [--parts lidar kitti cameras drawn cost] [--json FILE]
 
 Depth is up to one factor a picture, the median ratio over all points at 2 to 80 m; errors are means over
 pictures, then over cameras. The baseline is a level road below the known camera with a wall at 40 m, through
-the same code. Recordings are found through ``DREAMDRIVE_DATA`` (default ``../shared/data``). PandaSet's are
-also training material: what was trained on them must not be judged by them.
+the same code. Recordings are found through ``DREAMDRIVE_DATA`` (default ``../shared/data``). The weights
+that ship have learned from PandaSet; their twin, which is judged where no other is named, has not.
 """
 
 import sys
@@ -18,6 +18,7 @@ from common.machine import describe_machine
 from common.memory import peak_bytes, resident_bytes
 from common.options import parser_of
 from common.report import as_json, write
+from common.twin import TWIN, name_of
 from dreamdrive.knowledge import LookOptions, load_knowledge, look
 from dreamdrive.scene.look import Look
 from knowledge.cameras import Frames, See, judge_camera, known_cameras
@@ -34,7 +35,7 @@ SHOTS = {"lidar": pandaset, "kitti": kitti}
 def main() -> int:
     """Measure the parts, print their figures and write all as JSON."""
     parser = parser_of(__doc__)
-    parser.add_argument("knowledge", nargs="?", default="street", metavar="street|FILE")
+    parser.add_argument("knowledge", nargs="?", default=TWIN, metavar="street|FILE")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--baseline", action="store_true", help="the baseline alone, which needs no weights")
     parser.add_argument("--width", type=int, metavar="PX", help="for the network", default=WIDTH_PX)
@@ -44,12 +45,12 @@ def main() -> int:
     lidar = [part for part in args.parts if part in SHOTS]
     report: dict[str, Any] = {
         "machine": describe_machine(),
-        "knowledge": args.knowledge,
+        "knowledge": name_of(args.knowledge),
         "width_px": args.width,
     }
     report["baseline"] = {part: judge(SHOTS[part](), plane_and_backdrop) for part in lidar}
     if not args.baseline:
-        report |= {"knowledge": args.knowledge, "width_px": args.width}
+        report |= {"knowledge": name_of(args.knowledge), "width_px": args.width}
         network, options = load_knowledge(args.knowledge), LookOptions(width_px=args.width)
 
         def see(frames: Frames) -> Look:

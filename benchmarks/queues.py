@@ -24,6 +24,7 @@ from common.machine import describe_machine
 from common.options import parser_of
 from common.report import publish
 from common.true_look import true_look
+from common.twin import TWIN, name_of
 from common.worlds import SETS
 from dreamdrive.evaluate.paths import compare_paths
 from dreamdrive.geometry.cameras import pose_clip
@@ -87,7 +88,7 @@ def parse() -> argparse.Namespace:
     parser = parser_of(__doc__, markdown=True)
     parser.add_argument("--worlds", choices=SETS, default="development", help="the first eight of a set")
     parser.add_argument("--seeds", type=int, nargs="+", metavar="S", help="others than those")
-    parser.add_argument("--knowledge", nargs="+", default=[NO_KNOWLEDGE, OUTLINES], metavar="WHAT")
+    parser.add_argument("--knowledge", nargs="+", default=[NO_KNOWLEDGE, TWIN, OUTLINES], metavar="WHAT")
     parser.add_argument("--calibrated", action="store_true", help="the lens is known")
     return parser.parse_args()
 
@@ -119,7 +120,7 @@ def measure(seed: int, knowledge: str, calibrated: bool) -> Row:
     assert error is not None, "queues move"
     return Row(
         seed=seed,
-        knowledge=knowledge,
+        knowledge=name_of(knowledge),
         traffic=float(made.moving.mean()),
         path_m=made.trajectory.length_m,
         refused=posed.fallback,

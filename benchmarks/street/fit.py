@@ -19,7 +19,7 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.stored import load_scene, save_scene
 
 PROBE_STEPS = 30
-SHARED = ("prior", "geometry", "initialise", "static")
+SHARED = ("prior", "look", "geometry", "initialise", "static")
 """Stages that all fits of a case begin with."""
 T = TypeVar("T")
 
@@ -40,7 +40,9 @@ class Start:
 
     def stages(self, options: Options) -> Stages:
         """Keeps what is shared by all fits of these options, a folder for each choice of them."""
-        shared = digest([options.geometry, options.seeds, options.static, options.device, options.seed])
+        shared = digest(
+            [options.knowledge, options.geometry, options.seeds, options.static, options.device, options.seed]
+        )
         folder = self.folder / shared[:8]
         return Stages(folder, None, lambda *_: None, lambda: folder.mkdir(parents=True, exist_ok=True))
 

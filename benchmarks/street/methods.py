@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+from common.twin import TWIN
 from dreamdrive.motion import DeformationConfig, HexPlaneConfig, MotionConfig
 from dreamdrive.options import QUALITIES, Options, with_method
 from street.fit import with_steps
 
-QUALITY = QUALITIES["draft"]
+QUALITY = replace(QUALITIES["draft"], knowledge=TWIN)
 OURS = "hybrid"
 REPRESENTATIONS = ("hybrid", "static", "vibration", "deformable", "hexplane")
 

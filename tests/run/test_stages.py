@@ -14,6 +14,8 @@ from dreamdrive.errors import InputError
 from dreamdrive.run import codec, stages
 from dreamdrive.run.stages import STAGES, Stages, digest, file_digest, stage_seed
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.look import RoadUser
+from dreamdrive.scene.street_class import StreetClass
 
 
 class Work:
@@ -297,3 +299,16 @@ def _assert_equal(a: object, b: object) -> None:
             _assert_equal(x, y)
     else:
         assert a == b
+
+
+def test_what_a_look_holds_comes_back_as_it_was(tmp_path: Path) -> None:
+    users = (
+        RoadUser(StreetClass.VEHICLE, 0.8, (0, 3, 6, 6), 18),
+        RoadUser(StreetClass.PERSON, 1.0, (1, 1, 2, 2), 1),
+    )
+    codec.write(tmp_path, users, {})
+    assert codec.read(tmp_path, tuple) == users
+    document = json.loads((tmp_path / codec.JSON_NAME).read_text())
+    (tmp_path / codec.JSON_NAME).write_text(json.dumps(document).replace('"PERSON"', '"GHOST"'))
+    with pytest.raises(codec.DamagedError, match="GHOST"):
+        codec.read(tmp_path)

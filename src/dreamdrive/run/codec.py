@@ -27,6 +27,7 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
 from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.scene.trajectory import Trajectory
 
 NOUNS: dict[str, type] = {
@@ -58,6 +59,7 @@ NOUNS: dict[str, type] = {
 JSON_NAME, _ARRAYS = "result.json", "result.safetensors"
 # Keys of the JSON objects that stand for something else.
 _NOUN, _ARRAY, _TENSOR, _TUPLE, _DICT, _ODD = "noun", "array", "tensor", "tuple", "dict", "number"
+_CLASS = "street class"
 
 
 T = TypeVar("T")
@@ -110,6 +112,8 @@ def _encode(value: object, name: str, arrays: dict[str, np.ndarray]) -> object:
     """JSON values for ``value``; arrays go to ``arrays`` under their path."""
     if isinstance(value, float) and not math.isfinite(value):
         return {_ODD: str(value)}
+    if isinstance(value, StreetClass):
+        return {_CLASS: value.name}
     if value is None or isinstance(value, str | bool | int | float):
         return value
     if isinstance(value, np.generic):
@@ -151,6 +155,8 @@ def _decode(value: Any, arrays: dict[str, Shaped[np.ndarray, "..."]]) -> Any:
         return {key: _decode(item, arrays) for key, item in content.items()}
     if kind == _ODD:
         return float(content)
+    if kind == _CLASS:
+        return StreetClass[content]
     if kind == _NOUN:
         parts = {name: _decode(item, arrays) for name, item in value["fields"].items()}
         return build(NOUNS[content], parts)
