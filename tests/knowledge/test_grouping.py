@@ -35,6 +35,15 @@ def test_two_cars_that_touch_are_two() -> None:
     assert (numbers > 0).sum() == 800
 
 
+def test_the_halves_of_a_lorry_are_one_and_people_above_one_another_two() -> None:
+    classes, sure, peaks, offset = empty()
+    for kind, index in ((StreetClass.VEHICLE, CAR), (StreetClass.PERSON, PERSON)):
+        classes[8:32, 20:40] = kind
+        peaks.zero_()
+        peaks[index, 3, 7], peaks[index, 6, 7] = 0.9, 0.7
+        assert len(group(classes, sure, peaks, offset)[1]) == (1 if index == CAR else 2)
+
+
 def test_classes_do_not_share_a_centre() -> None:
     classes, sure, peaks, offset = empty()
     classes[10:30, 20:40] = StreetClass.VEHICLE

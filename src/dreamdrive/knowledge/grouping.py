@@ -9,20 +9,24 @@ from torch import Tensor
 from torch.nn import functional
 
 from dreamdrive.scene.look import RoadUser
-from dreamdrive.scene.street_class import ROAD_USERS
+from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 
 @dataclass(frozen=True)
 class GroupingOptions:
     """How pixels of road users become vehicles, two-wheelers and persons."""
 
-    peak: float = 0.2
+    peak: float = 0.15
     """Least height of a centre's peak, in [0, 1]."""
-    window: int = 3
-    """Cells of the coarse map, along each side, of which a peak is the highest."""
+    window: tuple[int, int] = (3, 3)
+    """Rows and columns of the coarse map of whose cells a peak is the highest."""
+    vehicle_window: tuple[int, int] = (19, 5)
+    """The same of vehicles. None stands above another, but both halves of a lorry seem to have a centre: with
+    (3, 3) the mean IoU of vehicles on drawn streets 0-7 falls from 0.855 to 0.824, in edition 2 from 0.764 to
+    0.732."""
     most: int = 100
     """Peaks of a class that are taken, the highest."""
-    reach: float = 0.1
+    reach: float = 0.2
     """How far from a centre a pixel may point, as a share of the picture's width."""
     least: float = 2e-4
     """Smallest road user as a share of the picture: 26 pixels of 480x270."""
@@ -44,8 +48,9 @@ def group(
     numbers = np.zeros((height, width), np.uint16)
     found: list[tuple[RoadUser, Int[np.ndarray, " n"]]] = []
     for heat, kind in zip(peaks, ROAD_USERS, strict=True):
+        window = options.vehicle_window if kind == StreetClass.VEHICLE else options.window
         rows, columns = torch.nonzero(classes == kind, as_tuple=True)
-        places, heights = _centres(heat, options)
+        places, heights = _centres(heat, window, options)
         if not len(rows) or not len(places):
             continue
         places = places * torch.tensor([width / heat.shape[1], height / heat.shape[0]])
@@ -67,10 +72,11 @@ def group(
 
 
 def _centres(
-    heat: Float[Tensor, "h w"], options: GroupingOptions
+    heat: Float[Tensor, "h w"], window: tuple[int, int], options: GroupingOptions
 ) -> tuple[Float[Tensor, "n 2"], Float[Tensor, " n"]]:
     """Columns and rows of the peaks in cells, and their heights, the highest first."""
-    highest = functional.max_pool2d(heat[None], options.window, stride=1, padding=options.window // 2)[0]
+    around = window[0] // 2, window[1] // 2
+    highest = functional.max_pool2d(heat[None], window, stride=1, padding=around)[0]
     rows, columns = torch.nonzero((heat == highest) & (heat >= options.peak), as_tuple=True)
     order = heat[rows, columns].argsort(descending=True)[: options.most]
     rows, columns = rows[order], columns[order]

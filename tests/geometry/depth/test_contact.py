@@ -5,9 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dreamdrive.geometry.depth.contact import on_the_road
+from dreamdrive.geometry.options import FusionOptions
 
 HEIGHT, WIDTH, HORIZON = 60, 80, 20.0
-NONE = np.zeros(2)
+NONE, VEHICLE = np.zeros(2, bool), np.array([False, True])
 
 
 def plane() -> np.ndarray:
@@ -26,7 +27,7 @@ def standing(bottom: int, columns: slice = slice(20, 40)) -> tuple[np.ndarray, n
 @given(bottom=st.integers(34, 55))
 def test_a_block_has_the_depth_of_the_road_at_its_foot(bottom: int) -> None:
     instances, ground = standing(bottom)
-    found = on_the_road(instances, ground, plane(), 0.05, NONE)
+    found = on_the_road(instances, ground, plane(), 1.5, NONE, FusionOptions())
     assert np.allclose(found.inverse[instances == 1], (bottom + 1 - HORIZON) / 150)
     assert (found.inverse[instances == 0] == 0).all()
 
@@ -35,7 +36,7 @@ def test_the_floor_between_wheels_is_not_taken_for_a_contact() -> None:
     instances, ground = standing(45)
     instances[42:46, 25:35] = 0  # wheels left and right of it
     ground = (instances == 0) & (plane() > 0)
-    found = on_the_road(instances, ground, plane(), 0.05, NONE)
+    found = on_the_road(instances, ground, plane(), 1.5, NONE, FusionOptions())
     assert np.allclose(found.inverse[instances == 1], (46 - HORIZON) / 150)
 
 
@@ -44,24 +45,51 @@ def test_a_side_that_recedes_gets_farther() -> None:
     for column in range(20, 60):
         instances[25 : 50 - (column - 20) // 4, column] = 1
     ground = (instances == 0) & (plane() > 0)
-    found = on_the_road(instances, ground, plane(), 0.05, NONE).inverse
+    found = on_the_road(instances, ground, plane(), 1.5, NONE, FusionOptions()).inverse
     assert found[30, 22] > 1.3 * found[30, 57] > 0
 
 
 def test_nothing_is_said_where_the_foot_is_hidden() -> None:
     instances, _ = standing(45)
     nowhere = np.zeros((HEIGHT, WIDTH), bool)
-    assert not on_the_road(instances, nowhere, plane(), 0.05, NONE).inverse.any()
+    assert not on_the_road(instances, nowhere, plane(), 1.5, NONE, FusionOptions()).inverse.any()
     cut_off, ground = standing(HEIGHT - 1)
-    assert not on_the_road(cut_off, ground, plane(), 0.05, NONE).inverse.any()
+    assert not on_the_road(cut_off, ground, plane(), 1.5, NONE, FusionOptions()).inverse.any()
 
 
 def test_far_contacts_are_less_sure() -> None:
-    near, far = (on_the_road(*standing(bottom), plane(), 0.05, NONE) for bottom in (50, 34))
+    near, far = (on_the_road(*standing(bottom), plane(), 1.5, NONE, FusionOptions()) for bottom in (50, 34))
     assert 0.05 < near.spread.max() < far.spread.max()
 
 
 def test_a_bumper_is_nearer_than_the_wheels() -> None:
     instances, ground = standing(45)
-    found = on_the_road(instances, ground, plane(), 0.05, np.array([0, 0.4]))
-    assert np.allclose(1 / found.inverse[instances == 1], 150 / (46 - HORIZON) - 0.4)
+    found = on_the_road(instances, ground, plane(), 1.5, VEHICLE, FusionOptions())
+    depth_m = 150 / (46 - HORIZON)
+    tall_m = 13 * depth_m / 100
+    assert np.allclose(1 / found.inverse[instances == 1], depth_m - FusionOptions().end_overhang * tall_m)
+
+
+def test_sides_are_hardly_nearer_than_the_wheels() -> None:
+    instances = np.zeros((HEIGHT, WIDTH), np.int32)
+    for column in range(42, 60):
+        instances[15 : 24 + (column - 40), column] = 1
+    ground = (instances == 0) & (plane() > 0)
+    wheels, surface = (
+        1 / on_the_road(instances, ground, plane(), 1.5, kind, FusionOptions()).inverse[16, 44:58]
+        for kind in (NONE, VEHICLE)
+    )
+    assert (surface < wheels).all()
+    end_m = (
+        wheels
+        - 1
+        / on_the_road(
+            instances,
+            ground,
+            plane(),
+            1.5,
+            VEHICLE,
+            FusionOptions(side_overhang=FusionOptions().end_overhang),
+        ).inverse[16, 44:58]
+    )
+    assert (wheels - surface < 0.5 * end_m).all()

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
+from dreamdrive.geometry.options import FusionOptions
 from dreamdrive.scene.windows import grown
 
 _LEAST_PX = 8  # of a thing that is given a depth
@@ -31,8 +32,9 @@ def on_the_road(
     instances: Integer[np.ndarray, "h w"],
     ground: Bool[np.ndarray, "h w"],
     plane_inverse: Float[np.ndarray, "h w"],
-    least_spread: float,
-    overhang_m: Float[np.ndarray, " n"],
+    camera_height_m: float,
+    is_vehicle: Bool[np.ndarray, " n"],
+    options: FusionOptions,
 ) -> Contact:
     """Every column of a road user gets the depth at which it meets the road.
 
@@ -40,8 +42,8 @@ def on_the_road(
     the outline, taken of those columns in which the ground is seen right below. Columns between these are on
     the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing.
 
-    ``overhang_m`` has for each label, 0 included, by how much its surface is nearer than its contact: bumpers
-    reach out beyond the wheels.
+    ``plane_inverse`` is inverse depth of the road in 1/m, ``camera_height_m`` above which the camera is;
+    ``is_vehicle`` has a flag for each label, 0 included. The surface of a vehicle is nearer than its contact.
     """
     height, width = instances.shape
     inverse, spread = np.zeros((2, height, width), np.float32)
@@ -56,13 +58,19 @@ def on_the_road(
         if seen.sum() < max(_SEEN_COLUMNS, _SEEN_SHARE * len(columns)):
             continue
         foot = _hull(columns[seen], lowest[seen] + 1, columns)
-        contact = _nearer(_at_rows(plane_inverse, foot, columns), overhang_m[label])
-        higher = _nearer(_at_rows(plane_inverse, foot - 1, columns), overhang_m[label])
-        off = _ROW_PX * (contact - higher) / np.maximum(contact, 1e-6)
+        contact = _at_rows(plane_inverse, foot, columns)
+        a_row = (contact - _at_rows(plane_inverse, foot - 1, columns)) / np.maximum(contact, 1e-6)
         near = contact > _LEAST_INVERSE
+        if not near.any():
+            continue
+        # A row is that share of the camera's height at the distance of the foot.
+        row_m = camera_height_m * a_row
+        if is_vehicle[label]:
+            tall_m = float(((foot - mask[:, columns].argmax(axis=0)) * row_m)[near].max())
+            contact = _overhanging(contact, (columns + 0.5 - width / 2) * row_m, tall_m, options)
         place = np.zeros((2, width), np.float32)
         place[0, columns[near]] = contact[near]
-        place[1, columns[near]] = np.hypot(off[near], least_spread)
+        place[1, columns[near]] = np.hypot(_ROW_PX * a_row[near], options.contact_spread)
         inverse[mask] = np.broadcast_to(place[0], mask.shape)[mask]
         spread[mask] = np.broadcast_to(place[1], mask.shape)[mask]
     return Contact(inverse, spread)
@@ -78,9 +86,19 @@ def _at_rows(
     return (1 - share) * image[above, columns] + share * image[above + 1, columns]
 
 
-def _nearer(inverse: Float[np.ndarray, " n"], by_m: float) -> Float[np.ndarray, " n"]:
-    """Inverse depth of what is so many metres nearer, at most half of the way."""
-    return inverse / np.maximum(1 - by_m * inverse, 0.5)
+def _overhanging(
+    contact: Float[np.ndarray, " n"], right_m: Float[np.ndarray, " n"], tall_m: float, options: FusionOptions
+) -> Float[np.ndarray, " n"]:
+    """Inverse depth of a vehicle above a line of contact: bumpers reach out beyond the wheels, sides little.
+
+    The line is at inverse depths ``contact`` in 1/m, and ``right_m`` right of the camera.
+    """
+    if len(contact) < 2:
+        return contact
+    along, across = np.gradient(1 / np.maximum(contact, 1e-6)), np.gradient(right_m)
+    facing = across**2 / np.maximum(across**2 + along**2, 1e-12)
+    by_m = tall_m * (options.end_overhang * facing + options.side_overhang * (1 - facing))
+    return contact / np.maximum(1 - by_m * contact, 0.5)
 
 
 def _hull(

@@ -70,7 +70,7 @@ def fused(
             ),
             inverse[frame],
             confidence[frame],
-            Plane(view.plane_inverse[frame], tilt_rad / height_m),
+            Plane(view.plane_inverse[frame], tilt_rad / height_m, height_m),
             view.usable[frame],
             view.options.fusion,
         )
@@ -84,10 +84,14 @@ def fused(
 
 @dataclass(frozen=True)
 class Plane:
-    """The road's plane in one frame: inverse depth in 1/m, and its relative spread a metre of depth."""
+    """The road's plane in one frame: inverse depth in 1/m, and its relative spread a metre of depth.
+
+    The camera is ``height_m`` above it.
+    """
 
     inverse: Float[np.ndarray, "h w"]
     spread_per_m: float = 0.0
+    height_m: float = _USUAL_HEIGHT_M
 
     @property
     def spread(self) -> Float[np.ndarray, "h w"]:
@@ -140,8 +144,7 @@ def fuse(
     flat = road & ~(stereo & believed) & (level_spread < spread)
     log_depth[flat], spread[flat] = level[flat], level_spread[flat]
     ground = np.isin(seen.classes, _GROUND)
-    overhang = np.where(seen.is_vehicle(), options.overhang_m, 0)
-    contact = on_the_road(seen.instances, ground, plane.inverse, options.contact_spread, overhang)
+    contact = on_the_road(seen.instances, ground, plane.inverse, plane.height_m, seen.is_vehicle(), options)
     contact_spread = np.hypot(contact.spread, plane.spread_per_m / np.maximum(contact.inverse, 1e-4))
     standing = (contact.inverse > 0) & shown & ((plane.spread_per_m == 0) | (contact_spread < spread))
     log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact_spread[standing]
