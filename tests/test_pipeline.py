@@ -241,7 +241,8 @@ def spoiled(value: object) -> object:
         return replace(value, rig=(value.rig[0].resized(32, 20),))
     if isinstance(value, Geometry):
         short = {
-            name: getattr(value, name)[1:] for name in ("cameras", "depth_m", "confidence", "sky", "moving")
+            name: getattr(value, name)[1:]
+            for name in ("cameras", "depth_m", "confidence", "sky", "moving", "spread", "users")
         }
         return replace(value, **short)
     if isinstance(value, Gaussians):

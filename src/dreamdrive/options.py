@@ -6,7 +6,7 @@ from dreamdrive.choices import DeviceName, MethodName, QualityName, Representati
 from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.knowledge import NO_KNOWLEDGE
+from dreamdrive.knowledge import SHIPPED
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
 
 
@@ -42,7 +42,7 @@ class Options:
     representation: RepresentationName = "hybrid"
     device: DeviceName = "cpu"
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
-    knowledge: str = NO_KNOWLEDGE
+    knowledge: str = SHIPPED
     method: MethodName = "dreamdrive"
     seed: int = 0
 

@@ -1,5 +1,9 @@
-"""The network by name and by file."""
+"""The network by name and by file, and what the weights that ship answer.
 
+After new weights ``python tests/knowledge/test_shipped.py`` writes their answers anew.
+"""
+
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +13,12 @@ import torch
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import LookOptions, load_knowledge, look, shipped
 from dreamdrive.knowledge.network import StreetNetwork
-from dreamdrive.knowledge.weights import Training, write_network
+from dreamdrive.knowledge.training.drawn import CLASS_OF
+from dreamdrive.knowledge.weights import Training, read_network, write_network
+from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.world import Drive, make_street
+
+ANSWERS = Path(__file__).with_name("shipped.json")
 
 
 @pytest.fixture
@@ -42,3 +51,57 @@ def test_missing_weights_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "text.safetensors").write_text("nothing")
     with pytest.raises(InputError, match="missing or damaged"):
         load_knowledge(tmp_path / "text.safetensors")
+
+
+def street() -> Drive:
+    return make_street(0, 1, 1.0, (320, 180), edition=2)
+
+
+def answers(drive: Drive) -> dict[str, list[float]]:
+    """Depth and classes on a grid, road users and the camera: what any slip in the network would change."""
+    seen = look(drive.frames, options=LookOptions(width_px=320))
+    camera = seen.camera
+    return {
+        "depth": seen.depth[0, 10::20, 10::20].ravel().tolist(),
+        "spread": seen.spread[0, 10::20, 10::20].ravel().tolist(),
+        "classes": [float((seen.classes == each).mean()) for each in StreetClass],
+        "users": [len(seen.road_users[0])],
+        "camera": [camera.focal_px, camera.horizon_px, camera.roll_rad, camera.focal_spread],
+    }
+
+
+def test_the_weights_that_ship_answer_as_before() -> None:
+    wanted = json.loads(ANSWERS.read_text())
+    found = answers(street())
+    assert found["classes"] == pytest.approx(wanted["classes"], abs=2e-3)
+    assert found["users"] == wanted["users"]
+    assert found["camera"] == pytest.approx(wanted["camera"], rel=0.01, abs=1e-3)
+    for name in ("depth", "spread"):
+        one, other = np.array(found[name]), np.array(wanted[name])
+        # Where two classes are as likely, rounding decides.
+        assert (np.abs(one - other) <= 0.01 * np.abs(other) + 1e-3).mean() > 0.97
+
+
+def test_the_weights_that_ship_know_a_street() -> None:
+    drive = street()
+    seen = look(drive.frames)
+    true_m, depth, sky = drive.depth_m[0], seen.depth[0], CLASS_OF[drive.semantic[0]] == StreetClass.SKY
+    near = (true_m > 2) & (true_m < 80) & (depth > 0)
+    ratio = np.log(true_m[near] / depth[near])
+    assert np.median(np.abs(ratio - np.median(ratio))) < 0.15
+    assert (seen.classes[0][sky] == StreetClass.SKY).mean() > 0.9
+
+
+def test_the_weights_that_ship_are_small_and_say_what_they_were_trained_on() -> None:
+    path = shipped.weights_of()
+    assert path.stat().st_size < 12e6
+    network, training = read_network(path)
+    assert sum(each.numel() for each in network.parameters()) < 6e6
+    assert training.data
+    assert training.steps > 0
+    assert len(training.commit) >= 7
+    assert training.licence
+
+
+if __name__ == "__main__":
+    ANSWERS.write_text(json.dumps(answers(street()), indent=1) + "\n")

@@ -70,7 +70,7 @@ def generate(
             model that the hub's cache holds. Nothing is ever downloaded.
         geometry_weights: Weights of the geometry's network, where the prior has one too.
         knowledge: Weights of the street network, which sees depth, classes and road users in each frame:
-            street are those that ship, none asks no network.
+            street, the default, are those that ship, none asks no network.
         quality: How many steps the fits take.
         method: dreamdrive is ours; paper takes the equations of the DreamDrive paper as printed.
         frames: Frames of the input to use, counted from 0.
