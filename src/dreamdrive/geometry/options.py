@@ -67,8 +67,9 @@ class FusionOptions:
         contact_spread: Of the depth of a road user that its contact with the road gives, beside that of the
             row in which it is seen.
         end_overhang: By how much front and rear of a vehicle are nearer than their line of contact with the
-            road, in shares of the vehicle's height. On drawn streets 0-13 it is 0.7 m where they are 1.5 m
-            high and 1.5 m where they are 3.4 m.
+            road, in shares of the vehicle's height. Of the points on PandaSet's vehicles 25 % are more than
+            10 % off with 0, 15 % with 0.25, 16 % with 0.33 and 20 % with 0.45; of standing vehicles on drawn
+            streets 1-3 it is 36, 17, 17 and 18 %.
         side_overhang: The same of its sides.
         user_stereo: Log depth by which sure stereo on a road user may differ from its contact.
         user_spread: Of such stereo.
@@ -82,8 +83,8 @@ class FusionOptions:
     stereo_spread: float = 0.013
     least_spread: float = 0.05
     contact_spread: float = 0.06
-    end_overhang: float = 0.45
-    side_overhang: float = 0.12
+    end_overhang: float = 0.3
+    side_overhang: float = 0.1
     user_stereo: float = 0.12
     user_spread: float = 0.05
 
