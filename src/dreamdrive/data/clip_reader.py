@@ -107,7 +107,11 @@ def read_clip(
         held_out=held_out_mask(len(index), hold_out),
         source_index=index,
         features={} if given is None else given.cropped(sampler.sizing, sampler.lens, features),
-        known=Known(world_from_camera=known_poses, intrinsics=sampler.calibration.known),
+        known=Known(
+            world_from_camera=known_poses,
+            intrinsics=sampler.calibration.known,
+            focal=intrinsics is not None or hfov_deg is not None,
+        ),
         requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
         cuts=tuple(cut.first for cut in found.cuts),
         recorded=_recorded(source, sampler),

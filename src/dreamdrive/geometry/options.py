@@ -61,6 +61,7 @@ class FusionOptions:
         hinted: Confidence from which it counts where it is near the aligned depth.
         sure_spreads: Spreads of the aligned depth beyond which even sure stereo is not believed.
         hinted_spreads: Spreads within which hinted stereo is.
+        far_m: Aligned depth from which sure stereo is believed that it is farther still.
         reach: Part of the image width over which the network's scale is carried from sure pixels.
         stereo_spread: Of stereo that is believed, and of the road.
         least_spread: Of the network, at least.
@@ -80,6 +81,7 @@ class FusionOptions:
     sure_spreads: float = 4.0
     hinted_spreads: float = 1.5
     reach: float = 0.05
+    far_m: float = 30.0
     stereo_spread: float = 0.013
     least_spread: float = 0.05
     contact_spread: float = 0.06

@@ -23,6 +23,7 @@ class Known:
     Attributes:
         world_from_camera: Poses (F, 4, 4) in metres, unless ``metric`` says otherwise.
         intrinsics: Whether the rig's focal length and principal point are calibrated (not guessed).
+        focal: Whether somebody told the field of view at least: it may be corrected by what turning shows.
         depth_m: Depth along z (F, H, W) in metres; 0 where unknown.
         sky: Sky masks (F, H, W).
         metric: Whether poses, depth and points are in metres; otherwise all share a unit that is not known.
@@ -40,6 +41,7 @@ class Known:
     points: Float[np.ndarray, "p 3"] | None = None
     ground: Ground | None = None
     generated: bool = False
+    focal: bool = False
 
 
 @dataclass(frozen=True)

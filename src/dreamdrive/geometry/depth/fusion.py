@@ -139,6 +139,8 @@ def fuse(
     stereo = shown & ~users & (swept_inverse > 1 / _FARTHEST_M)
     believed = (confidence >= options.sure) & (off < options.sure_spreads * spread + 0.1)
     believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
+    # Of what is far the network knows only that it is far; its parallax tells how far.
+    believed |= (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
     log_depth = np.where(stereo & believed, swept, aligned)
     spread = np.where(stereo & believed, options.stereo_spread, spread)
     flat = road & ~(stereo & believed) & (level_spread < spread)
