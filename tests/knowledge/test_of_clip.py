@@ -33,7 +33,7 @@ def test_a_lens_of_which_nothing_is_told_is_the_one_that_is_seen(clip: Clip) -> 
     assert with_looks(clip, ()) == clip
 
 
-@pytest.mark.parametrize("known", [Known(intrinsics=True), Known(focal=True)])
+@pytest.mark.parametrize("known", [Known(intrinsics=True), Known(hfov=True)])
 def test_a_lens_that_is_told_is_kept(clip: Clip, known: Known) -> None:
     told = replace(clip, known=known)
     (look,) = looks = look_at(told, "street")

@@ -36,7 +36,7 @@ def consistency(
 
     asked = None if trajectory is None else read_trajectory(trajectory)
     clip = read_clip(video, fps=fps, intrinsics=intrinsics, hfov_deg=hfov)
-    known = clip.known.intrinsics or hfov is not None
+    known = clip.known.focal
     console = Console()
     with console.status("looking for the path and following the pixels"):
         figures = evaluate_consistency(

@@ -107,11 +107,11 @@ def _read(
             raise InputError(f"--frames {frames}: {path} is one photo; give --frames with a clip")
         wanted = choose_size(read_image(path).size, size).target
         photo = read_photo(path, wanted, intrinsics, hfov)
-        focal_px = photo.camera.fx_px if photo.calibrated or hfov is not None else None
+        focal_px = photo.camera.fx_px if photo.calibrated or photo.hfov else None
         notes = _without_guesses(photo.notes)
         return _Pictures(photo.rgb[None], focal_px, [{"source_index": 0, "time_s": 0.0}], notes)
     clip = read_clip(path, frames=frames, size=size, intrinsics=intrinsics, hfov_deg=hfov)
-    focal_px = clip.rig[0].fx_px if clip.known.intrinsics or hfov is not None else None
+    focal_px = clip.rig[0].fx_px if clip.known.focal else None
     rows = zip(clip.source_index.tolist(), clip.times_s.tolist(), strict=True)
     each = [{"source_index": index, "time_s": time_s} for index, time_s in rows]
     return _Pictures(clip.frames, focal_px, each, _without_guesses(clip.provenance["notes"]))

@@ -110,7 +110,7 @@ def read_clip(
         known=Known(
             world_from_camera=known_poses,
             intrinsics=sampler.calibration.known,
-            focal=intrinsics is not None or hfov_deg is not None,
+            hfov=sampler.calibration.hfov,
         ),
         requested=None if asked is None else Trajectory(asked, times_s - times_s[0]),
         cuts=tuple(cut.first for cut in found.cuts),

@@ -26,13 +26,14 @@ class Calibration:
     """The camera that took the source, with sentences for the report.
 
     The pinhole is at the source's size; there is no distortion or it is unknown where it is None. ``known``
-    tells a calibration file from a guess.
+    tells a calibration file from a guess, ``hfov`` a guess from a field of view that was told.
     """
 
     camera: Camera
     distortion: Distortion | None
     known: bool
     notes: tuple[str, ...]
+    hfov: bool = False
 
 
 def calibration(size: tuple[int, int], intrinsics: Path | None, hfov_deg: float | None) -> Calibration:
@@ -54,7 +55,8 @@ def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibr
         focal = 0.5 * width / tan(radians(hfov_deg) / 2)
         said = f"No calibration: the focal length follows from --hfov, {hfov_deg:g} degrees."
     camera = Camera(focal, focal, width / 2, height / 2, width, height)
-    return Calibration(camera, None, False, (said, "The lens distortion is unknown and taken as zero."))
+    notes = said, "The lens distortion is unknown and taken as zero."
+    return Calibration(camera, None, False, notes, hfov_deg is not None)
 
 
 def read_intrinsics(path: Path, size: tuple[int, int]) -> Calibration:

@@ -26,13 +26,14 @@ _HALF_STEP = 0.5 + _ROUNDING
 class Photo:
     """A picture of a street as a pinhole at the identity sees it, with sentences for the report.
 
-    ``calibrated`` tells a calibrated pinhole from a guess.
+    ``calibrated`` tells a calibrated pinhole from a guess, ``hfov`` a guess from a told field of view.
     """
 
     rgb: UInt8[np.ndarray, "h w 3"]
     camera: Camera
     calibrated: bool
     notes: tuple[str, ...]
+    hfov: bool = False
 
 
 def read_photo(
@@ -58,7 +59,7 @@ def read_photo(
         notes.append(f"{100 * cut:.0f} % of the photo was cut away to fit the model's {size[0]}x{size[1]}.")
     if sizing.shrink < 1:
         notes.append(f"The photo was enlarged {1 / sizing.shrink:.2f} times; it holds no more detail.")
-    return Photo(rgb, camera, known.known, (*raw.notes, *known.notes, *notes))
+    return Photo(rgb, camera, known.known, (*raw.notes, *known.notes, *notes), known.hfov)
 
 
 def is_photo(path: Path) -> bool:

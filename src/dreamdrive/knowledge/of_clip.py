@@ -25,14 +25,14 @@ def look_at(clip: Clip, knowledge: str, work: Work = Work()) -> tuple[Look, ...]
         def tell(done: int, _: int, before: int = before) -> None:
             work(before + done, len(clip))
 
-        focal_px = camera.fx_px if clip.known.intrinsics or clip.known.focal else None
+        focal_px = camera.fx_px if clip.known.focal else None
         looks.append(look(frames, network, focal_px=focal_px, tell=tell))
     return tuple(looks)
 
 
 def with_looks(clip: Clip, looks: tuple[Look, ...]) -> Clip:
     """The clip with what is seen in it; a camera of which nothing is told gets the focal length seen."""
-    if not looks or clip.known.intrinsics or clip.known.focal:
+    if not looks or clip.known.focal:
         return replace(clip, looks=looks)
     rig = tuple(_guessed(camera, seen.camera) for camera, seen in zip(clip.rig, looks, strict=True))
     return replace(clip, looks=looks, rig=rig)

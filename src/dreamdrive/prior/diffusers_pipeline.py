@@ -141,7 +141,7 @@ def make_clip(
         held_out=held_out_mask(len(index), control.hold_out),
         source_index=index,
         features={"appearance": appearance(frames, valid)},
-        known=Known(intrinsics=photo.calibrated and same),
+        known=Known(intrinsics=photo.calibrated and same, hfov=photo.hfov and same),
         requested=requested,
         provenance={**provenance, "notes": notes},
     )

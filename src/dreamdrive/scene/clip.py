@@ -23,7 +23,6 @@ class Known:
     Attributes:
         world_from_camera: Poses (F, 4, 4) in metres, unless ``metric`` says otherwise.
         intrinsics: Whether the rig's focal length and principal point are calibrated (not guessed).
-        focal: Whether somebody told the field of view at least: it may be corrected by what turning shows.
         depth_m: Depth along z (F, H, W) in metres; 0 where unknown.
         sky: Sky masks (F, H, W).
         metric: Whether poses, depth and points are in metres; otherwise all share a unit that is not known.
@@ -31,6 +30,7 @@ class Known:
         ground: The road plane, in the world of the poses.
         generated: Whether a model drew the frames for these poses, or for the rig's mountings: that the
             frames show something else is then no mistake of the user's.
+        hfov: Whether the field of view at least was told; what turning shows may correct it.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
@@ -41,7 +41,12 @@ class Known:
     points: Float[np.ndarray, "p 3"] | None = None
     ground: Ground | None = None
     generated: bool = False
-    focal: bool = False
+    hfov: bool = False
+
+    @property
+    def focal(self) -> bool:
+        """Whether the focal length was told, by a calibration or a field of view."""
+        return self.intrinsics or self.hfov
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,18 @@ def test_stereo_that_contradicts_its_surroundings_is_not_believed() -> None:
     assert street.off(street.fused(wrong), hole) < 0.15
 
 
+def test_of_what_is_far_sure_parallax_is_believed() -> None:
+    street = Street()
+    tower = np.zeros((HEIGHT, WIDTH), bool)
+    tower[8:16, 40:50] = True
+    street.confidence[(street.classes == StreetClass.STRUCTURE) & ~tower] = 0.9
+    street.confidence[tower] = 0.9
+    swept = np.where(tower, 1 / 140, street.inverse).astype(np.float32)
+    assert (street.fused(swept).inverse[tower] > 1 / 30).all()  # the network sees the wall at 20 m
+    street.network *= np.where(tower, 2.2, 1)
+    assert np.allclose(street.fused(swept).inverse[tower], 1 / 140, rtol=1e-3)
+
+
 def test_a_car_has_the_depth_of_its_contact_whatever_stereo_says() -> None:
     street = Street()
     street.confidence[:] = 0.9

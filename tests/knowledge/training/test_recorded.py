@@ -144,7 +144,7 @@ def test_points_on_the_road_lie_below_the_horizon_by_the_camera_height(
 ) -> None:
     folder, front = data_dir / "training" / "pandaset_002", data_dir / "clips" / "pandaset_002"
     if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
+        pytest.skip(f"DREAMDRIVE_DATA ({data_dir}) lacks training/pandaset_002")
     records = pandaset_records(folder, front, tmp_path, 2.1)
     assert len(records) == 103
     for record in records[::8]:

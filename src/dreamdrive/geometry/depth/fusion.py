@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Integer
 from dreamdrive.geometry.depth.contact import on_the_road
 from dreamdrive.geometry.depth.view import View, by_frame
 from dreamdrive.geometry.options import FusionOptions
+from dreamdrive.geometry.road import scale
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
@@ -17,7 +18,6 @@ _GROUND = (*_PAVED, StreetClass.GROUND)
 _NEAREST_M, _FARTHEST_M = 0.5, 500.0
 _FAR_INVERSE = 1 / 150  # 1/m; farther away stereo anchors nothing
 _ROAD_INVERSE = 1 / 150
-_USUAL_HEIGHT_M = 1.5  # of a camera above the road
 _FEW = 50  # sure pixels, from which on the network can be aligned
 _ODD = 1.0  # of log depth: a pixel that far from all others anchors nothing
 _COARSE = 0.12  # of the image width
@@ -58,7 +58,7 @@ def fused(
     Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
     ``tilt_rad`` is the standard deviation of the tilt of the road's plane.
     """
-    height_m = _USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
+    height_m = scale.USUAL_HEIGHT_M if view.ground is None else view.ground.offset_m
 
     def one(frame: int) -> Fused:
         return fuse(
@@ -91,7 +91,7 @@ class Plane:
 
     inverse: Float[np.ndarray, "h w"]
     spread_per_m: float = 0.0
-    height_m: float = _USUAL_HEIGHT_M
+    height_m: float = scale.USUAL_HEIGHT_M
 
     @property
     def spread(self) -> Float[np.ndarray, "h w"]:

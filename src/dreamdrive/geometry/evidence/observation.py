@@ -52,7 +52,7 @@ def observe(clip: Clip) -> Evidence:
         fixed = masks.with_own_car(fixed, np.median(clip.look.own_car, axis=0) > 0)
     street = valid & ~users & ~resized(((fixed.regions > 0) | fixed.objects)[None], size)
     detected = masks.describe(fixed)
-    if clip.look is not None and not (clip.known.intrinsics or clip.known.focal):
+    if clip.look is not None and not clip.known.focal:
         detected.append(
             f"the street network sees a field of view of {np.degrees(clip.look.camera.hfov_rad):.0f} "
             f"degrees, give or take {100 * clip.look.camera.focal_spread:.0f} %: it is taken unless turning "

@@ -83,7 +83,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
         source_index=wanted,
         features={"appearance": appearance(frames, valid), f"{kind.name}:{BLOCK}": features},
         latents=latents.permute(0, 2, 3, 1).contiguous().numpy(),
-        known=Known(intrinsics=leading.calibration.known),
+        known=Known(intrinsics=leading.calibration.known, hfov=leading.calibration.hfov),
         requested=asked,
         provenance=_provenance(kind, control, leading, steps, len(spans), noticed),
     )
