@@ -20,6 +20,7 @@ from dreamdrive.geometry.depth import (
     sweep_frames,
     temporal_neighbours,
     unheard,
+    with_stereo,
 )
 from dreamdrive.geometry.moving import (
     FLAGGED,
@@ -27,6 +28,7 @@ from dreamdrive.geometry.moving import (
     moving_evidence,
     neighbour_flows,
     standing_evidence,
+    too_near,
     whole_users,
 )
 from dreamdrive.geometry.options import GeometryOptions
@@ -69,7 +71,7 @@ def densify(
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
-    look, spread, users = clip.look, None, None
+    look, found, users = clip.look, None, None
     with single_threaded_opencv():
         sky = _sky(clip, view)
         if clip.known.depth_m is not None:
@@ -87,7 +89,7 @@ def densify(
         if look is not None and not given:
             # Where no motion shows the road, its tilt is that of the horizon that the network sees.
             tilt_rad = look.camera.horizon_spread_px / look.camera.focal_px if rough else 0.0
-            inverse, confidence, spread = fused(view, look, inverse, confidence, tilt_rad)
+            found = fused(view, look, inverse, confidence, tilt_rad)
         flows: dict[int, list[PairFlow]] = {}
         if posed.standing:
             moving = standing_evidence(view)
@@ -95,15 +97,18 @@ def densify(
             moving = np.zeros(inverse.shape, np.float32)
         else:
             flows = neighbour_flows(view)
-            moving = moving_evidence(view, flows, inverse, sky, given)
+            likely = inverse if found is None else found.inverse
+            moving = moving_evidence(view, flows, likely, sky, given)
         moving = moving * ~sky
-        if look is not None and spread is not None:
-            moving, users = whole_users(view, look, flows, moving, inverse, spread, clip.times_s)
-        if spread is not None:
-            inverse = settled_in_time(view, inverse, spread, moving < FLAGGED)
+        if look is not None and found is not None:
+            nearer = too_near(found.inverse, inverse, confidence, options.users)
+            moving, users = whole_users(view, look, flows, moving, nearer)
+            still = moving < FLAGGED
+            found = with_stereo(view, found, still & (users > 0), inverse, confidence)
+            inverse, confidence = settled_in_time(view, found.inverse, found.spread, still), found.confidence
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    return _geometry(posed, view, inverse, confidence, sky, moving, spread, users)
+    return _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:

@@ -7,7 +7,8 @@ from tests.geometry import toy
 from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.depth import make_view
-from dreamdrive.geometry.moving import FLAGGED, whole_users
+from dreamdrive.geometry.moving import FLAGGED, too_near, whole_users
+from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.look import Look
 
 FRAMES = 6
@@ -34,14 +35,11 @@ class Scene:
             confidence=np.ones(shape, np.float16),
             instances=self.block.astype(np.uint16),
         )
-        self.inverse = np.full(shape, 0.1, np.float32)
-        self.spread = np.full(shape, 0.05, np.float32)
+        self.nearer = np.zeros(shape, bool)
 
     def found(self, evidence: np.ndarray) -> np.ndarray:
         """What is flagged in the end."""
-        times = np.arange(FRAMES) / 10
-        whole, _ = whole_users(self.view, self.look, {}, evidence, self.inverse, self.spread, times)
-        return whole >= FLAGGED
+        return whole_users(self.view, self.look, {}, evidence, self.nearer)[0] >= FLAGGED
 
 
 def test_a_user_of_which_enough_is_flagged_moves_in_all_frames() -> None:
@@ -57,22 +55,27 @@ def test_a_user_of_which_little_is_flagged_stands() -> None:
     scene = Scene()
     evidence = np.zeros(scene.block.shape, np.float32)
     evidence[3][scene.block[3]] = 0.8
-    scene.inverse[:] = 0  # no depth, and so no place
     assert not scene.found(evidence).any()
 
 
 def test_what_is_surely_street_does_not_move() -> None:
     scene = Scene()
-    scene.inverse[:] = 0
     assert not scene.found(np.where(scene.block, 0, 0.9).astype(np.float32)).any()
     doubtful = replace(scene.look, confidence=np.full(scene.block.shape, 0.4, np.float16))
     scene.look = doubtful
     assert scene.found(np.where(scene.block, 0, 0.9).astype(np.float32))[scene.view.frames[0]].any()
 
 
-def test_a_foot_that_goes_with_the_camera_moves() -> None:
+def test_a_user_that_stereo_sees_before_its_foot_moves() -> None:
     scene = Scene()
-    steps = np.diff([camera.world_from_camera[2, 3] for camera in scene.view.cameras])
-    assert (steps > 0.6).all()  # 10 Hz: faster than 6 m/s
+    scene.nearer[:3] = scene.block[:3]  # half of the frames
     flagged = scene.found(np.zeros(scene.block.shape, np.float32))
     assert (flagged[list(scene.view.frames)] == scene.block[list(scene.view.frames)]).all()
+
+
+def test_stereo_contradicts_contact_where_it_is_sure_and_near() -> None:
+    metres = np.array([[[20.0, 20.0, 20.0, 90.0]]], np.float32)
+    stereo = np.array([[[10.0, 15.0, 10.0, 45.0]]], np.float32)
+    confidence = np.array([[[0.9, 0.9, 0.1, 0.9]]], np.float32)
+    found = too_near(1 / metres, 1 / stereo, confidence, UserOptions())
+    assert found.tolist() == [[[True, False, False, False]]]

@@ -1,5 +1,6 @@
 """One depth from all that know something of it: stereo, the road, contact with it, and the street network."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -46,14 +47,23 @@ class Seen:
         return 2 * np.bincount(labels, weights=of_vehicle) > np.bincount(labels)
 
 
+@dataclass(frozen=True)
+class Fused:
+    """Inverse depth in 1/m, 0 where there is none; trust in [0, 1]; the depth's relative spread, 0 there."""
+
+    inverse: Float[np.ndarray, "*f h w"]
+    confidence: Float[np.ndarray, "*f h w"]
+    spread: Float[np.ndarray, "*f h w"]
+
+
 def fused(
     view: View,
     look: Look,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
     tilt_rad: float = 0.0,
-) -> tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]]:
-    """Inverse depth in 1/m, trust in it, and its relative spread, of every used frame.
+) -> Fused:
+    """The depth of every used frame.
 
     Inverse depth and confidence are those of stereo or of a network that measures; 0 where there is none.
     ``tilt_rad`` is the standard deviation of the tilt of the road's plane.
@@ -75,11 +85,44 @@ def fused(
             view.options.fusion,
         )
 
-    found = by_frame(view, one)
-    depth, trust, spread = (np.zeros_like(inverse, dtype=np.float32) for _ in range(3))
+    return _of_frames(by_frame(view, one), len(inverse))
+
+
+def with_stereo(
+    view: View,
+    found: Fused,
+    standing: Bool[np.ndarray, "f h w"],
+    swept_inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+) -> Fused:
+    """The depth of every used frame, with stereo where it is sure of standing road users, near their contact.
+
+    What lies between such pixels follows them: a car has no steps.
+    """
+    options = view.options.fusion
+
+    def one(frame: int) -> Fused:
+        inverse, sure, stands = found.inverse[frame], confidence[frame], standing[frame]
+        off = _log_depth(swept_inverse[frame]) - _log_depth(inverse)
+        near = stands & (inverse > 0) & (sure >= options.sure) & (np.abs(off) < options.user_stereo)
+        off = np.where(near, off, 0)
+        follow = _carried(off, sure * near, np.zeros_like(off), options.user_reach * off.shape[1])
+        return Fused(
+            inverse * np.exp(-np.where(near, off, follow * stands)),
+            np.where(near, sure, found.confidence[frame]),
+            np.where(near, np.float32(options.user_spread), found.spread[frame]),
+        )
+
+    return _of_frames(by_frame(view, one), len(found.inverse))
+
+
+def _of_frames(found: Mapping[int, Fused], count: int) -> Fused:
+    """The maps of all frames; 0 in those that are not used."""
+    shape = count, *next(iter(found.values())).inverse.shape
+    depth, trust, spread = (np.zeros(shape, np.float32) for _ in range(3))
     for frame, each in found.items():
         depth[frame], trust[frame], spread[frame] = each.inverse, each.confidence, each.spread
-    return depth, trust, spread
+    return Fused(depth, trust, spread)
 
 
 @dataclass(frozen=True)
@@ -97,15 +140,6 @@ class Plane:
     def spread(self) -> Float[np.ndarray, "h w"]:
         """Relative spread of the depth that comes from the tilt."""
         return self.spread_per_m / np.maximum(self.inverse, 1e-4)
-
-
-@dataclass(frozen=True)
-class Fused:
-    """Inverse depth in 1/m, 0 where there is none; trust in [0, 1]; the depth's relative spread, 0 there."""
-
-    inverse: Float[np.ndarray, "h w"]
-    confidence: Float[np.ndarray, "h w"]
-    spread: Float[np.ndarray, "h w"]
 
 
 def fuse(
@@ -140,20 +174,19 @@ def fuse(
     believed = (confidence >= options.sure) & (off < options.sure_spreads * spread + 0.1)
     believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
     # Of what is far the network knows only that it is far; its parallax tells how far.
-    believed |= (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
-    log_depth = np.where(stereo & believed, swept, aligned)
-    spread = np.where(stereo & believed, options.stereo_spread, spread)
-    flat = road & ~(stereo & believed) & (level_spread < spread)
+    far = shown & ~users & (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
+    stereo = stereo & believed | far
+    log_depth = np.where(stereo, swept, aligned)
+    spread = np.where(stereo, options.stereo_spread, spread)
+    flat = road & ~stereo & (level_spread < spread)
     log_depth[flat], spread[flat] = level[flat], level_spread[flat]
     ground = np.isin(seen.classes, _GROUND)
     contact = on_the_road(seen.instances, ground, plane.inverse, plane.height_m, seen.is_vehicle(), options)
     contact_spread = np.hypot(contact.spread, plane.spread_per_m / np.maximum(contact.inverse, 1e-4))
     standing = (contact.inverse > 0) & shown & ((plane.spread_per_m == 0) | (contact_spread < spread))
     log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact_spread[standing]
-    matched = users & shown & (confidence >= options.sure) & (np.abs(swept - log_depth) < options.user_stereo)
-    log_depth[matched], spread[matched] = swept[matched], options.user_spread
     depth = np.clip(np.exp(log_depth), _NEAREST_M, _FARTHEST_M)
-    trust = np.where(stereo & believed | matched, confidence, np.clip(_TRUSTED / spread, 0, 1))
+    trust = np.where(stereo, confidence, np.clip(_TRUSTED / spread, 0, 1))
     maps = (np.where(shown, each, 0).astype(np.float32) for each in (1 / depth, trust, spread))
     return Fused(*maps)
 

@@ -12,25 +12,34 @@ from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.look import Look
 
-_LEAST_SIGHTINGS = 4  # from which a speed is read
 _LEAST_PX = 12  # of a road user that is followed
-_FOOT_SHARE = 0.3  # of its pixels, the lowest, that tell where it stands
 _MOST_COUNTED_PX = 2000  # in one frame: a near view does not outvote many far ones
+_FARTHEST_INVERSE = 1 / 60  # 1/m; farther away contact with the road tells too little
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """A road user in one frame: its pixels, how many are flagged, and its foot on the map in metres.
-
-    ``off_m`` is the standard deviation of the place; the place is not a number where no depth is known.
-    """
+    """A road user in one frame: its pixels, and how many of them tell that it moves."""
 
     frame: int
     label: int
     pixels: int
-    flagged: int
-    place_m: Float[np.ndarray, "3"]
-    off_m: float
+    telling: int
+
+
+def too_near(
+    inverse: Float[np.ndarray, "f h w"],
+    stereo: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+    options: UserOptions,
+) -> Bool[np.ndarray, "f h w"]:
+    """Pixels that stereo puts nearer than where their road user touches the road: oncoming traffic's.
+
+    What stands has one distance. What comes agrees with stereo, too, but at another one: at half of it if it
+    is as fast as the camera. Inverse depths in 1/m are those of fusion and of stereo, with stereo's trust.
+    """
+    nearer = stereo > inverse * np.float32(np.exp(options.nearer))
+    return nearer & (inverse > _FARTHEST_INVERSE) & (confidence >= options.sure_stereo)
 
 
 def whole_users(
@@ -38,64 +47,43 @@ def whole_users(
     look: Look,
     flows: Mapping[int, Sequence[PairFlow]],
     evidence: Float[np.ndarray, "f h w"],
-    inverse: Float[np.ndarray, "f h w"],
-    spread: Float[np.ndarray, "f h w"],
-    times_s: Float[np.ndarray, " f"],
+    nearer: Bool[np.ndarray, "f h w"],
 ) -> tuple[Float[np.ndarray, "f h w"], UInt16[np.ndarray, "f h w"]]:
     """Evidence of motion in [0, 1] with each road user moving as a whole, in all its frames, or not at all.
 
     With it the number of the road user of each pixel, from 1, the same in all frames.
 
-    A road user moves if enough of its pixels do, or if its foot changes its place on the map. What surely is
-    no road user does not move.
+    A road user moves if enough of its pixels are flagged or nearer than they can be if it stands. What surely
+    is no road user does not move.
     """
     options = view.options.users
     whole, users = evidence.copy(), np.zeros(evidence.shape, np.uint16)
     for frame in view.frames:
         street = (look.instances[frame] == 0) & (look.confidence[frame] >= options.sure)
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
-    tracks = follow(view, look.instances, flows, evidence, inverse, spread)
+    tracks = follow(view, look.instances, flows, (evidence >= FLAGGED) | nearer)
     for number, track in enumerate(tracks, start=1):
-        moves = is_moving(track, times_s, options)
+        moves = is_moving(track, options)
         for seen in track:
             own = look.instances[seen.frame] == seen.label
             users[seen.frame][own] = number
             part = whole[seen.frame]
-            part[own] = np.maximum(part[own], FLAGGED) if moves else np.minimum(part[own], 0.9 * FLAGGED)
+            part[own] = 1 if moves else np.minimum(part[own], 0.9 * FLAGGED)
     return whole, users
 
 
-def is_moving(track: Sequence[Sighting], times_s: Float[np.ndarray, " f"], options: UserOptions) -> bool:
+def is_moving(track: Sequence[Sighting], options: UserOptions) -> bool:
     """Whether a road user that was followed moves."""
     counted = np.array([min(seen.pixels, _MOST_COUNTED_PX) for seen in track], np.float64)
-    share = float(counted @ [seen.flagged / seen.pixels for seen in track] / counted.sum())
-    speed, off = _speed(track, times_s)
-    return share > options.moving_share or speed - 2 * off > options.moving_m_s
-
-
-def _speed(track: Sequence[Sighting], times_s: Float[np.ndarray, " f"]) -> tuple[float, float]:
-    """Speed over the map in m/s, and its standard deviation; 0 where it is not seen often enough.
-
-    Of what stands another part is seen from each place, which looks like a few metres a second.
-    """
-    placed = [seen for seen in track if np.isfinite(seen.off_m)]
-    if len(placed) < _LEAST_SIGHTINGS:
-        return 0.0, 0.0
-    weight = 1 / np.array([seen.off_m for seen in placed])
-    times = times_s[[seen.frame for seen in placed]]
-    terms = np.stack([np.ones(len(times)), times - times.mean()], axis=1) * weight[:, None]
-    places = np.stack([seen.place_m for seen in placed]) * weight[:, None]
-    velocity = np.linalg.lstsq(terms, places, rcond=None)[0][1]
-    return float(np.linalg.norm(velocity)), float(np.sqrt(np.linalg.inv(terms.T @ terms)[1, 1]))
+    share = counted @ [seen.telling / seen.pixels for seen in track] / counted.sum()
+    return bool(share > options.moving_share)
 
 
 def follow(
     view: View,
     instances: Integer[np.ndarray, "f h w"],
     flows: Mapping[int, Sequence[PairFlow]],
-    evidence: Float[np.ndarray, "f h w"],
-    inverse: Float[np.ndarray, "f h w"],
-    spread: Float[np.ndarray, "f h w"],
+    telling: Bool[np.ndarray, "f h w"],
 ) -> list[list[Sighting]]:
     """Road users from frame to frame: each goes on as the one that it shares most pixels with."""
     tracks: list[list[Sighting]] = []
@@ -111,7 +99,8 @@ def follow(
             if track is None:
                 track = []
                 tracks.append(track)
-            track.append(_sighting(view, frame, label, instances[frame], evidence[frame], inverse, spread))
+            told = int((telling[frame] & (instances[frame] == label)).sum())
+            track.append(Sighting(frame, label, int(counts[label]), told))
             going_on[label] = track
         open_ = going_on
     return tracks
@@ -147,26 +136,3 @@ def _counts(
 ) -> Integer[np.ndarray, "n m"]:
     both = first.astype(np.intp) * shape[1] + second
     return np.bincount(both.ravel(), minlength=shape[0] * shape[1]).reshape(shape)
-
-
-def _sighting(
-    view: View,
-    frame: int,
-    label: int,
-    instances: Integer[np.ndarray, "h w"],
-    evidence: Float[np.ndarray, "h w"],
-    inverse: Float[np.ndarray, "f h w"],
-    spread: Float[np.ndarray, "f h w"],
-) -> Sighting:
-    own: Bool[np.ndarray, "h w"] = instances == label
-    rows = np.nonzero(own)[0]
-    pixels = len(rows)
-    low = own & (np.arange(len(own))[:, None] >= np.quantile(rows, 1 - _FOOT_SHARE)) & (inverse[frame] > 0)
-    place, off = np.full(3, np.nan), np.inf
-    if low.any():
-        camera = view.cameras[frame]
-        points = camera.rays()[low] / inverse[frame][low][:, None]
-        middle = np.median(points, axis=0)
-        place = camera.world_from_camera[:3, :3] @ middle + camera.world_from_camera[:3, 3]
-        off = float(np.median(spread[frame][low]) * np.linalg.norm(middle))
-    return Sighting(frame, label, pixels, int((own & (evidence >= FLAGGED)).sum()), place, off)
