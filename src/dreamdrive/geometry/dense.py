@@ -6,6 +6,7 @@ from jaxtyping import Bool, Float, UInt16
 
 from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
+    PAVED,
     Tell,
     View,
     above_horizon,
@@ -20,6 +21,7 @@ from dreamdrive.geometry.depth import (
     sweep_frames,
     temporal_neighbours,
     unheard,
+    with_outlines,
     with_stereo,
 )
 from dreamdrive.geometry.moving import (
@@ -37,8 +39,9 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
-PASSES = 7
-"""How often the frames are gone through one by one: the sweep, and six times for what moves."""
+PASSES = 11
+"""How often the frames are gone through one by one: the sweep, six times for what moves, and four times for a
+depth that the street network has a part in."""
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
@@ -106,6 +109,7 @@ def densify(
             still = moving < FLAGGED
             found = with_stereo(view, found, still & (users > 0), inverse, confidence)
             inverse, confidence = settled_in_time(view, found.inverse, found.spread, still), found.confidence
+            inverse = with_outlines(view, inverse, still & ~np.isin(look.classes, PAVED))
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from tests.geometry import toy
 
-from dreamdrive.geometry.depth.fusion import Fused, Plane, Seen, fuse
+from dreamdrive.geometry.depth import make_view
+from dreamdrive.geometry.depth.fusion import Fused, Plane, Seen, fuse, with_stereo
 from dreamdrive.geometry.options import FusionOptions
 from dreamdrive.scene.street_class import StreetClass
 
@@ -114,3 +116,34 @@ def test_a_road_of_unsure_tilt_is_believed_nearby_only() -> None:
     assert street.off(doubted, road) < 0.6 * street.off(believed, road)
     near = road & (np.arange(HEIGHT) == HEIGHT - 1)[:, None]
     assert doubted.spread[near].max() < 0.19
+
+
+def test_parallax_of_nothing_is_believed_of_what_is_far() -> None:
+    street = Street()
+    tower = np.zeros((HEIGHT, WIDTH), bool)
+    tower[8:16, 40:50] = True
+    street.network[tower] *= 4
+    street.confidence[:] = 0.9
+    swept = np.where(tower, 0, street.inverse).astype(np.float32)
+    found = street.fused(swept)
+    assert (1 / found.inverse[tower] > 300).all()
+
+
+def test_a_standing_road_user_follows_sure_stereo_near_its_contact() -> None:
+    drive = toy.drive([], count=2)
+    view = make_view(drive.clip, drive.posed.cameras, drive.posed.fixed_regions, drive.posed.ground)
+    shape = drive.depth_m.shape
+    contact = Fused(*(np.full(shape, value, np.float32) for value in (0.1, 0.5, 0.06)))
+    stereo = np.full(shape, 0.105, np.float32)
+    stereo[:, :, 30:33] = 0.2
+    sure = np.zeros(shape, np.float32)
+    sure[:, ::2] = 0.9
+    frame = view.frames[0]
+    standing = np.ones(shape, bool)
+    standing[:, :10] = False
+    found = with_stereo(view, contact, standing, stereo, sure)
+    assert found.inverse[frame, 10:, :20] == pytest.approx(0.105, rel=0.02)
+    assert found.inverse[frame, 10::2, :20] == pytest.approx(0.105)
+    assert found.inverse[frame, 10:, 31] == pytest.approx(0.105, rel=0.02)  # what is far off is not stereo's
+    assert found.inverse[frame, :10] == pytest.approx(0.1)
+    assert found.spread[frame, 10, 0] < contact.spread[frame, 10, 0]

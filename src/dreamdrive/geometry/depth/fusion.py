@@ -14,8 +14,8 @@ from dreamdrive.geometry.road import scale
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
-_PAVED = (StreetClass.ROAD, StreetClass.MARKING)
-_GROUND = (*_PAVED, StreetClass.GROUND)
+PAVED = (StreetClass.ROAD, StreetClass.MARKING)
+_GROUND = (*PAVED, StreetClass.GROUND)
 _NEAREST_M, _FARTHEST_M = 0.5, 500.0
 _FAR_INVERSE = 1 / 150  # 1/m; farther away stereo anchors nothing
 _ROAD_INVERSE = 1 / 150
@@ -158,7 +158,7 @@ def fuse(
     """
     users = seen.users & usable
     shown = usable & (seen.classes != StreetClass.SKY) & (seen.depth > 0)
-    road = np.isin(seen.classes, _PAVED) & (plane.inverse > _ROAD_INVERSE) & usable
+    road = np.isin(seen.classes, PAVED) & (plane.inverse > _ROAD_INVERSE) & usable
     swept, level = _log_depth(swept_inverse), _log_depth(plane.inverse)
     level_spread = np.hypot(options.stereo_spread, plane.spread)
     sure = np.where(
@@ -174,8 +174,10 @@ def fuse(
     believed = (confidence >= options.sure) & (off < options.sure_spreads * spread + 0.1)
     believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
     # Of what is far the network knows only that it is far; its parallax tells how far.
-    far = shown & ~users & (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
-    stereo = stereo & believed | far
+    far = (
+        shown & ~users & (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
+    )
+    stereo = stereo & believed | shown & ~users & far
     log_depth = np.where(stereo, swept, aligned)
     spread = np.where(stereo, options.stereo_spread, spread)
     flat = road & ~stereo & (level_spread < spread)

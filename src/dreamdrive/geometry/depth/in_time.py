@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
+from dreamdrive.geometry.depth.outlines import weighted_median
 from dreamdrive.geometry.depth.sweep import Warp
 from dreamdrive.geometry.depth.view import View, by_frame
 
@@ -57,16 +58,6 @@ def _settled(
         both &= np.abs(off) < _ALIKE
         shift.append(np.where(both, off, 0))
         weight.append(np.where(both, 1 / np.maximum(trust, _LEAST_SPREAD) ** 2, 0))
-    change = _weighted_median(np.stack(shift), np.stack(weight))
+    change = weighted_median(np.stack(shift), np.stack(weight))
     moved = still[frame] & (inverse[frame] > 0)
     return np.where(moved, inverse[frame] * np.exp(-change), inverse[frame]).astype(np.float32)
-
-
-def _weighted_median(
-    values: Float[np.ndarray, "n h w"], weight: Float[np.ndarray, "n h w"]
-) -> Float[np.ndarray, "h w"]:
-    order = np.argsort(values, axis=0)
-    values, weight = (np.take_along_axis(each, order, axis=0) for each in (values, weight))
-    total = np.cumsum(weight, axis=0)
-    first = (total >= 0.5 * total[-1]).argmax(axis=0)
-    return np.take_along_axis(values, first[None], axis=0)[0]
