@@ -1,22 +1,38 @@
 """Steps of geometry are counted, and end where they should."""
 
+from dataclasses import replace
+
+import pytest
 from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.cameras.mapping import STEPS
-from dreamdrive.geometry.dense import PASSES
+from dreamdrive.geometry.dense import LOOK_PASSES, PASSES
+from dreamdrive.knowledge import look
 from dreamdrive.progress import Work
+from dreamdrive.scene.clip import Clip
 
 
-def test_a_drive_takes_all_steps_and_one_that_stands_jumps() -> None:
+def steps_of(clip: Clip) -> tuple[list[int], int]:
+    """The steps done whenever geometry told of them, and how many there are in all."""
     seen: list[tuple[int, int]] = []
-    reconstruct(make_clip(straight([0.5] * 7)), work=Work(lambda done, total: seen.append((done, total))))
-    total = 8 * (1 + STEPS + PASSES)
-    assert {whole for _, whole in seen} == {total}
-    steps = [done for done, _ in seen]
+    reconstruct(clip, work=Work(lambda done, total: seen.append((done, total))))
+    (total,) = {whole for _, whole in seen}
+    return [done for done, _ in seen], total
+
+
+@pytest.mark.parametrize("looked", [False, True])
+def test_a_drive_takes_all_steps(looked: bool) -> None:
+    clip = make_clip(straight([0.5] * 7))
+    if looked:
+        clip = replace(clip, looks=(look(clip.frames),))
+    steps, total = steps_of(clip)
+    assert total == 8 * (1 + STEPS + PASSES + looked * LOOK_PASSES)
     assert steps == sorted(steps)
     assert steps.count(total) == 1
     assert set(range(8 * (1 + STEPS), total + 1)) <= set(steps)
-    seen.clear()
-    reconstruct(make_clip(straight([0.0] * 7)), work=Work(lambda done, total: seen.append((done, total))))
-    assert seen[-1] == (total, total)
+
+
+def test_a_camera_that_stands_jumps() -> None:
+    steps, total = steps_of(make_clip(straight([0.0] * 7)))
+    assert steps[-1] == total

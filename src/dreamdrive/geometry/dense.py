@@ -39,9 +39,9 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
-PASSES = 11
-"""How often the frames are gone through one by one: the sweep, six times for what moves, and four times for a
-depth that the street network has a part in."""
+PASSES, LOOK_PASSES = 7, 4
+"""How often the frames are gone through one by one: the sweep, six times for what moves, and with a look
+four times for depth that the street network has a part in."""
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
@@ -69,7 +69,7 @@ def densify(
     m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
     the place of the backdrop. What moves is found against the parallax of a moving camera or against the
     temporal median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for
-    each frame of at most ``PASSES``.
+    each frame of at most ``PASSES``, and with a look of ``LOOK_PASSES`` more.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None

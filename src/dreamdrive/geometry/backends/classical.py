@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from dreamdrive.geometry.cameras import STEPS, pose_clip
-from dreamdrive.geometry.dense import PASSES, densify
+from dreamdrive.geometry.dense import LOOK_PASSES, PASSES, densify
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.geometry.road import in_metres
@@ -19,7 +19,8 @@ def reconstruct(clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Wo
     over all frames; what a clip does not need is jumped over.
     """
     passes, used = len(clip), int((~clip.held_out).sum())
-    posing, total = (1 + STEPS) * passes, (1 + STEPS) * passes + PASSES * used
+    posing, dense = (1 + STEPS) * passes, PASSES if clip.look is None else PASSES + LOOK_PASSES
+    total = posing + dense * used
     tell = _counted(work, 0, passes, total)
     posed = work.keep("posed", lambda: pose_clip(clip, options, seed=seed, tell=tell))
     known = in_metres(clip, posed.metres_per_unit)

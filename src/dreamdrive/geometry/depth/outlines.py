@@ -47,7 +47,8 @@ def redrawn(
         return inverse
     step = max(1, round(grown(_REACH_PX, width) / _SAMPLES))
     reach = step * _SAMPLES
-    colour = cv2.copyMakeBorder(rgb, *(4 * [reach]), cv2.BORDER_REPLICATE).reshape(-1, 3).astype(np.float32)
+    around = (reach, reach), (reach, reach), (0, 0)
+    colour = np.pad(rgb, around, mode="edge").reshape(-1, 3).astype(np.float32)
     depth = np.pad(level, reach).ravel()
     known = np.pad((inverse > 0).astype(np.float32), reach).ravel()
     line = width + 2 * reach
