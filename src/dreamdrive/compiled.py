@@ -40,7 +40,11 @@ class _Compiled(torch.autograd.Function):
         if any(wanted):
             ctx.gradients = gradients
             ctx.save_for_backward(*inputs)
-        return outputs
+        # ``gradients`` may hold the outputs. Torch gets others of the same memory: what it hands out holds
+        # ctx, which holds ``gradients``, and no collector sees through torch.
+        if isinstance(outputs, Tensor):
+            return outputs.detach()
+        return tuple(each.detach() for each in outputs)
 
     @staticmethod
     @once_differentiable
