@@ -16,7 +16,11 @@ def _square_root(value: Tensor, wanted: Wanted) -> tuple[Tensor, Gradients]:
     """Its gradient needs the result, as that of many functions does."""
     root, held = value.sqrt(), _Held()
     forgotten.append(weakref.ref(held))
-    return root, lambda upstream: [upstream / (2 * root) if held else None]
+
+    def gradients(upstream: Tensor) -> list[Tensor | None]:
+        return [upstream / (2 * root) if held else None]
+
+    return root, gradients
 
 
 forgotten: list[weakref.ref[_Held]] = []
