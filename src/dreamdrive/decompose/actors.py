@@ -6,7 +6,9 @@ spans let the copies nearest in time speak loudest, see ``lives``.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 import torch
@@ -76,10 +78,12 @@ def cast(
     grouping: Grouping,
     options: ActorOptions,
     reach_px: float,
+    known: Mapping[int, Path] = MappingProxyType({}),
 ) -> Cast:
     """Track every dynamic cluster and merge its copies, each where its source frame saw it.
 
     Copies within ``reach_px`` in an image are neighbours, see ``SeedOptions``. Held-out frames are not read.
+    Paths that are known already, by cluster, are taken as they are. They name all frames that saw it.
     """
     index = np.flatnonzero(grouping.dynamic.numpy())
     chosen = gaussians.select(torch.from_numpy(index))
@@ -93,6 +97,9 @@ def cast(
     cluster, frames = grouping.cluster.numpy()[index], chosen.source_frame.numpy()
     paths: list[Path | None] = []
     for c in range(cluster.max() + 1):
+        if c in known:
+            paths.append(known[c])
+            continue
         rows = np.flatnonzero(cluster == c)
         seen = np.unique(frames[rows])
         shown = [pixels[rows[frames[rows] == frame]] for frame in seen]

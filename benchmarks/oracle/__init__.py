@@ -1,0 +1,1 @@
+"""Truth in place of parts of a scene."""
