@@ -120,3 +120,14 @@ def test_export_says_what_is_left_out(run: Run, out: Path, tmp_path: Path) -> No
     save_scene(driving(make_scene(dynamic=0, full=False)), tmp_path / "bare")
     said = run("export", tmp_path / "bare", "--to", "ply", "-o", tmp_path / "bare.ply").out
     assert said == f"{tmp_path}/bare.ply PLY holds the scene at 0.333 s."
+
+
+def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:
+    wanted = ("render", out, "--trajectory", "stop", "--fps", "5", "--show", "dynamic", "--format", "npz")
+    assert run(*wanted, "-o", out.parent / "all").code == 0
+    assert run(*wanted, "--without", "0", "-o", out.parent / "less").code == 0
+    name = next(each for each in names(out.parent / "all") if each.endswith(".npz"))
+    with np.load(out.parent / "all" / name) as whole, np.load(out.parent / "less" / name) as less:
+        assert any(not np.array_equal(whole[key], less[key]) for key in whole.files)
+    result = run(*wanted, "--without", "7", "-o", out.parent / "none")
+    assert (result.code, "--without: no actor 7; there are 0" in result.err) == (2, True), result

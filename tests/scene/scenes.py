@@ -17,7 +17,7 @@ from dreamdrive.motion import (
     Vibration,
     VibrationConfig,
 )
-from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
@@ -54,7 +54,16 @@ def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
         static=gaussians(7, 1, features=torch.ones(7, 2)),
         dynamic=gaussians(dynamic, 2, **more),
         deformation=field if full else None,
-        actors=(Actor(0, "actor 0", "vehicle", 2, np.array([0.0, 0.1]), np.ones((2, 3)) / 3),)
+        actors=(
+            Actor(
+                0,
+                "actor 0",
+                "vehicle",
+                2,
+                Track(np.array([0.0, 0.1]), np.ones((2, 3)) / 3, np.array([0.0, 0.1])),
+                np.ones(2),
+            ),
+        )
         if full
         else (),
         sky=Sky(torch.rand(4, 6, 3), (-1.0, 1.0), (-0.1, 0.8)) if full else None,

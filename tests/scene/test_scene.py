@@ -5,7 +5,7 @@ import pytest
 import torch
 from tests.scene.scenes import make_scene
 
-from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.scene import Scene
 
 
@@ -44,12 +44,49 @@ def test_counts_must_agree() -> None:
 
 
 def test_actor_tracks() -> None:
-    actor = Actor(
-        0, "a", "vehicle", 9, np.array([0.5, 1.0, 2.0]), np.array([[0, 0, 0], [3, 4, 0], [3, 4, 1.0]])
-    )
-    assert (actor.first_s, actor.last_s, actor.path_length_m) == (0.5, 2.0, 6.0)
+    track = Track(np.array([0.5, 1.0, 2.0]), np.array([[0, 0, 0], [3, 4, 0], [3, 4, 1.0]]), np.zeros(3))
+    assert (track.first_s, track.last_s, track.length_m) == (0.5, 2.0, 6.0)
+    np.testing.assert_allclose(track.speed_m_s[[0, 2]], [10, 1])
     with pytest.raises(ValueError, match="increasing"):
-        Actor(0, "a", "vehicle", 9, np.array([1.0, 1.0]), np.zeros((2, 3)))
+        Track(np.array([1.0, 1.0]), np.zeros((2, 3)), np.zeros(2))
+    with pytest.raises(ValueError, match="2 spreads for 3 points"):
+        Actor(0, "a", "vehicle", 9, track, np.zeros(2))
+
+
+def test_a_track_goes_on_at_its_rate() -> None:
+    track = Track(np.array([1.0, 2.0]), np.array([[0.0, 0, 0], [2.0, 0, 0]]), np.array([3.0, -3.0]))
+    found = track.at(np.array([0.5, 1.5, 3.0]))
+    np.testing.assert_allclose(found.positions_m[:, 0], [-1, 1, 4])
+    # From 3 rad to -3 it is a short way over the half turn.
+    np.testing.assert_allclose(found.yaw_rad, 3 + (2 * np.pi - 6) * np.array([-0.5, 0.5, 2]))
+
+
+def test_a_scene_without_an_actor_has_none_of_it() -> None:
+    scene = make_scene()
+    members = int((scene.dynamic.actor == 0).sum())
+    assert members
+    left = scene.without(0)
+    assert not left.actors
+    assert len(left.dynamic) == len(scene.dynamic) - members
+    assert left.dynamic.actor is not None
+    assert not (left.dynamic.actor == 0).any()
+    assert torch.equal(left.static.means, scene.static.means)
+    with pytest.raises(ValueError, match="no actor 7; there are 0"):
+        scene.without(7)
+
+
+def test_an_actor_follows_another_track_and_nothing_else_moves() -> None:
+    scene = make_scene()
+    members = scene.dynamic.actor == 0
+    old = scene.actor(0).track
+    moved = scene.with_track(0, replace(old, positions_m=old.positions_m + np.array([0, 0, 5.0])))
+    before, after = scene.dynamic_at(0.05), moved.dynamic_at(0.05)
+    change = (after.means - before.means)[members[scene.dynamic.alive_at(0.05)]]
+    assert (change[:, 2] > 2).all()
+    others = ~members[scene.dynamic.alive_at(0.05)]
+    assert torch.equal(after.means[others], before.means[others])
+    with pytest.raises(ValueError, match="no motion"):
+        replace(scene, deformation=None).with_track(0, old)
 
 
 def test_scenes_are_frozen() -> None:

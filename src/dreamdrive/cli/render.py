@@ -3,7 +3,7 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
@@ -14,6 +14,9 @@ from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
+
+if TYPE_CHECKING:
+    from dreamdrive.scene.scene import Scene
 
 
 def render(
@@ -27,6 +30,7 @@ def render(
     format: Format = "mp4",
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
+    without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
     """Drive through a scene and write videos, pictures or arrays.
@@ -40,6 +44,7 @@ def render(
         format: A video, or a folder with a picture or with exact arrays a frame.
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         fps: Frames a second; without it a file's own, and for the others 20 at least.
+        without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:
@@ -51,7 +56,7 @@ def render(
     options = RenderOptions(show, format, None if size is None else parse_size(size), fps)
     check_numbers(shift_m, fps)
     check_size(options)
-    scene = open_scene(out)
+    scene = _less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":
         for drive in drives:
@@ -64,3 +69,13 @@ def render(
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
         console.print(f"{place}: {rate}", soft_wrap=True, markup=False)
+
+
+def _less(scene: "Scene", ids: tuple[int, ...]) -> "Scene":
+    """The scene less some of its actors."""
+    for id in dict.fromkeys(ids):
+        try:
+            scene = scene.without(id)
+        except ValueError as error:
+            raise InputError(f"--without: {error}") from error
+    return scene

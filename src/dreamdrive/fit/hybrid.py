@@ -11,7 +11,7 @@ from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
 from dreamdrive.fit.trainer import FitOptions, Model, optimise
 from dreamdrive.fit.views import training_views
-from dreamdrive.motion import MotionConfig, Start, Tracks, start_motion
+from dreamdrive.motion import Motion, MotionConfig, Start, Tracks, start_motion
 from dreamdrive.progress import Progress
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
@@ -76,7 +76,7 @@ def fit(
         static=model.static.frozen() if model.static is not None else empty,
         dynamic=dynamic,
         deformation=None if moving is None else moving.requires_grad_(False).to(CPU),
-        actors=tuple(replace(a, count=_members(dynamic, a.id)) for a in parts.actors),
+        actors=tuple(_fitted(actor, dynamic, moving) for actor in parts.actors),
         sky=start.sky,
         exposure=model.exposure.freeze(clip.times_s, ~clip.held_out, clip.camera),
         cameras=geometry.cameras,
@@ -90,5 +90,9 @@ def _parameters(gaussians: Gaussians, rates: LearningRates) -> Parameters | None
     return Parameters(gaussians, footprints(gaussians), rates) if len(gaussians) else None
 
 
-def _members(gaussians: Gaussians, actor: int) -> int:
-    return 0 if gaussians.actor is None else int((gaussians.actor == actor).sum())
+def _fitted(actor: Actor, gaussians: Gaussians, motion: Motion | None) -> Actor:
+    """The actor with the track and the Gaussians that the fit has left it."""
+    count = 0 if gaussians.actor is None else int((gaussians.actor == actor.id).sum())
+    return replace(
+        actor, count=count, track=actor.track if motion is None else motion.refined(actor.id, actor.track)
+    )

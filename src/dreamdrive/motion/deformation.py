@@ -1,5 +1,6 @@
 """Where the dynamic Gaussians are at a given time: rigid actor tracks plus a learned residual (eq. 11-12)."""
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from dreamdrive.device import in_core
 from dreamdrive.motion.compiled_deformation import network_residual, posed
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.motion.tracks import Tracks, key_weights, multiply_quaternions, rotate
+from dreamdrive.scene.actor import Track
 from dreamdrive.scene.gaussians import Gaussians
 
 
@@ -268,6 +270,25 @@ class DeformationField(Motion):
             log_scales=gaussians.log_scales + offsets.log_scale,
         )
         return moved.faded_at(t_s)
+
+    @torch.no_grad()
+    def refined(self, actor: int, track: Track) -> Track:
+        """See ``Motion``: the splines through the key frames, at the track's times."""
+        poses = [self.pose(t_s) for t_s in track.times_s.tolist()]
+        moved = torch.stack([translation[actor] for translation, _ in poses]).double().numpy(force=True)
+        yaw_rad = torch.stack([yaw[actor] for _, yaw in poses]).double().numpy(force=True)
+        return Track(track.times_s, self.track_pivot_m[actor].double().numpy(force=True) + moved, yaw_rad)
+
+    @torch.no_grad()
+    def steered(self, actor: int, track: Track) -> "DeformationField":
+        """See ``Motion``; key frames keep their times."""
+        if not 0 <= actor < self.config.actors:
+            raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
+        copy, keyed = deepcopy(self), track.at(self.track_times_s.numpy(force=True))
+        pivot_m = self.track_pivot_m[actor].double().numpy(force=True)
+        copy.track_translation[actor] = torch.from_numpy(keyed.positions_m - pivot_m).to(self.centre_m)
+        copy.track_yaw_rad[actor] = torch.from_numpy(keyed.yaw_rad).to(self.centre_m)
+        return copy
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""

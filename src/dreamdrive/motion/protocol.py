@@ -10,6 +10,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from dreamdrive.motion.tracks import Tracks
+from dreamdrive.scene.actor import Track
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
@@ -99,6 +100,18 @@ class Motion(nn.Module, ABC):
     def training_at(self, gaussians: Gaussians, t_s: float, generator: torch.Generator) -> Gaussians:
         """What a step of the fit renders at ``t_s``; the same as a scene unless a method says otherwise."""
         return self.apply_at(gaussians, t_s)
+
+    def refined(self, actor: int, track: Track) -> Track:
+        """The track that an actor has now, at the times of the one that it started with."""
+        return track
+
+    def steered(self, actor: int, track: Track) -> "Motion":
+        """A copy in which an actor follows another track.
+
+        Raises:
+            ValueError: It knows no tracks, or none of this actor.
+        """
+        raise ValueError(f"motion: {self.kind} knows no tracks of actors")
 
     def penalty(self, canonical: Gaussians, moved: Gaussians) -> Float[Tensor, ""] | None:
         """A term to add to the loss of a step, weighted; None for none.

@@ -57,9 +57,11 @@ def describe(
                 "name": actor.name,
                 "kind": actor.kind,
                 "gaussians": actor.count,
-                "first_s": actor.first_s,
-                "last_s": actor.last_s,
-                "path_m": actor.path_length_m,
+                "first_s": actor.track.first_s,
+                "last_s": actor.track.last_s,
+                "path_m": actor.track.length_m,
+                "speed_m_s": float(np.median(actor.track.speed_m_s)),
+                "spread_m": None if actor.spread_m is None else float(np.median(actor.spread_m)),
             }
             for actor in scene.actors
         ],

@@ -7,35 +7,81 @@ from jaxtyping import Float
 
 
 @dataclass(frozen=True)
+class Track:
+    """Where a thing is over time: places of one point of it in the world, and its yaw.
+
+    Times increase strictly. The yaw is about the up axis of the scene, right-handed, against the attitude of
+    the thing in its canonical place.
+    """
+
+    times_s: Float[np.ndarray, " t"]
+    positions_m: Float[np.ndarray, "t 3"]
+    yaw_rad: Float[np.ndarray, " t"]
+
+    def __post_init__(self) -> None:
+        counts = len(self.times_s), len(self.positions_m), len(self.yaw_rad)
+        if len(set(counts)) > 1:
+            raise ValueError(f"track: numbers of times, places and yaws differ: {counts}")
+        if not counts[0] or (np.diff(self.times_s) <= 0).any():
+            raise ValueError("track: expected at least one point and strictly increasing times")
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path."""
+        return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
+
+    @property
+    def speed_m_s(self) -> Float[np.ndarray, " t"]:
+        """Speed at each point, by its neighbours; 0 where there is one point alone."""
+        if len(self.times_s) < 2:
+            return np.zeros(1)
+        return np.linalg.norm(np.gradient(self.positions_m, self.times_s, axis=0), axis=1)
+
+    def at(self, times_s: Float[np.ndarray, " k"]) -> "Track":
+        """The track at other times: linear between those known, at a constant rate beyond them."""
+        known = np.column_stack([self.positions_m, np.unwrap(self.yaw_rad)])
+        found = np.stack([np.interp(times_s, self.times_s, column) for column in known.T], axis=1)
+        if len(self.times_s) > 1:
+            ends = ((times_s < self.first_s, 0, 1), (times_s > self.last_s, -1, -2))
+            for beyond, end, inner in ends:
+                rate = (known[end] - known[inner]) / (self.times_s[end] - self.times_s[inner])
+                found[beyond] = known[end] + (times_s[beyond] - self.times_s[end])[:, None] * rate
+        return Track(times_s, found[:, :3], found[:, 3])
+
+    @property
+    def first_s(self) -> float:
+        """Its first time."""
+        return float(self.times_s[0])
+
+    @property
+    def last_s(self) -> float:
+        """Its last time."""
+        return float(self.times_s[-1])
+
+
+@dataclass(frozen=True)
 class Actor:
     """A group of dynamic Gaussians that move as one: those whose ``Gaussians.actor`` is ``id``.
 
-    The name is unique, for people, such as ``"actor 3"``; the kind such as ``"vehicle"`` or ``"unknown"``.
-    The track is of its centre, in the world; its times increase strictly.
+    Attributes:
+        id: See above.
+        name: Unique, for people, such as ``"actor 3"``.
+        kind: Such as ``"vehicle"`` or ``"unknown"``.
+        count: Number of its Gaussians.
+        track: Where it is at the frames that saw it.
+        spread_m: Standard deviation of its place at these (T,) along the axis in which it is known least, as
+            the estimate of its track believes; None where nothing tells.
     """
 
     id: int
     name: str
     kind: str
     count: int
-    times_s: Float[np.ndarray, " t"]
-    positions_m: Float[np.ndarray, "t 3"]
+    track: Track
+    spread_m: Float[np.ndarray, " t"] | None = None
 
     def __post_init__(self) -> None:
-        if len(self.times_s) == 0 or (np.diff(self.times_s) <= 0).any():
-            raise ValueError(f"{self.name}: expected at least one track point and strictly increasing times")
-
-    @property
-    def first_s(self) -> float:
-        """When it is first seen."""
-        return float(self.times_s[0])
-
-    @property
-    def last_s(self) -> float:
-        """When it is last seen."""
-        return float(self.times_s[-1])
-
-    @property
-    def path_length_m(self) -> float:
-        """Length of its track."""
-        return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
+        if self.spread_m is not None and len(self.spread_m) != len(self.track.times_s):
+            raise ValueError(
+                f"{self.name}: {len(self.spread_m)} spreads for {len(self.track.times_s)} points"
+            )

@@ -1,6 +1,6 @@
 """The product: a street over time as Gaussians."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
@@ -32,6 +32,10 @@ class SceneMotion(Protocol):
 
     def check(self, gaussians: Gaussians) -> None:
         """Raise ``ValueError`` where these are not Gaussians that it can move."""
+        ...
+
+    def steered(self, actor: int, track: Track) -> "SceneMotion":
+        """A copy in which an actor follows another track; ``ValueError`` where it knows no such actor."""
         ...
 
     def state_dict(self) -> dict[str, Tensor]:
@@ -111,6 +115,45 @@ class Scene:
         if self.camera is None:
             return np.arange(len(self.cameras))
         return np.flatnonzero(self.camera == self.camera[0])
+
+    def actor(self, id: int) -> Actor:
+        """The actor of an id; ``ValueError`` names those there are."""
+        for actor in self.actors:
+            if actor.id == id:
+                return actor
+        raise ValueError(f"no actor {id}; there are {', '.join(str(a.id) for a in self.actors) or 'none'}")
+
+    def without(self, id: int) -> "Scene":
+        """The scene less one actor with all its Gaussians; the others keep their ids.
+
+        Raises:
+            ValueError: There is no such actor.
+        """
+        gone = self.actor(id)
+        members = torch.zeros(len(self.dynamic), dtype=torch.bool)
+        if self.dynamic.actor is not None:
+            members = self.dynamic.actor == gone.id
+        dynamic = self.dynamic.select(torch.nonzero(~members).squeeze(1))
+        return replace(self, dynamic=dynamic, actors=tuple(a for a in self.actors if a.id != id))
+
+    def with_track(self, id: int, track: Track) -> "Scene":
+        """The scene with an actor on another track, whose places are those of the same point of it.
+
+        Before the first and after the last time of the track the actor goes on as there. Copies of its
+        surface live as long as before: what no frame has seen stays empty.
+
+        Raises:
+            ValueError: There is no such actor, or what moves the scene knows no tracks.
+        """
+        actor = self.actor(id)
+        if self.deformation is None:
+            raise ValueError(f"nothing moves {actor.name}: the scene has no motion")
+        steered = replace(actor, track=track, spread_m=None)
+        return replace(
+            self,
+            deformation=self.deformation.steered(id, track),
+            actors=tuple(steered if each.id == id else each for each in self.actors),
+        )
 
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:

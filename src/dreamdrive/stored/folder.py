@@ -23,7 +23,7 @@ from dreamdrive.files.json_file import of_type, parse_json
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
-from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import FARTHEST_M, Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
@@ -47,6 +47,7 @@ MAX_PIXELS = 64_000_000
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _Point = tuple[_Metres, _Metres, _Metres]
+_Angle = Annotated[float, Meta(ge=-1e4, le=1e4)]
 
 
 class _StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,14 +76,27 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     count: Annotated[int, Meta(ge=0, le=10**9)]
     times_s: list[float]
     positions_m: list[_Point]
+    yaw_rad: list[_Angle] | None = None
+    spread_m: list[Annotated[float, Meta(ge=0, le=FARTHEST_M)]] | None = None
 
     def actor(self) -> Actor:
         """The noun; ``ValueError`` where times and places do not belong together."""
-        times_s = _increasing(self.times_s, f"times of {self.name}")
-        if len(self.positions_m) != len(times_s):
-            raise ValueError(f"{self.name} has {len(times_s)} times and {len(self.positions_m)} places")
+        yaw_rad = [0.0] * len(self.times_s) if self.yaw_rad is None else self.yaw_rad
         positions_m = np.array(self.positions_m, dtype=np.float64).reshape(-1, 3)
-        return Actor(self.id, self.name, self.kind, self.count, times_s, positions_m)
+        track = Track(
+            np.array(self.times_s, dtype=np.float64), positions_m, np.array(yaw_rad, dtype=np.float64)
+        )
+        spread_m = None if self.spread_m is None else np.array(self.spread_m, dtype=np.float64)
+        return Actor(self.id, self.name, self.kind, self.count, track, spread_m)
+
+    @classmethod
+    def of(cls, actor: Actor) -> "_StoredActor":
+        """What is stored of one."""
+        track, spread = actor.track, actor.spread_m
+        path = track.times_s.tolist(), track.positions_m.tolist(), track.yaw_rad.tolist()
+        return cls(
+            actor.id, actor.name, actor.kind, actor.count, *path, None if spread is None else spread.tolist()
+        )
 
 
 class _StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -192,10 +206,7 @@ def _tensors(scene: Scene) -> dict[str, dict[str, Tensor]]:
 def _values(scene: Scene) -> dict[str, Any]:
     """What goes into the index itself; floats survive JSON exactly."""
     return {
-        "actors": [
-            {**asdict(a), "times_s": a.times_s.tolist(), "positions_m": a.positions_m.tolist()}
-            for a in scene.actors
-        ],
+        "actors": [msgspec.structs.asdict(_StoredActor.of(actor)) for actor in scene.actors],
         "cameras": [{**asdict(c), "world_from_camera": c.world_from_camera.tolist()} for c in scene.cameras],
         "times_s": scene.times_s.tolist(),
         "held_out": scene.held_out.tolist(),
