@@ -1,8 +1,9 @@
 """Road users from peaks and offsets."""
 
+import numpy as np
 import torch
 
-from dreamdrive.knowledge.grouping import GroupingOptions, group
+from dreamdrive.knowledge.grouping import GroupingOptions, group, outlined
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
 CAR, PERSON = (ROAD_USERS.index(kind) for kind in (StreetClass.VEHICLE, StreetClass.PERSON))
@@ -81,3 +82,25 @@ def test_without_road_users_there_are_none() -> None:
     numbers, users = group(*empty())
     assert users == ()
     assert not numbers.any()
+
+
+def test_panes_and_letters_are_the_vehicle_and_another_road_user_is_not() -> None:
+    classes, sure, peaks, offset = empty()
+    classes[10:30, 20:60] = StreetClass.VEHICLE
+    classes[14:18, 30:40] = StreetClass.STRUCTURE  # a pane
+    classes[22:26, 44:48] = StreetClass.PERSON
+    peaks[CAR, 5, 10] = 0.9
+    numbers, users = group(classes, sure, peaks, offset, GroupingOptions(reach=1))
+    assert (numbers[14:18, 30:40] == 1).all()
+    assert (numbers[22:26, 44:48] == 0).all()
+    assert users[0].pixels == 20 * 40 - 4 * 4
+    assert (numbers > 0).sum() == users[0].pixels
+
+
+def test_what_the_border_cuts_off_is_whole_up_to_it() -> None:
+    mask = np.zeros((40, 60), bool)
+    mask[5:35, :30] = True
+    mask[15:25, :12] = False  # a pane that the border cuts
+    found = outlined(mask, 0.02)
+    assert found[5:35, :30].all()
+    assert found.sum() == 30 * 30

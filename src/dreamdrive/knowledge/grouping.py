@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import torch
-from jaxtyping import Float, Int, UInt16
+from jaxtyping import Bool, Float, Int, UInt16
 from torch import Tensor
 from torch.nn import functional
 
@@ -28,6 +29,9 @@ class GroupingOptions:
     """Peaks of a class that are taken, the highest."""
     reach: float = 0.2
     """How far from a centre a pixel may point, as a share of the picture's width."""
+    closing: float = 0.2
+    """Radius of the notches of a vehicle's outline that are closed, over the root of its area; all holes are.
+    On drawn streets 0-3 the mean IoU of vehicles is 0.890 without, 0.892 with 0.05 and 0.895 with this."""
     least: float = 2e-4
     """Smallest road user as a share of the picture: 26 pixels of 480x270."""
 
@@ -41,11 +45,13 @@ def group(
 ) -> tuple[UInt16[np.ndarray, "h w"], tuple[RoadUser, ...]]:
     """Number of each pixel's road user, 0 for none, and the road users by falling score.
 
-    A pixel belongs to the centre of its class that is nearest to where it points. Peaks are in [0, 1], over
-    the same picture, a channel for each of ``ROAD_USERS``; offsets are columns and rows, in its pixels.
+    A pixel belongs to the centre of its class that is nearest to where it points. A vehicle has its panes and
+    letters, too, which may be taken for something else. Peaks are in [0, 1], over the same picture, a channel
+    for each of ``ROAD_USERS``; offsets are columns and rows, in its pixels.
     """
     height, width = classes.shape
     numbers = np.zeros((height, width), np.uint16)
+    free = ~np.isin(classes.numpy(), (*ROAD_USERS, StreetClass.OWN_CAR))
     found: list[tuple[RoadUser, Int[np.ndarray, " n"]]] = []
     for heat, kind in zip(peaks, ROAD_USERS, strict=True):
         window = options.vehicle_window if kind == StreetClass.VEHICLE else options.window
@@ -63,12 +69,35 @@ def group(
                 continue
             at, across = rows[own], columns[own]
             score = peak * float(confidence[at, across].mean())
+            mask = np.zeros((height, width), bool)
+            mask[at.numpy(), across.numpy()] = True
+            if kind == StreetClass.VEHICLE:
+                mask |= outlined(mask, options.closing) & free
+            at, across = np.nonzero(mask)
             box = int(across.min()), int(at.min()), int(across.max()) + 1, int(at.max()) + 1
-            found.append((RoadUser(kind, score, box, len(at)), (at * width + across).numpy()))
+            found.append((RoadUser(kind, score, box, len(at)), at * width + across))
     found.sort(key=lambda each: -each[0].score)
     for number, (_, pixels) in enumerate(found, start=1):
         numbers.ravel()[pixels] = number
     return numbers, tuple(user for user, _ in found)
+
+
+def outlined(mask: Bool[np.ndarray, "h w"], closing: float) -> Bool[np.ndarray, "h w"]:
+    """A thing without holes and narrow notches; what the picture's border cuts off goes on beyond it."""
+    reach = max(1, round(closing * float(np.sqrt(mask.sum()))))
+    beyond = reach + 1
+    wide = np.pad(mask.astype(np.uint8), beyond)
+    for border in (wide[:, beyond], wide[:, -beyond - 1], wide[beyond], wide[-beyond - 1]):
+        filled = np.flatnonzero(border)
+        if len(filled):
+            border[filled[0] : filled[-1] + 1] = 1
+    inner = wide[beyond:-beyond, beyond:-beyond]
+    wide = np.pad(inner, beyond, mode="edge")
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    closed = cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(closed, outlines, -1, 1, cv2.FILLED)
+    return closed[beyond:-beyond, beyond:-beyond] > 0
 
 
 def _centres(

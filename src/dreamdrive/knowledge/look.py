@@ -141,6 +141,8 @@ def _see(
     # Between two road users a mean of their offsets would point to neither.
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
     instances, users = group(classes, chance, peaks, offset_px, options.grouping)
+    for number, user in enumerate(users, start=1):
+        classes[torch.from_numpy(instances == number)] = user.kind
     depth, spread = _depth(said, fitting, _regions(classes, instances))
     sky = classes == StreetClass.SKY
     maps = {
