@@ -70,14 +70,18 @@ def tau(threshold: float) -> Callable[[Options], Options]:
     )
 
 
+_SHORT = 1.25
+"""Frames that a copy lives: without a track it is wrong soon."""
+
+
 def untracked(lifespan_frames: float) -> Callable[[Options], Options]:
     """No tracks: each copy stays where it was seen, and lives so long."""
     return played(least_frames=10**6, untracked_frames=lifespan_frames)
 
 
 def ungrouped(options: Options) -> Options:
-    """No clusters, hence no things that could have tracks; copies live as long as those of things do."""
-    return grouped(clusters="none")(untracked(options.cast.lifespan_frames)(options))
+    """No clusters, hence no things that could have tracks."""
+    return grouped(clusters="none")(untracked(_SHORT)(options))
 
 
 VARIANTS = {
@@ -129,14 +133,12 @@ VARIANTS = {
     "shadows": Variant("shadows and road around the wheels move with their cars", grouped(road=None)),
     "no-tracks": Variant(
         "no tracks: F_deform alone moves things",
-        lambda options: untracked(options.cast.lifespan_frames)(options),
+        untracked(_SHORT),
     ),
     "no-lives": Variant("no tracks, and copies live for ever (eq. 11)", untracked(1e3)),
     "no-residual": Variant("tracks alone, F_deform stays 0", fitted_with(deformation_rate=0.0)),
     "short-lives": Variant("what no other frame sees lives no longer", played(lasting=False)),
-    "long-lives": Variant(
-        "copies that others replace live three times as long", played(lifespan_frames=3.75)
-    ),
+    "brief-lives": Variant("copies that others replace live a third as long", played(lifespan_frames=_SHORT)),
     "paper-loss": Variant("joint fit with L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
     "no-depth": Variant("joint fit without the term on depth", fitted_with(depth_weight=0.0)),
     "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),

@@ -74,4 +74,8 @@ def _path(made: Drive, box: WorldBox, geometry: Geometry, used: Bool[np.ndarray,
     up = _UP if geometry.ground is None else geometry.ground.normal_world
     middle = len(poses) // 2
     yaw = Rotation.from_matrix(turns @ turns[middle].T).as_rotvec() @ up
-    return Path(np.flatnonzero(used), Placement(place_m, np.unwrap(yaw), np.ones(len(poses))), up)
+    return Path(
+        np.flatnonzero(used),
+        Placement(place_m, np.unwrap(yaw), np.ones(len(poses)), np.zeros(len(poses))),
+        up,
+    )

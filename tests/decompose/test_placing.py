@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from dreamdrive.decompose.placing import Carried, PlacingOptions, placed
+from dreamdrive.decompose.placing import Carried, Glances, PlacingOptions, placed
 from dreamdrive.scene.camera import Camera
 
 UP = np.array([0.0, -1.0, 0.0])
@@ -35,6 +35,11 @@ class Street:
             first_m, second_m = one[:, 2] * factor[k], two[:, 2] * factor[k + 1]
             found.append(Carried(k, k + 1, one[:, :2], first_m, target, second_m))
         return found
+
+    def glances(self, middles_m: np.ndarray, cut: int = 0) -> Glances:
+        """Its first frames, as many as there are middles; the border cuts the thing off in some of them."""
+        count = len(middles_m)
+        return Glances(self.cameras[:count], self.times_s[:count], middles_m, np.arange(count) >= cut)
 
     def middles_m(self, factor: np.ndarray) -> np.ndarray:
         """The middles of what the frames see."""
@@ -77,9 +82,7 @@ def moved(place_m: np.ndarray, at: int = FRAMES // 2) -> np.ndarray:
 def test_place_and_yaw_are_found_though_depth_is_off(speed_m_s: float, yaw_rate: float) -> None:
     true = street(speed_m_s, yaw_rate)
     factor = np.exp(np.random.default_rng(2).normal(0, 0.06, FRAMES))
-    found = placed(
-        true.cameras, true.times_s, true.middles_m(factor), true.carried(factor), UP, PlacingOptions()
-    )
+    found = placed(true.glances(true.middles_m(factor)), true.carried(factor), UP, PlacingOptions())
     scale = 1 / np.mean(found.factor * factor)  # no frame tells the common factor
     assert scale == pytest.approx(1, abs=0.06)
     assert np.abs(found.factor * factor * scale - 1).max() < 0.02
@@ -90,7 +93,7 @@ def test_place_and_yaw_are_found_though_depth_is_off(speed_m_s: float, yaw_rate:
 def test_flow_that_is_lost_does_not_count() -> None:
     true, right = street(-12.0), np.ones(FRAMES)
     flow = true.carried(right, lost=0.4)
-    found = placed(true.cameras, true.times_s, true.middles_m(right), flow, UP, PlacingOptions())
+    found = placed(true.glances(true.middles_m(right)), flow, UP, PlacingOptions())
     assert np.abs(moved(found.place_m) - moved(true.place_m)).max() < 0.25
 
 
@@ -98,18 +101,33 @@ def test_without_flow_motion_is_smooth() -> None:
     true = street(6.0)
     middles = true.place_m + np.random.default_rng(3).normal(0, 0.3, (FRAMES, 3))
     middles[3] += [0, 0, 9.0]  # one frame has it all wrong
-    found = placed(true.cameras, true.times_s, middles, (), UP, PlacingOptions())
+    found = placed(true.glances(middles), (), UP, PlacingOptions())
     rough = np.abs(np.diff(middles, n=2, axis=0)).max()
     assert np.abs(np.diff(found.place_m, n=2, axis=0)).max() < 0.02 * rough
     assert np.abs(found.place_m - true.place_m).max() < 0.6
 
 
+def test_frames_that_the_border_cuts_off_do_not_draw_the_path_to_what_they_show() -> None:
+    true, right = street(0.5), np.ones(FRAMES)
+    middles = true.middles_m(right)
+    middles[:4] += [0, 0, 2.0]  # they see one end alone
+    flow = true.carried(right)
+    off = [
+        np.abs(
+            moved(placed(true.glances(middles, cut), flow, UP, PlacingOptions()).place_m)
+            - moved(true.place_m)
+        )
+        for cut in (0, 4)
+    ]
+    assert off[1].max() < 0.15
+    assert off[1].max() < 0.5 * off[0].max()
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_or_two_frames_are_enough(count: int) -> None:
     true = street(3.0)
-    cameras, times = true.cameras[:count], true.times_s[:count]
     flow = true.carried(np.ones(FRAMES))[: count - 1]
-    found = placed(cameras, times, true.middles_m(np.ones(FRAMES))[:count], flow, UP, PlacingOptions())
+    found = placed(true.glances(true.middles_m(np.ones(FRAMES))[:count]), flow, UP, PlacingOptions())
     assert found.place_m.shape == (count, 3)
     assert np.allclose(np.diff(found.place_m, axis=0), np.diff(true.place_m[:count], axis=0), atol=0.1)
     assert found.yaw_rad[count // 2] == 0

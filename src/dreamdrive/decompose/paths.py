@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.decompose.flow import grey, guided
-from dreamdrive.decompose.placing import Carried, Placement, PlacingOptions, placed
+from dreamdrive.decompose.placing import Carried, Glances, Placement, PlacingOptions, placed
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -53,18 +53,27 @@ def find_path(
     frames oncoming traffic moves farther than flow finds by itself. Places at most ``reach_px`` apart are
     neighbours.
     """
-    cameras, times_s = [geometry.cameras[frame] for frame in frames], clip.times_s[frames]
-    middles_m = np.stack(
-        [np.median(camera.lift(each), axis=0) for camera, each in zip(cameras, shown, strict=True)]
-    )
+    glances = _glances(clip, geometry, frames, shown, reach_px)
     up = _UP if geometry.ground is None else geometry.ground.normal_world
-    path = Path(frames, placed(cameras, times_s, middles_m, (), up, options), up)
+    path = Path(frames, placed(glances, (), up, options), up)
     for _ in range(_ROUNDS):
         steps = range(len(frames) - 1)
         found = [_carried(k, clip, geometry, path, shown, options, reach_px) for k in steps]
-        known = [each for each in found if each is not None]
-        path = Path(frames, placed(cameras, times_s, middles_m, known, up, options), up)
+        path = Path(frames, placed(glances, [each for each in found if each is not None], up, options), up)
     return path
+
+
+def _glances(
+    clip: Clip,
+    geometry: Geometry,
+    frames: Int[np.ndarray, " k"],
+    shown: list[Float[np.ndarray, "_ 3"]],
+    reach_px: float,
+) -> Glances:
+    cameras, right = [geometry.cameras[frame] for frame in frames], clip.size[0] - reach_px
+    middles_m = [np.median(camera.lift(each), axis=0) for camera, each in zip(cameras, shown, strict=True)]
+    whole = [each[:, 0].min() > reach_px and each[:, 0].max() < right for each in shown]
+    return Glances(cameras, clip.times_s[frames], np.stack(middles_m), np.array(whole))
 
 
 def _carried(

@@ -12,7 +12,7 @@ from itertools import pairwise
 from math import radians
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from dreamdrive.scene.camera import NEAR_M, Camera
 
@@ -37,6 +37,9 @@ class PlacingOptions:
         factor: Of the logarithm of the factor of a frame's depth.
         place: Of the middle of the points of a frame, in shares of their distance: each frame sees another
             part of the thing.
+        cut_m: Added to that where the border of the picture cuts the thing off: one end is all that it shows.
+            With 0.3, as where it is whole, a van that overtakes on drawn street 3 is 0.24 m off in place of
+            0.14, and the view 2 m aside loses 1.7 dB.
         acceleration_m_s2: Of what moves along the road.
         climb_m_s2: Across it.
         yaw_rate_deg_s: Of its yaw.
@@ -50,12 +53,30 @@ class PlacingOptions:
     depth: float = 0.1
     factor: float = 0.08
     place: float = 0.06
+    cut_m: float = 3.0
     acceleration_m_s2: float = 2.5
     climb_m_s2: float = 0.3
     yaw_rate_deg_s: float = 20.0
     yaw_acceleration_deg_s2: float = 40.0
     samples: int = 120
     independent: float = 12.0
+
+
+@dataclass(frozen=True)
+class Glances:
+    """The K frames that saw a thing, in order.
+
+    Attributes:
+        cameras: Their cameras.
+        times_s: Their times.
+        middles_m: The middles of what they saw, in the world.
+        whole: Which of them saw all of it: the border of the picture cuts it off in the others.
+    """
+
+    cameras: Sequence[Camera]
+    times_s: Float[np.ndarray, " k"]
+    middles_m: Float[np.ndarray, "k 3"]
+    whole: Bool[np.ndarray, " k"]
 
 
 @dataclass(frozen=True)
@@ -82,31 +103,25 @@ class Placement:
         place_m: Of one point of it, in the world.
         yaw_rad: Turn about the up axis, right-handed, against a frame about the middle.
         factor: Of the depth that each frame saw.
+        spread_m: Standard deviation of the place along the axis in which it is known least.
     """
 
     place_m: Float[np.ndarray, "k 3"]
     yaw_rad: Float[np.ndarray, " k"]
     factor: Float[np.ndarray, " k"]
+    spread_m: Float[np.ndarray, " k"]
 
 
 def placed(
-    cameras: Sequence[Camera],
-    times_s: Float[np.ndarray, " k"],
-    middles_m: Float[np.ndarray, "k 3"],
-    carried: Sequence[Carried],
-    up: Float[np.ndarray, "3"],
-    options: PlacingOptions,
+    seen: Glances, carried: Sequence[Carried], up: Float[np.ndarray, "3"], options: PlacingOptions
 ) -> Placement:
-    """The motion that explains most.
-
-    Cameras and times are those of the frames that saw the thing, in order, ``middles_m`` the middles of what
-    they saw, in the world; ``up`` is the axis of yaw.
-    """
-    count = len(cameras)
-    flow = _Flow(cameras, carried, up, options) if carried else None
-    prior = _prior(cameras, times_s, middles_m, up, options)
+    """The motion that explains most; ``up`` is the axis of yaw."""
+    count = len(seen.cameras)
+    flow = _Flow(seen.cameras, carried, up, options) if carried else None
+    prior = _prior(seen, up, options)
     state = np.zeros((count, _STATE))
-    state[:, :3] = middles_m
+    state[:, :3] = seen.middles_m
+    normal = np.eye(state.size)
     for step in range(_STEPS):
         normal, gradient = prior.terms(state)
         # The first step has none: from far away the wrong points would pass for lost.
@@ -119,7 +134,14 @@ def placed(
         state[:, 4] = state[:, 4].clip(-_MOST_FACTOR, _MOST_FACTOR)
         if step > 0.7 * _STEPS and np.abs(change[:, :3]).max() < _STILL_M:
             break
-    return Placement(state[:, :3], state[:, 3] - state[count // 2, 3], np.exp(state[:, 4]))
+    spread_m = _spread_m(np.linalg.inv(normal), count)
+    return Placement(state[:, :3], state[:, 3] - state[count // 2, 3], np.exp(state[:, 4]), spread_m)
+
+
+def _spread_m(covariance: Float[np.ndarray, "m m"], count: int) -> Float[np.ndarray, " k"]:
+    """Of each place, the deviation along the axis in which it is known least."""
+    blocks = covariance.reshape(count, _STATE, count, _STATE)[np.arange(count), :3, np.arange(count), :3]
+    return np.sqrt(np.linalg.eigvalsh(blocks)[:, -1].clip(0))
 
 
 class _Flow:
@@ -202,23 +224,17 @@ class _Prior:
         return weighted @ self.rows + _FREE * np.eye(state.size), weighted @ off
 
 
-def _prior(
-    cameras: Sequence[Camera],
-    times_s: Float[np.ndarray, " k"],
-    middles_m: Float[np.ndarray, "k 3"],
-    up: Float[np.ndarray, "3"],
-    options: PlacingOptions,
-) -> _Prior:
+def _prior(seen: Glances, up: Float[np.ndarray, "3"], options: PlacingOptions) -> _Prior:
     """What is known without flow: about the places, and that motion is smooth."""
-    count = len(cameras)
-    arm = middles_m - np.stack([camera.world_from_camera[:3, 3] for camera in cameras])
-    off = options.place * np.linalg.norm(arm, axis=1) + _PLACE_M
+    count = len(seen.cameras)
+    arm = seen.middles_m - np.stack([camera.world_from_camera[:3, 3] for camera in seen.cameras])
+    off = options.place * np.linalg.norm(arm, axis=1) + np.where(seen.whole, _PLACE_M, options.cut_m)
     place, factor = np.zeros((count, 3, count, _STATE)), np.zeros((count, count, _STATE))
     for k in range(count):
         place[k, :, k, :3] = np.eye(3) / off[k]
         place[k, :, k, 4] = -arm[k] / off[k]
         factor[k, k, 4] = 1 / options.factor
-    gaps_s = np.diff(times_s)
+    gaps_s = np.diff(seen.times_s)
     turn = np.zeros((count - 1, count, _STATE))
     for k, gap_s in enumerate(gaps_s):
         turn[k, k : k + 2, 3] = np.array([-1, 1]) / gap_s / radians(options.yaw_rate_deg_s)
@@ -235,7 +251,7 @@ def _prior(
     parts = [each.reshape(-1, count * _STATE) for each in (place, factor, turn, bend, twist)]
     rows = np.concatenate(parts)
     wanted = np.zeros(len(rows))
-    wanted[: 3 * count] = (middles_m / off[:, None]).ravel()
+    wanted[: 3 * count] = (seen.middles_m / off[:, None]).ravel()
     return _Prior(rows, wanted)
 
 

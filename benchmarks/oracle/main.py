@@ -1,0 +1,128 @@
+"""The command line of ``oracle.py``, and its tables."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any, get_args
+
+import numpy as np
+
+from common.keep import kept
+from common.machine import describe_machine
+from common.markdown import grid, number
+from common.options import parser_of
+from common.report import publish
+from common.worlds import DEVELOPMENT, set_of
+from dreamdrive.knowledge import NO_KNOWLEDGE
+from dreamdrive.options import Options
+from dreamdrive.run import digest, program_digest
+from oracle.arms import ARMS, ceiling, judged
+from oracle.views import Seen, seen
+from street.case import VIEWS, Case, References, case_digest, clip_of
+from street.methods import QUALITY
+from street.views import views_digest
+
+Row = dict[str, Any]
+AS_IT_IS, WITHOUT, CEILING = "as it is", "none", "ceiling"
+NAMES = {WITHOUT: None, **{"+".join(arm) or AS_IT_IS: arm for arm in ARMS}, CEILING: None}
+GROUPS = ("all", "standing", "moving", "unseen")
+
+
+def main(doc: str | None) -> int:
+    """Measure, print the tables and write all as JSON."""
+    parser = parser_of(doc, runs="runs/oracle", markdown=True)
+    parser.add_argument("--seeds", type=int, nargs="+", default=list(DEVELOPMENT[:4]))
+    parser.add_argument("--references", nargs="+", choices=get_args(References), default=["clean"])
+    parser.add_argument("--poses", nargs="+", choices=("true", "estimated"), default=["true"])
+    parser.add_argument("--views", nargs="+", choices=VIEWS, default=["held_out", "shift_2"])
+    parser.add_argument("--arms", nargs="+", choices=NAMES, default=list(NAMES))
+    args = parser.parse_args()
+    rows: list[Row] = []
+    for case in [Case(s, p, r) for r in args.references for p in args.poses for s in args.seeds]:
+        views = cache(partial(_views, case, tuple(args.views)))
+        for name in args.arms:
+            path = args.runs / f"{case.name}-{name.replace(' ', '-')}.json"
+            key = digest(
+                [
+                    program_digest(),
+                    _options(name),
+                    name,
+                    case_digest(case),
+                    views_digest(case.seed),
+                    args.views,
+                ]
+            )
+            found = kept(path, key, partial(_measured, case, name, views))
+            rows.append(
+                {
+                    "arm": name,
+                    "poses": case.geometry,
+                    "references": case.references,
+                    "seed": case.seed,
+                    **found,
+                }
+            )
+            print(_line(rows[-1]), file=sys.stderr, flush=True)
+    report = {"machine": describe_machine(), "worlds": set_of(args.seeds), "rows": rows}
+    return publish(args, report, tables(rows), ())
+
+
+def _options(name: str) -> Options:
+    return replace(QUALITY, knowledge=NO_KNOWLEDGE) if name == WITHOUT else QUALITY
+
+
+def _views(case: Case, names: tuple[str, ...]) -> dict[str, Seen]:
+    return {name: seen(case.seed, name, clip_of(case)) for name in names}
+
+
+def _measured(case: Case, name: str, views: Callable[[], dict[str, Seen]]) -> Row:
+    if name == CEILING:
+        return ceiling(views())
+    return judged(case, _options(name), NAMES[name] or (), views())
+
+
+def _line(row: Row) -> str:
+    cells = [f"{view} {number(row[view]['all'])} / {number(row[view]['moving'])}" for view in _shown(row)]
+    return f"{row['seed']} {row['poses']} {row['references']} {row['arm']}: " + ", ".join(cells)
+
+
+def _shown(row: Row) -> list[str]:
+    return [view for view in VIEWS if view in row]
+
+
+def tables(rows: list[Row]) -> str:
+    """For each kind of case and each view the means over the worlds, an arm a line."""
+    texts: list[str] = []
+    for poses, references in dict.fromkeys((row["poses"], row["references"]) for row in rows):
+        same = [row for row in rows if (row["poses"], row["references"]) == (poses, references)]
+        for view in _shown(same[0]):
+            texts.append(
+                f"{view}, {poses} poses, {references} references, {len({r['seed'] for r in same})} worlds\n"
+            )
+            texts.append(_table(same, view))
+    return "\n".join(texts)
+
+
+def _table(rows: list[Row], view: str) -> str:
+    arms = dict.fromkeys(row["arm"] for row in rows)
+    mean = {arm: {g: _mean([r[view][g] for r in rows if r["arm"] == arm]) for g in GROUPS} for arm in arms}
+    nothing = dict.fromkeys(GROUPS)
+    low, high = mean.get(WITHOUT, nothing), mean.get("+".join(ARMS[-1]), nothing)
+    lines = [["truth in place of", *(f"{g}, dB" for g in GROUPS), "share of what all truth brings, %"]]
+    for arm, values in mean.items():
+        gains = [_share(values[g], low[g], high[g]) for g in ("all", "moving")]
+        told = "" if arm in (WITHOUT, CEILING) else " / ".join(number(gain, ".0f") for gain in gains)
+        lines.append([arm, *(number(values[g]) for g in GROUPS), told])
+    return grid(lines)
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _share(value: float | None, low: float | None, high: float | None) -> float | None:
+    if value is None or low is None or high is None or high <= low:
+        return None
+    return 100 * (value - low) / (high - low)
