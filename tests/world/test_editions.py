@@ -62,8 +62,9 @@ a dry day, wet snow, and a night of the worlds kept for tests."""
 WITHOUT_AVX512: dict[tuple[int, int], str] = {
     (2, 7): "39834dd2361a7b40d30969ed51253616046834faf38bca7f28adae6a37393470",
 }
-"""SHA-256 of frames that processors with AVX2 alone draw otherwise. A wet road mirrors where its share is large
-enough, and the number of such pixels seeds the roughness of them all: rounding decides. All else is the same."""
+"""SHA-256 of frames that processors with AVX2 alone draw otherwise. A wet road mirrors where its share is
+large enough, and the number of such pixels seeds the roughness of them all: rounding decides. All else is the
+same."""
 
 
 @pytest.mark.parametrize(
