@@ -86,18 +86,32 @@ def outlined(mask: Bool[np.ndarray, "h w"], closing: float) -> Bool[np.ndarray, 
     """A thing without holes and narrow notches; what the picture's border cuts off goes on beyond it."""
     reach = max(1, round(closing * float(np.sqrt(mask.sum()))))
     beyond = reach + 1
-    wide = np.pad(mask.astype(np.uint8), beyond)
-    for border in (wide[:, beyond], wide[:, -beyond - 1], wide[beyond], wide[-beyond - 1]):
-        filled = np.flatnonzero(border)
-        if len(filled):
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    thing = mask[box].astype(np.uint8)
+    # Nothing that is closed or filled reaches out of the thing's box.
+    wide = np.zeros((thing.shape[0] + 2 * beyond, thing.shape[1] + 2 * beyond), np.uint8)
+    inner = slice(beyond, -beyond), slice(beyond, -beyond)
+    height, width = mask.shape
+    sides = (
+        (box[1].start == 0, thing[:, 0], wide[inner[0], :beyond].T),
+        (box[1].stop == width, thing[:, -1], wide[inner[0], -beyond:].T),
+        (box[0].start == 0, thing[0], wide[:beyond, inner[1]]),
+        (box[0].stop == height, thing[-1], wide[-beyond:, inner[1]]),
+    )
+    for cut, border, outside in sides:
+        if cut:
+            filled = np.flatnonzero(border)
             border[filled[0] : filled[-1] + 1] = 1
-    inner = wide[beyond:-beyond, beyond:-beyond]
-    wide = np.pad(inner, beyond, mode="edge")
+            outside[:] = border
+    wide[inner] = thing
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     closed = cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(closed, outlines, -1, 1, cv2.FILLED)
-    return closed[beyond:-beyond, beyond:-beyond] > 0
+    whole = np.zeros_like(mask)
+    whole[box] = closed[inner] > 0
+    return whole
 
 
 def _centres(

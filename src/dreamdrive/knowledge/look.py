@@ -141,8 +141,8 @@ def _see(
     # Between two road users a mean of their offsets would point to neither.
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
     instances, users = group(classes, chance, peaks, offset_px, options.grouping)
-    for number, user in enumerate(users, start=1):
-        classes[torch.from_numpy(instances == number)] = user.kind
+    kinds = torch.tensor([0, *(user.kind for user in users)])[torch.from_numpy(instances.astype(np.int64))]
+    classes = torch.where(torch.from_numpy(instances > 0), kinds, classes)
     depth, spread = _depth(said, fitting, _regions(classes, instances))
     sky = classes == StreetClass.SKY
     maps = {

@@ -185,9 +185,7 @@ class Eye2(Eye):
         wet = level * self.world.ground2.wetness(here[:, :2], level)
         wet *= np.where(self.world.ground.labels_at(here[:, :2]) == Semantic.GRASS, 0.3, 1).astype(np.float32)
         seen[ground] *= (1 - 0.45 * wet)[:, None]
-        rest = 1 - slope[ground]
-        # Products are the same on every processor, powers are not.
-        share = wet * (0.02 + 0.98 * (rest * rest * rest * rest * rest))
+        share = wet * (0.02 + 0.98 * (1 - slope[ground]) ** 5)
         mirrors = np.flatnonzero(share > 0.03)
         if not len(mirrors):
             return
