@@ -62,11 +62,18 @@ def true_paths(
     for c in range(int(cluster.max(initial=-1)) + 1):
         count = np.bincount(instances[cluster == c])
         if int(count.argmax()) > 0:
-            found[c] = _path(made, boxes[int(count.argmax())], geometry, ~clip.held_out)
+            seen = np.bincount(seeds.source_frame.numpy()[cluster == c], minlength=len(clip))
+            found[c] = _path(made, boxes[int(count.argmax())], geometry, ~clip.held_out, seen)
     return found
 
 
-def _path(made: Drive, box: WorldBox, geometry: Geometry, used: Bool[np.ndarray, " f"]) -> Path:
+def _path(
+    made: Drive,
+    box: WorldBox,
+    geometry: Geometry,
+    used: Bool[np.ndarray, " f"],
+    seeds: Int[np.ndarray, " f"],
+) -> Path:
     similarity = fit_similarity(geometry.cameras, made.cameras)
     poses = box.world_from_box[used]
     place_m = (poses[:, :3, 3] - similarity.translation) @ similarity.rotation / similarity.scale
@@ -78,4 +85,5 @@ def _path(made: Drive, box: WorldBox, geometry: Geometry, used: Bool[np.ndarray,
         np.flatnonzero(used),
         Placement(place_m, np.unwrap(yaw), np.ones(len(poses)), np.zeros(len(poses))),
         up,
+        tuple(np.ones(count) for count in seeds[used]),
     )

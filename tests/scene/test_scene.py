@@ -61,6 +61,14 @@ def test_a_track_goes_on_at_its_rate() -> None:
     np.testing.assert_allclose(found.yaw_rad, 3 + (2 * np.pi - 6) * np.array([-0.5, 0.5, 2]))
 
 
+def test_noise_at_the_end_of_a_track_does_not_lead_it_astray() -> None:
+    times_s = 0.1 * np.arange(10)
+    positions = np.stack([8 * times_s, 0 * times_s, 0 * times_s], axis=1)
+    positions[-2, 0] += 0.1
+    found = Track(times_s, positions, np.zeros(10)).at(np.array([1.9]))
+    assert found.positions_m[0, 0] == pytest.approx(8 * 1.9, abs=0.6)
+
+
 def test_a_scene_without_an_actor_has_none_of_it() -> None:
     scene = make_scene()
     members = int((scene.dynamic.actor == 0).sum())

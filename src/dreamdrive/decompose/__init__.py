@@ -3,7 +3,7 @@
 from dreamdrive.decompose.actors import ActorOptions, Cast, cast
 from dreamdrive.decompose.errors import error_maps
 from dreamdrive.decompose.flow import neighbour_flow
+from dreamdrive.decompose.glances import Placement, PlacingOptions
 from dreamdrive.decompose.group import Grouping, GroupOptions, group, source_pixels
 from dreamdrive.decompose.paths import Path, find_path
-from dreamdrive.decompose.placing import Placement, PlacingOptions
 from dreamdrive.decompose.score import ScoreNetwork, ScoreOptions, score

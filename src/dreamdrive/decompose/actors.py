@@ -16,10 +16,10 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
+from dreamdrive.decompose.glances import PlacingOptions
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
-from dreamdrive.decompose.paths import Path, find_path
-from dreamdrive.decompose.placing import PlacingOptions
+from dreamdrive.decompose.paths import Path, deeper, find_path
 from dreamdrive.motion import Tracks, multiply_quaternions
 from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.clip import Clip
@@ -138,7 +138,9 @@ def _merge(
         rows = np.flatnonzero(cluster == c)
         placement = path.placement
         where = np.searchsorted(path.frames, frames[rows])
-        stretch = placement.factor[where]
+        stretch = np.zeros(len(rows))
+        for k, factors in enumerate(path.stretch):
+            stretch[where == k] = factors
         centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames[rows]])
         seen_m = centres + (means[rows] - centres) * stretch[:, None]
         back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * path.up)
@@ -191,7 +193,7 @@ def _glimpses(
     """What each frame of a path saw of its cluster, as deep as the path says."""
     found: list[Glimpse] = []
     for k, frame in enumerate(path.frames.tolist()):
-        copies = pixels[frames == frame] * [1, 1, path.placement.factor[k]]
+        copies = deeper(pixels[frames == frame], path.stretch[k])
         camera, moved = geometry.cameras[frame], path.world_from_canonical(k)
         found.append(Glimpse(float(clip.times_s[frame]), camera, moved, copies, geometry.depth_m[frame]))
     return found

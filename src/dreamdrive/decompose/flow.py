@@ -32,6 +32,7 @@ def neighbour_flow(
 
 
 _LEAST_SIDE_PX, _LARGEST = 64, 3.0  # of what flow is looked for in, and by how much it is enlarged for that
+_STIFF = 0.02  # how far a warp keeps to one factor: share of the spread of points
 _RETURNS_PX = 1.0  # flow there and back misses by less where it can be trusted
 
 
@@ -47,8 +48,7 @@ def guided(
     found in a cut around the thing. With the places it is told where the flow back leads to the start again.
     """
     middle, there = points.mean(axis=0), expected.mean(axis=0)
-    spread, shared = (float(((points - middle) * each).sum()) for each in (points - middle, expected - there))
-    scale = min(max(shared / spread, 0.3), 3.0) if spread > 0 else 1.0
+    way = _warp(points - middle, expected - there)
     low, high = points.min(axis=0), points.max(axis=0)
     margin = np.maximum(0.3 * (high - low), 8.0)
     corner, size = low - margin, high - low + 2 * margin
@@ -56,12 +56,11 @@ def guided(
     shape = int(np.ceil(size[0] * enlarged)), int(np.ceil(size[1] * enlarged))
     # From the cut to each picture, in coordinates in which the middle of the first pixel is 0.
     to_first = np.array([[1 / enlarged, 0, corner[0] - 0.5], [0, 1 / enlarged, corner[1] - 0.5]])
-    moved = there + scale * (corner - middle)
-    to_second = np.array([[scale / enlarged, 0, moved[0] - 0.5], [0, scale / enlarged, moved[1] - 0.5]])
+    to_second = np.column_stack([way / enlarged, there + way @ (corner - middle) - 0.5])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     one, other = (
-        cv2.warpAffine(picture, way, shape, flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        for picture, way in ((first, to_first), (second, to_second))
+        cv2.warpAffine(picture, matrix, shape, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        for picture, matrix in ((first, to_first), (second, to_second))
     )
     method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     still = np.zeros((*one.shape, 2), np.float32)
@@ -69,4 +68,17 @@ def guided(
     start = (points - corner) * enlarged
     end = carried(start, ahead)
     trusted = np.linalg.norm(carried(end, back) - start, axis=1) < _RETURNS_PX * enlarged
-    return moved + scale * end / enlarged, trusted & (end >= 0).all(axis=1) & (end < shape).all(axis=1)
+    return there + (end / enlarged + corner - middle) @ way.T, trusted & (end >= 0).all(axis=1) & (
+        end < shape
+    ).all(axis=1)
+
+
+def _warp(points: Float[np.ndarray, "m 2"], expected: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "2 2"]:
+    """The linear map that brings points next to where they are expected; both are about their middles.
+
+    One factor, unless the points spread in both directions.
+    """
+    spread = float((points**2).sum())
+    scale = min(max(float((points * expected).sum()) / spread, 0.3), 3.0) if spread > 0 else 1.0
+    ridge = _STIFF * max(spread, 1.0) * np.eye(2)
+    return np.linalg.solve(points.T @ points + ridge, points.T @ expected + scale * ridge).T

@@ -8,23 +8,29 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.decompose.flow import grey, guided
-from dreamdrive.decompose.placing import Carried, Glances, Placement, PlacingOptions, placed
+from dreamdrive.decompose.glances import Carried, Glances, Placement, PlacingOptions, PointDepth
+from dreamdrive.decompose.placing import placed
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
-_ROUNDS = 2  # flow starts from the path that the flow before has given
+_ROUNDS = (1,), (1,), (1, 3)  # how many frames apart; flow starts from the path that the flow before gave
+_NEIGHBOURS = 9  # points that tell the depth of one beside them
 _LEAST_POINTS = 12  # that flow carries from frame to frame
 _UP = np.array([0.0, -1.0, 0.0])  # where no road tells it
 
 
 @dataclass(frozen=True)
 class Path:
-    """Places of a rigid thing in the frames that saw it, in order; ``up`` is the axis of yaw."""
+    """Places of a rigid thing in the frames that saw it, in order; ``up`` is the axis of yaw.
+
+    ``stretch`` has for each frame a factor of the depth of each place that it showed.
+    """
 
     frames: Int[np.ndarray, " k"]
     placement: Placement
     up: Float[np.ndarray, "3"]
+    stretch: tuple[Float[np.ndarray, " _"], ...]
 
     @property
     def pivot_m(self) -> Float[np.ndarray, "3"]:
@@ -55,12 +61,40 @@ def find_path(
     """
     glances = _glances(clip, geometry, frames, shown, reach_px)
     up = _UP if geometry.ground is None else geometry.ground.normal_world
-    path = Path(frames, placed(glances, (), up, options), up)
-    for _ in range(_ROUNDS):
-        steps = range(len(frames) - 1)
-        found = [_carried(k, clip, geometry, path, shown, options, reach_px) for k in steps]
-        path = Path(frames, placed(glances, [each for each in found if each is not None], up, options), up)
+    path = _path(frames, placed(glances, (), up, options), up, shown)
+    for gaps in _ROUNDS:
+        pairs = [(k, k + way * gap) for k in range(len(frames)) for gap in gaps for way in (-1, 1)]
+        among = [pair for pair in pairs if 0 <= pair[1] < len(frames)]
+        found = [_carried(*pair, clip, geometry, path, shown, options, reach_px) for pair in among]
+        carried = [each for each in found if each is not None]
+        path = _path(frames, placed(glances, carried, up, options), up, shown)
     return path
+
+
+def _path(
+    frames: Int[np.ndarray, " k"],
+    placement: Placement,
+    up: Float[np.ndarray, "3"],
+    shown: list[Float[np.ndarray, "_ 3"]],
+) -> Path:
+    points = placement.points or [None] * len(frames)
+    of_frames = zip(shown, points, placement.factor, strict=True)
+    return Path(frames, placement, up, tuple(_stretch(*each) for each in of_frames))
+
+
+def _stretch(
+    places: Float[np.ndarray, "m 3"], known: PointDepth | None, factor: float
+) -> Float[np.ndarray, " m"]:
+    """Factor of the depth of all places of a frame: that of the points beside them."""
+    if known is None or len(known.point) < _NEIGHBOURS:
+        return np.full(len(places), factor)
+    _, near = KDTree(places[known.point, :2]).query(places[:, :2], k=_NEIGHBOURS)
+    return np.median(known.factor[near], axis=1)
+
+
+def deeper(places: Float[np.ndarray, "m 3"], factor: Float[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
+    """Places (column, row, depth) with their depths multiplied."""
+    return np.column_stack([places[:, :2], places[:, 2] * factor])
 
 
 def _glances(
@@ -78,6 +112,7 @@ def _glances(
 
 def _carried(
     k: int,
+    to: int,
     clip: Clip,
     geometry: Geometry,
     path: Path,
@@ -85,21 +120,22 @@ def _carried(
     options: PlacingOptions,
     reach_px: float,
 ) -> Carried | None:
-    """What flow carries from a frame onto the same thing in the next one."""
-    frame, other = path.frames[k : k + 2].tolist()
-    chosen = shown[k][:: max(1, len(shown[k]) // options.samples)]
+    """What flow carries from a frame onto the same thing in another one."""
+    frame, other = int(path.frames[k]), int(path.frames[to])
+    number = np.arange(0, len(shown[k]), max(1, len(shown[k]) // options.samples))
+    chosen = shown[k][number]
     if len(chosen) < _LEAST_POINTS:
         return None
-    step = path.world_from_canonical(k + 1) @ np.linalg.inv(path.world_from_canonical(k))
-    points = geometry.cameras[frame].lift(chosen * [1, 1, path.placement.factor[k]])
+    step = path.world_from_canonical(to) @ np.linalg.inv(path.world_from_canonical(k))
+    points = geometry.cameras[frame].lift(deeper(chosen, path.stretch[k][number]))
     expected = geometry.cameras[other].project(points @ step[:3, :3].T + step[:3, 3])
     if (expected[:, 2] <= NEAR_M).any():
         return None
     one, two = (grey(clip.frames[each]) for each in (frame, other))
     moved, kept = guided(one, two, chosen[:, :2], expected[:, :2])
-    distance, nearest = KDTree(shown[k + 1][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
+    distance, nearest = KDTree(shown[to][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
     kept &= np.isfinite(distance)
     if kept.sum() < _LEAST_POINTS:
         return None
-    depth_m = shown[k + 1][np.asarray(nearest)[kept], 2]
-    return Carried(k, k + 1, chosen[kept, :2], chosen[kept, 2], moved[kept], depth_m)
+    depth_m = shown[to][np.asarray(nearest)[kept], 2]
+    return Carried(k, to, number[kept], chosen[kept, :2], chosen[kept, 2], moved[kept], depth_m)

@@ -135,12 +135,16 @@ class UserOptions:
         nearer: Log of the ratio of distances from which on stereo contradicts contact with the road. Parked
             cars come to 0.3, oncoming ones to 0.6 to 1.3.
         sure_stereo: Trust in stereo from which on it contradicts.
+        rim: Regions beside road users that are flagged, and nowhere wider than twice this share of the width,
+            do not move: four fifths of their pixels are street that a user has just left. With 0 standing
+            things of drawn streets 0-7 seem to move 15 mm in place of 13, and KITTI 04 loses 0.4 dB.
     """
 
     sure: float = 0.8
     moving_share: float = 0.3
     nearer: float = 0.45
     sure_stereo: float = 0.25
+    rim: float = 0.02
 
 
 @dataclass(frozen=True)

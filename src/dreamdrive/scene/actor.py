@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+_RATE_S = 0.5  # over which the rate at the ends of a track is taken
+
 
 @dataclass(frozen=True)
 class Track:
@@ -41,12 +43,18 @@ class Track:
         """The track at other times: linear between those known, at a constant rate beyond them."""
         known = np.column_stack([self.positions_m, np.unwrap(self.yaw_rad)])
         found = np.stack([np.interp(times_s, self.times_s, column) for column in known.T], axis=1)
-        if len(self.times_s) > 1:
-            ends = ((times_s < self.first_s, 0, 1), (times_s > self.last_s, -1, -2))
-            for beyond, end, inner in ends:
-                rate = (known[end] - known[inner]) / (self.times_s[end] - self.times_s[inner])
-                found[beyond] = known[end] + (times_s[beyond] - self.times_s[end])[:, None] * rate
+        for beyond, end in ((times_s < self.first_s, 0), (times_s > self.last_s, -1)):
+            if len(self.times_s) > 1 and beyond.any():
+                away_s = (times_s[beyond] - self.times_s[end])[:, None]
+                found[beyond] = known[end] + away_s * self._rate_at(known, end)
         return Track(times_s, found[:, :3], found[:, 3])
+
+    def _rate_at(self, known: Float[np.ndarray, "k 4"], end: int) -> Float[np.ndarray, "4"]:
+        """Mean rate at one end, over ``_RATE_S``: two places alone would tell the noise of theirs."""
+        since_s = np.abs(self.times_s - self.times_s[end])
+        near = since_s <= max(_RATE_S, np.partition(since_s, 1)[1]) + 1e-9
+        centred_s = self.times_s[near] - self.times_s[near].mean()
+        return centred_s @ known[near] / (centred_s @ centred_s)
 
     @property
     def first_s(self) -> float:

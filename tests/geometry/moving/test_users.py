@@ -66,6 +66,19 @@ def test_what_is_surely_street_does_not_move() -> None:
     assert scene.found(np.where(scene.block, 0, 0.9).astype(np.float32))[scene.view.frames[0]].any()
 
 
+def test_rims_beside_users_do_not_move_but_wide_regions_do() -> None:
+    scene = Scene()
+    scene.look = replace(scene.look, confidence=np.full(scene.block.shape, 0.4, np.float16))
+    evidence = np.where(scene.block, 0.9, 0).astype(np.float32)
+    row, column = np.argwhere(scene.block[0])[0]
+    evidence[:, row : row + 20, column + 20 : column + 24] = 0.9  # the road that it has just left
+    evidence[:, row : row + 20, column - 60 : column - 30] = 0.9
+    flagged = scene.found(evidence)[scene.view.frames[0]]
+    assert flagged[row + 10, column + 10]
+    assert not flagged[row + 10, column + 21]
+    assert flagged[row + 10, column - 45]
+
+
 def test_a_user_that_stereo_sees_before_its_foot_moves() -> None:
     scene = Scene()
     scene.nearer[:3] = scene.block[:3]  # half of the frames

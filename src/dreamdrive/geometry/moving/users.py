@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt16
 
@@ -69,7 +70,20 @@ def whole_users(
             users[seen.frame][own] = number
             part = whole[seen.frame]
             part[own] = 1 if moves else np.minimum(part[own], 0.9 * FLAGGED)
+    for frame in view.frames:
+        thin = _thin((whole[frame] >= FLAGGED) & (users[frame] == 0), options.rim)
+        whole[frame][thin] = np.minimum(whole[frame][thin], 0.9 * FLAGGED)
     return whole, users
+
+
+def _thin(flagged: Bool[np.ndarray, "h w"], rim: float) -> Bool[np.ndarray, "h w"]:
+    """Regions nowhere thicker than twice ``rim``, a share of the width: the rims of users, not users."""
+    inside = flagged.astype(np.uint8)
+    count, found = cv2.connectedComponents(inside)
+    labels, depth = np.asarray(found, np.intp), np.asarray(cv2.distanceTransform(inside, cv2.DIST_L2, 3))
+    deepest = np.zeros(count, np.float32)
+    np.maximum.at(deepest, labels.ravel(), depth.ravel())
+    return flagged & (deepest[labels] < rim * flagged.shape[1])
 
 
 def is_moving(track: Sequence[Sighting], options: UserOptions) -> bool:
