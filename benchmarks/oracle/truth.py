@@ -83,7 +83,7 @@ def _path(
     yaw = Rotation.from_matrix(turns @ turns[middle].T).as_rotvec() @ up
     return Path(
         np.flatnonzero(used),
-        Placement(place_m, np.unwrap(yaw), np.ones(len(poses)), np.zeros(len(poses))),
+        Placement(place_m, np.unwrap(yaw), np.ones(len(poses)), np.zeros(len(poses)), turns[middle, :, 0]),
         up,
         tuple(np.ones(count) for count in seeds[used]),
     )

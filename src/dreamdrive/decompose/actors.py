@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
+from dreamdrive.decompose.completing import completed
 from dreamdrive.decompose.glances import PlacingOptions
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives
@@ -25,6 +26,8 @@ from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+
+_FADELESS = 100.0  # deviation of a life span over the length of the clip
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class ActorOptions:
         lasting: Whether copies of what no other frame sees live on, see ``lives``: without it novel views
             lose 0.11 dB, and standing things seem to move 14 mm less.
         placing: How place, yaw and depth of a track are estimated.
+        complete: Whether the side of a vehicle that no frame saw is mirrored from the one that some did, see
+            ``completing``. On drawn streets 4 and 7 the view 2 m aside wins 0.2 and 1.0 dB.
         least_frames: Clusters seen in fewer frames get no track, only a short life.
         opacity: Opacity to start from: what moves hides what it passes, and must not leave the static
             Gaussians behind it to take on its colours.
@@ -53,6 +58,7 @@ class ActorOptions:
     untracked_frames: float = 0.5
     lasting: bool = True
     placing: PlacingOptions = field(default_factory=PlacingOptions)
+    complete: bool = True
     least_frames: int = 2
     opacity: float = 0.8
 
@@ -119,54 +125,92 @@ def _merge(
     options: ActorOptions,
     reach_px: float,
 ) -> Cast:
-    seen = np.flatnonzero(~clip.held_out)
-    times = np.unique(clip.times_s[seen])
-    interval = float(np.median(np.diff(times)))
-    means = chosen.means.numpy().astype(np.float64)
-    log_scales = chosen.log_scales.numpy().copy()
-    quaternions = chosen.quaternions.clone()
-    opacity = torch.full_like(chosen.logit_opacities, math.log(options.opacity / (1 - options.opacity)))
-    actor = np.full(len(means), -1, dtype=np.int64)
+    times = np.unique(clip.times_s[~clip.held_out])
+    interval_s = float(np.median(np.diff(times)))
+    logit = math.log(options.opacity / (1 - options.opacity))
+    chosen = replace(chosen, logit_opacities=torch.full_like(chosen.logit_opacities, logit))
     frames = chosen.source_frame.numpy()
-    untracked_s = np.full(len(means), options.untracked_frames * interval)
-    lifespan = np.column_stack([clip.times_s[frames], untracked_s])
-    deviation_s = options.lifespan_frames * interval
+    parts: list[Gaussians] = []
     actors: list[Actor] = []
     for c, path in enumerate(paths):
-        if path is None:
-            continue
         rows = np.flatnonzero(cluster == c)
+        copies, number = chosen.select(torch.from_numpy(rows)), len(actors)
+        if path is None:
+            span = torch.full((len(rows),), options.untracked_frames * interval_s)
+            parts.append(_cast(copies, -1, torch.stack([_times(clip, copies), span], dim=1)))
+            continue
+        copies = _carried_home(copies, geometry, path)
+        glimpses = _glimpses(clip, geometry, path, pixels[rows], frames[rows])
+        spans = _spans(clip, copies, path, glimpses, options, interval_s, reach_px)
+        own = [_cast(copies, number, spans)]
+        if options.complete:
+            unseen = completed(copies, path.placement.ahead, path.up, glimpses, reach_px)
+            own += [] if unseen is None else [_cast(unseen, number, _always(clip, len(unseen)))]
+        parts += own
         placement = path.placement
-        where = np.searchsorted(path.frames, frames[rows])
-        stretch = np.zeros(len(rows))
-        for k, factors in enumerate(path.stretch):
-            stretch[where == k] = factors
-        centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames[rows]])
-        seen_m = centres + (means[rows] - centres) * stretch[:, None]
-        back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * path.up)
-        means[rows] = path.pivot_m + back.apply(seen_m - placement.place_m[where])
-        quaternions[rows] = _turned(back, quaternions[rows])
-        log_scales[rows] += np.log(stretch)[:, None]
-        actor[rows] = len(actors)
-        lifespan[rows, 1] = deviation_s
-        if options.lasting:
-            glimpses = _glimpses(clip, geometry, path, pixels[rows], frames[rows])
-            span_s = float(clip.times_s[0]), float(clip.times_s[-1])
-            lifespan[rows] = lives(means[rows], where, glimpses, span_s, deviation_s, reach_px)
         track = Track(clip.times_s[path.frames], placement.place_m, placement.yaw_rad)
-        number = len(actors)
-        actors.append(Actor(number, f"actor {number}", "unknown", len(rows), track, placement.spread_m))
-    merged = replace(
-        chosen,
-        means=torch.tensor(means, dtype=torch.float32),
-        quaternions=quaternions,
-        log_scales=torch.tensor(log_scales, dtype=torch.float32),
-        logit_opacities=opacity,
-        actor=torch.from_numpy(actor),
-        lifespan=torch.tensor(lifespan, dtype=torch.float32),
-    )
+        count = sum(len(part) for part in own)
+        actors.append(
+            Actor(number, f"actor {number}", "unknown", count, track, placement.spread_m, len(own) > 1)
+        )
     pivots = [path.pivot_m for path in paths if path is not None]
+    merged = Gaussians.concatenate(*parts)
     return Cast(merged, _tracks(times, actors, pivots) if actors else None, tuple(actors))
+
+
+def _cast(copies: Gaussians, actor: int, spans: Float[Tensor, "n 2"]) -> Gaussians:
+    number = torch.full((len(copies),), actor, dtype=torch.int64)
+    return replace(copies, actor=number, lifespan=spans.to(torch.float32))
+
+
+def _times(clip: Clip, copies: Gaussians) -> Float[Tensor, " n"]:
+    return torch.from_numpy(clip.times_s[copies.source_frame.numpy()]).to(torch.float32)
+
+
+def _always(clip: Clip, count: int) -> Float[Tensor, "n 2"]:
+    """Life spans in which nothing fades while the clip lasts."""
+    first_s, last_s = float(clip.times_s[0]), float(clip.times_s[-1])
+    return torch.tensor([(first_s + last_s) / 2, _FADELESS * (last_s - first_s)]).repeat(count, 1)
+
+
+def _carried_home(copies: Gaussians, geometry: Geometry, path: Path) -> Gaussians:
+    """Copies of an actor where it is in its canonical place, as deep as the path says."""
+    placement, frames = path.placement, copies.source_frame.numpy()
+    where = np.searchsorted(path.frames, frames)
+    stretch = np.zeros(len(copies))
+    for k, factors in enumerate(path.stretch):
+        stretch[where == k] = factors
+    means = copies.means.numpy().astype(np.float64)
+    centres = np.stack([geometry.cameras[f].world_from_camera[:3, 3] for f in frames])
+    seen_m = centres + (means - centres) * stretch[:, None]
+    back = Rotation.from_rotvec(-placement.yaw_rad[where][:, None] * path.up)
+    means = path.pivot_m + back.apply(seen_m - placement.place_m[where])
+    grown = copies.log_scales + torch.from_numpy(np.log(stretch))[:, None]
+    return replace(
+        copies,
+        means=torch.tensor(means, dtype=torch.float32),
+        quaternions=_turned(back, copies.quaternions),
+        log_scales=grown.to(torch.float32),
+    )
+
+
+def _spans(
+    clip: Clip,
+    copies: Gaussians,
+    path: Path,
+    glimpses: list[Glimpse],
+    options: ActorOptions,
+    interval_s: float,
+    reach_px: float,
+) -> Float[Tensor, "n 2"]:
+    deviation_s = options.lifespan_frames * interval_s
+    if not options.lasting:
+        times_s = _times(clip, copies)
+        return torch.stack([times_s, torch.full_like(times_s, deviation_s)], dim=1)
+    where = np.searchsorted(path.frames, copies.source_frame.numpy())
+    whole_s = float(clip.times_s[0]), float(clip.times_s[-1])
+    places = copies.means.numpy().astype(np.float64)
+    return torch.from_numpy(lives(places, where, glimpses, whole_s, deviation_s, reach_px))
 
 
 def _tracks(

@@ -107,6 +107,7 @@ class Placement:
         place_m: Of one point of it, in the world.
         yaw_rad: Turn about the up axis, right-handed, against a frame about the middle.
         factor: Of the depth that each frame saw.
+        ahead: Where the thing points in the middle one of the frames: a unit vector in the world.
         spread_m: Standard deviation of the place along the axis in which it is known least.
         points: What is known of the depth of single points of each frame; ``factor`` is for the rest.
     """
@@ -115,4 +116,5 @@ class Placement:
     yaw_rad: Float[np.ndarray, " k"]
     factor: Float[np.ndarray, " k"]
     spread_m: Float[np.ndarray, " k"]
+    ahead: Float[np.ndarray, "3"]
     points: tuple[PointDepth, ...] = ()

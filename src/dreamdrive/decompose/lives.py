@@ -49,7 +49,7 @@ def lives(
     ``deviation_s`` that of a copy that its neighbours in time replace. Neighbours in an image are at most
     ``reach_px`` apart.
     """
-    unseen = np.stack([_unseen(places, glimpse, reach_px) for glimpse in glimpses])
+    unseen = np.stack([unseen_by(glimpse, places, reach_px) for glimpse in glimpses])
     times = np.array([glimpse.time_s for glimpse in glimpses])
     begin = _until(unseen, source, times, -1, span_s[0])
     end = _until(unseen, source, times, 1, span_s[1])
@@ -77,7 +77,7 @@ def _until(
     return until
 
 
-def _unseen(places: Float[np.ndarray, "n 3"], glimpse: Glimpse, reach_px: float) -> Bool[np.ndarray, " n"]:
+def unseen_by(glimpse: Glimpse, places: Float[np.ndarray, "n 3"], reach_px: float) -> Bool[np.ndarray, " n"]:
     """Which surfaces a frame cannot see: out of view, or behind the actor itself or something else.
 
     One that would stand in front of what the frame saw, or beside the actor, is misplaced: it counts as seen.

@@ -48,7 +48,8 @@ def placed(
             break
     factor, spread_m = np.exp(state[:, 4]), _spread_m(np.linalg.inv(normal)[:-1, :-1], count)
     yaw_rad = state[:, 3] - state[count // 2, 3]
-    return Placement(state[:, :3], yaw_rad, factor, spread_m, points.depths(factor) if points else ())
+    ahead = motion.ahead(course_rad + state[count // 2, 3])
+    return Placement(state[:, :3], yaw_rad, factor, spread_m, ahead, points.depths(factor) if points else ())
 
 
 def _spread_m(covariance: Float[np.ndarray, "m m"], count: int) -> Float[np.ndarray, " k"]:

@@ -45,6 +45,10 @@ class SmoothMotion:
         # Nothing tells the yaw that all frames share.
         return normal + _FREE * np.eye(len(normal)), gradient
 
+    def ahead(self, angle_rad: float) -> Float[np.ndarray, "3"]:
+        """The direction at an angle against the way from the first place to the last."""
+        return np.cos(angle_rad) * self._ahead + np.sin(angle_rad) * self._left
+
     def _slip(
         self, state: Float[np.ndarray, "k 5"], course_rad: float
     ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s m"]]:

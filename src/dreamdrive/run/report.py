@@ -62,6 +62,7 @@ def describe(
                 "path_m": actor.track.length_m,
                 "speed_m_s": float(np.median(actor.track.speed_m_s)),
                 "spread_m": None if actor.spread_m is None else float(np.median(actor.spread_m)),
+                "completed": actor.completed,
             }
             for actor in scene.actors
         ],

@@ -79,6 +79,7 @@ class Actor:
         track: Where it is at the frames that saw it.
         spread_m: Standard deviation of its place at these (T,) along the axis in which it is known least, as
             the estimate of its track believes; None where nothing tells.
+        completed: Whether a side that no frame saw was mirrored from one that some did.
     """
 
     id: int
@@ -87,6 +88,7 @@ class Actor:
     count: int
     track: Track
     spread_m: Float[np.ndarray, " t"] | None = None
+    completed: bool = False
 
     def __post_init__(self) -> None:
         if self.spread_m is not None and len(self.spread_m) != len(self.track.times_s):

@@ -78,6 +78,7 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     positions_m: list[_Point]
     yaw_rad: list[_Angle] | None = None
     spread_m: list[Annotated[float, Meta(ge=0, le=FARTHEST_M)]] | None = None
+    completed: bool = False
 
     def actor(self) -> Actor:
         """The noun; ``ValueError`` where times and places do not belong together."""
@@ -87,16 +88,15 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             np.array(self.times_s, dtype=np.float64), positions_m, np.array(yaw_rad, dtype=np.float64)
         )
         spread_m = None if self.spread_m is None else np.array(self.spread_m, dtype=np.float64)
-        return Actor(self.id, self.name, self.kind, self.count, track, spread_m)
+        return Actor(self.id, self.name, self.kind, self.count, track, spread_m, self.completed)
 
     @classmethod
     def of(cls, actor: Actor) -> "_StoredActor":
         """What is stored of one."""
-        track, spread = actor.track, actor.spread_m
+        track = actor.track
         path = track.times_s.tolist(), track.positions_m.tolist(), track.yaw_rad.tolist()
-        return cls(
-            actor.id, actor.name, actor.kind, actor.count, *path, None if spread is None else spread.tolist()
-        )
+        spread_m = None if actor.spread_m is None else actor.spread_m.tolist()
+        return cls(actor.id, actor.name, actor.kind, actor.count, *path, spread_m, actor.completed)
 
 
 class _StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
