@@ -10,7 +10,6 @@ from dreamdrive.decompose.glances import STATE, Carried, PlacingOptions, PointDe
 from dreamdrive.decompose.smooth_motion import trust
 from dreamdrive.scene.camera import NEAR_M, Camera
 
-_DIFFERENCE = 1e-4  # that stands for a derivative
 MOST_FACTOR = 0.7
 """Largest logarithm of a factor of depth."""
 
@@ -33,7 +32,8 @@ class Points:
         self._up, self._options = up, options
         sizes = [len(each.first_m) for each in carried]
         self._pairs = [(each.first, each.second) for each in carried]
-        self._starts = np.cumsum([0, *sizes[:-1]])
+        ends = np.cumsum(sizes)
+        self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         self._first, self._second = (np.repeat(each, sizes) for each in zip(*self._pairs, strict=True))
         self._share = np.repeat([options.independent / size for size in sizes], sizes)
         numbers = np.column_stack([self._first, np.concatenate([each.point for each in carried])])
@@ -59,13 +59,12 @@ class Points:
         """Normal matrix and gradient of the robust squares, for the states alone."""
         off, slopes = self._off_and_slopes(state)
         weighted = slopes * (self._weights(off, lost_px) * self._share[:, None])[..., None]
-        blocks = np.add.reduceat(np.einsum("nri,nrj->nij", weighted, slopes), self._starts)
-        pulls = np.add.reduceat(np.einsum("nri,nr->ni", weighted, off), self._starts)
         normal, gradient = np.zeros((state.size, state.size)), np.zeros(state.size)
-        for pair, block, pull in zip(self._pairs, blocks, pulls, strict=True):
+        for pair, own in zip(self._pairs, self._slices, strict=True):
             rows = np.concatenate([STATE * frame + np.arange(STATE) for frame in pair])
-            normal[np.ix_(rows, rows)] += block
-            gradient[rows] += pull
+            heavy = weighted[own].reshape(-1, 2 * STATE).T
+            normal[np.ix_(rows, rows)] += heavy @ slopes[own].reshape(-1, 2 * STATE)
+            gradient[rows] += heavy @ off[own].ravel()
         # A point's own unknown acts as the factor of its frame does.
         own, weighted_own = slopes[..., STATE - 1], weighted[..., STATE - 1]
         self._stiff = self._of_points((weighted_own * own).sum(axis=1)) + self._prior
@@ -106,31 +105,33 @@ class Points:
     def _off_and_slopes(
         self, state: Float[np.ndarray, "k 5"]
     ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 10"]]:
-        """By how much each point misses, and its derivatives by the states of both its frames."""
+        """By how much each point misses, in pixels and log depth, and its slopes by both frames' states."""
         one, other = state[self._first], state[self._second]
-        off = self._off(one, other)
-        slopes = np.empty((*off.shape, 2 * STATE))
-        for k, step in enumerate(_DIFFERENCE * np.eye(STATE)):
-            slopes[..., k] = (self._off(one + step, other) - off) / _DIFFERENCE
-            slopes[..., STATE + k] = (self._off(one, other + step) - off) / _DIFFERENCE
+        arm = np.exp(one[:, 4] + self._change[self._which])[:, None] * self._arm
+        turn = _about(self._up, other[:, 3] - one[:, 3])
+        turned = np.einsum("nij,nj->ni", turn, self._centre + arm - one[:, :3])
+        world, lens = self._other[:, :3, :3], self._focal
+        local = np.einsum("nij,nj->ni", world, turned + other[:, :3]) + self._other[:, :3, 3]
+        z = np.maximum(local[:, 2], NEAR_M)
+        missed = lens * local[:, :2] / z[:, None] + self._middle - self._target
+        off = np.column_stack([missed, np.log(z) - other[:, 4] - self._log_depth])
+        picture = np.zeros((len(off), 3, 3))
+        picture[:, [0, 1], [0, 1]] = lens / z[:, None]
+        picture[:, :2, 2] = -lens * local[:, :2] / z[:, None] ** 2
+        picture[:, 2, 2] = 1 / z
+        moved = picture @ world
+        before = moved @ turn
+        slopes = np.zeros((len(off), 3, 2 * STATE))
+        slopes[..., :3], slopes[..., STATE : STATE + 3] = -before, moved
+        slopes[..., STATE + 3] = np.einsum("nij,nj->ni", moved, np.cross(self._up, turned))
+        slopes[..., 3] = -slopes[..., STATE + 3]
+        slopes[..., 4] = np.einsum("nij,nj->ni", before, arm)
+        slopes[:, 2, STATE + 4] = -1
         return off, slopes
 
-    def _off(
-        self, one: Float[np.ndarray, "n 5"], other: Float[np.ndarray, "n 5"]
-    ) -> Float[np.ndarray, "n 3"]:
-        """By how much each point misses, in pixels and in log depth, by the state of both its frames."""
-        seen = self._centre + np.exp(one[:, 4:] + self._change[self._which, None]) * self._arm
-        there = _about(self._up, seen - one[:, :3], other[:, 3] - one[:, 3]) + other[:, :3]
-        local = np.einsum("nij,nj->ni", self._other[:, :3, :3], there) + self._other[:, :3, 3]
-        z = np.maximum(local[:, 2:], NEAR_M)
-        missed = self._focal * local[:, :2] / z + self._middle - self._target
-        return np.column_stack([missed, np.log(z[:, 0]) - other[:, 4] - self._log_depth])
 
-
-def _about(
-    axis: Float[np.ndarray, "3"], vectors: Float[np.ndarray, "n 3"], angle_rad: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, "n 3"]:
-    """Vectors turned about an axis (Rodrigues' formula)."""
-    cosine, sine = np.cos(angle_rad)[:, None], np.sin(angle_rad)[:, None]
-    along = (vectors @ axis)[:, None] * axis
-    return along + (vectors - along) * cosine + np.cross(axis, vectors) * sine
+def _about(axis: Float[np.ndarray, "3"], angle_rad: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3 3"]:
+    """Turns about an axis (Rodrigues' formula)."""
+    cosine, sine = np.cos(angle_rad)[:, None, None], np.sin(angle_rad)[:, None, None]
+    along = np.outer(axis, axis)
+    return along + cosine * (np.eye(3) - along) + sine * np.cross(axis, np.eye(3)).T
