@@ -1,6 +1,7 @@
 """What stands behind what was taken away: scenes without their actors, against streets drawn without them.
 
-    python benchmarks/removed.py [--seeds SEED ...] [--references clean corrupted] [--json FILE] [--markdown FILE]
+    python benchmarks/removed.py [--seeds SEED ...] [--references clean corrupted] [--json FILE]
+                                 [--markdown FILE]
 
 Drawn streets of edition 1, true poses, ``draft``, the twin of the street network. All actors of the scene are
 taken away. The truth is the same street less the boxes that move. PSNR along the recorded path of what they
