@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.decompose.glances import is_whole
 from dreamdrive.decompose.lives import Glimpse, unseen_by
 from dreamdrive.scene.gaussians import Gaussians
 
@@ -71,8 +72,7 @@ def completed(
 def _cut_off(glimpses: Sequence[Glimpse], reach_px: float) -> bool:
     """Whether the border of the picture cuts off the largest view of it."""
     largest = max(glimpses, key=lambda glimpse: len(glimpse.copies))
-    columns = largest.copies[:, 0]
-    return bool(columns.min() <= reach_px or columns.max() >= largest.camera.width_px - reach_px)
+    return not is_whole(largest.copies, largest.camera.width_px, reach_px)
 
 
 def _body(

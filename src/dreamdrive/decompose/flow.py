@@ -44,7 +44,7 @@ def guided(
 ) -> tuple[Float[np.ndarray, "m 2"], Bool[np.ndarray, " m"]]:
     """Where the points of a thing are in another picture, which is looked for around where they are expected.
 
-    The second picture is moved and scaled so that the thing should stay where it is; flow is then small, and
+    The second picture is moved and stretched so that the thing should stay in place; flow is then small, and
     found in a cut around the thing. With the places it is told where the flow back leads to the start again.
     """
     middle, there = points.mean(axis=0), expected.mean(axis=0)

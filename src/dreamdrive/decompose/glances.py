@@ -118,3 +118,8 @@ class Placement:
     spread_m: Float[np.ndarray, " k"]
     ahead: Float[np.ndarray, "3"]
     points: tuple[PointDepth, ...] = ()
+
+
+def is_whole(places: Float[np.ndarray, "n 3"], width_px: int, reach_px: float) -> bool:
+    """Whether places (column, row, depth) keep away from the sides of a picture of this width."""
+    return bool(places[:, 0].min() > reach_px and places[:, 0].max() < width_px - reach_px)

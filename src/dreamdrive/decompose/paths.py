@@ -3,12 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.decompose.flow import grey, guided
-from dreamdrive.decompose.glances import Carried, Glances, Placement, PlacingOptions, PointDepth
+from dreamdrive.decompose.glances import (
+    Carried,
+    Glances,
+    Placement,
+    PlacingOptions,
+    PointDepth,
+    is_whole,
+)
 from dreamdrive.decompose.placing import placed
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.clip import Clip
@@ -61,11 +68,12 @@ def find_path(
     """
     glances = _glances(clip, geometry, frames, shown, reach_px)
     up = _UP if geometry.ground is None else geometry.ground.normal_world
+    pictures = [grey(clip.frames[frame]) for frame in frames]
     path = _path(frames, placed(glances, (), up, options), up, shown)
     for gaps in _ROUNDS:
         pairs = [(k, k + way * gap) for k in range(len(frames)) for gap in gaps for way in (-1, 1)]
         among = [pair for pair in pairs if 0 <= pair[1] < len(frames)]
-        found = [_carried(*pair, clip, geometry, path, shown, options, reach_px) for pair in among]
+        found = [_carried(*pair, pictures, geometry, path, shown, options, reach_px) for pair in among]
         carried = [each for each in found if each is not None]
         path = _path(frames, placed(glances, carried, up, options), up, shown)
     return path
@@ -104,16 +112,16 @@ def _glances(
     shown: list[Float[np.ndarray, "_ 3"]],
     reach_px: float,
 ) -> Glances:
-    cameras, right = [geometry.cameras[frame] for frame in frames], clip.size[0] - reach_px
+    cameras = [geometry.cameras[frame] for frame in frames]
     middles_m = [np.median(camera.lift(each), axis=0) for camera, each in zip(cameras, shown, strict=True)]
-    whole = [each[:, 0].min() > reach_px and each[:, 0].max() < right for each in shown]
+    whole = [is_whole(each, clip.size[0], reach_px) for each in shown]
     return Glances(cameras, clip.times_s[frames], np.stack(middles_m), np.array(whole))
 
 
 def _carried(
     k: int,
     to: int,
-    clip: Clip,
+    pictures: list[UInt8[np.ndarray, "h w"]],
     geometry: Geometry,
     path: Path,
     shown: list[Float[np.ndarray, "_ 3"]],
@@ -131,8 +139,7 @@ def _carried(
     expected = geometry.cameras[other].project(points @ step[:3, :3].T + step[:3, 3])
     if (expected[:, 2] <= NEAR_M).any():
         return None
-    one, two = (grey(clip.frames[each]) for each in (frame, other))
-    moved, kept = guided(one, two, chosen[:, :2], expected[:, :2])
+    moved, kept = guided(pictures[k], pictures[to], chosen[:, :2], expected[:, :2])
     distance, nearest = KDTree(shown[to][:, :2]).query(moved, distance_upper_bound=1.5 * reach_px)
     kept &= np.isfinite(distance)
     if kept.sum() < _LEAST_POINTS:
