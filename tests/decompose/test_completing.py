@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from dreamdrive.decompose.body import body_of
 from dreamdrive.decompose.completing import completed
 from dreamdrive.decompose.lives import Glimpse
 from dreamdrive.scene.camera import Camera
@@ -45,9 +46,14 @@ def glimpses(places: np.ndarray, count: int = 6) -> list[Glimpse]:
     return found
 
 
+def added(places: np.ndarray, seen: list[Glimpse], to: Gaussians | None = None) -> Gaussians | None:
+    body = body_of(places, AHEAD, UP, seen, "vehicle", None)
+    return completed(gaussians(places) if to is None else to, body, seen, 4.5)
+
+
 def test_a_flank_becomes_a_body() -> None:
     places = flank()
-    found = completed(gaussians(places), AHEAD, UP, glimpses(places), 4.5)
+    found = added(places, glimpses(places))
     assert found is not None
     x, y, z = found.means.numpy().T
     assert np.quantile(x, 0.05) == pytest.approx(FLANK_M - 1.85, abs=0.1)
@@ -63,7 +69,7 @@ def test_a_flank_becomes_a_body() -> None:
 def test_mirrored_gaussians_are_mirrored_in_shape() -> None:
     places = flank()
     seen = gaussians(places)
-    found = completed(seen, AHEAD, UP, glimpses(places), 4.5)
+    found = added(places, glimpses(places), seen)
     assert found is not None
     mirror = torch.diag(torch.tensor([-1.0, 1.0, 1.0]))
     far = torch.nonzero(found.means[:, 0] < FLANK_M - 1.84).squeeze(1)[:20]
@@ -96,7 +102,7 @@ def test_what_is_no_half_of_a_vehicle_is_left_alone(why: str) -> None:
             Glimpse(g.time_s, g.camera, g.world_from_canonical, g.copies + np.array([60, 0, 0]), g.depth_m)
             for g in seen
         ]
-    assert completed(gaussians(places), AHEAD, UP, seen, 4.5) is None
+    assert added(places, seen) is None
 
 
 def test_nothing_is_put_where_a_frame_saw_the_street() -> None:
@@ -106,8 +112,6 @@ def test_nothing_is_put_where_a_frame_saw_the_street() -> None:
     beside = np.eye(4)
     beside[0, 3] = 3.0  # seen from the left lane, there is nothing but street
     open_street = Glimpse(1.0, watching, beside, np.zeros((0, 3)), np.full((192, 320), 60.0, np.float32))
-    free, watched = (
-        completed(gaussians(places), AHEAD, UP, each, 4.5) for each in (seen, [*seen, open_street])
-    )
+    free, watched = (added(places, each) for each in (seen, [*seen, open_street]))
     assert free is not None
     assert watched is None or len(watched) < 0.7 * len(free)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dreamdrive.decompose.lives import Glimpse, lives
+from dreamdrive.decompose.lives import Glimpse, lives, misplaced
 from dreamdrive.scene.camera import Camera
 
 CAMERA = Camera(100, 100, 50, 50, 100, 100)
@@ -81,3 +81,20 @@ def test_an_actor_that_turned_shows_another_side() -> None:
     seen = [glimpse(0, copy_at(1, 10)), Glimpse(0.1, CAMERA, moved, copy_at(0, 9.0), glimpse(0).depth_m)]
     assert life((1, 0, 10), 0, seen[:1])[0] == pytest.approx(0.0)
     assert life((-2, 0, 10), 0, seen)[0] == pytest.approx(0.25)
+
+
+def test_what_most_frames_see_past_is_misplaced():
+    """One frame put the rim of a car too far away; seen from elsewhere it hangs in the air beside it."""
+    car = copy_at(0, 10)
+    sees_past = [glimpse(k, car) for k in range(4)]
+    rim, roof, hidden = (2.0, 0.0, 10.0), (0.0, 0.0, 10.0), (0.0, 0.0, 14.0)
+    assert misplaced(np.array([rim, roof, hidden]), sees_past, 4.5).tolist() == [True, False, False]
+
+
+def test_what_one_frame_alone_sees_past_is_kept():
+    beside = np.array([[2.0, 0.0, 10.0]])
+    own = np.concatenate([copy_at(0, 10), copy_at(2, 10)])
+    once = [glimpse(0, copy_at(0, 10)), *(glimpse(k, own) for k in (1, 2, 3))]
+    assert not misplaced(beside, once, 4.5).any()
+    wall = [glimpse(k, copy_at(0, 10), behind_m=5) for k in range(4)]
+    assert not misplaced(beside, wall, 4.5).any()

@@ -172,6 +172,15 @@ def test_a_thing_points_where_it_goes() -> None:
     assert turned[-1] - turned[0] == pytest.approx(angle[0] - angle[-1], rel=0.4)
 
 
+@pytest.mark.parametrize("speed_m_s", [14.0, -12.0])
+def test_it_points_forwards_even_where_what_is_seen_goes_backwards(speed_m_s: float) -> None:
+    true, right = street(speed_m_s), np.ones(FRAMES)
+    middles = true.middles_m(right)
+    middles[-1, 2] -= 30.0 * np.sign(speed_m_s)  # the last frame has it all wrong
+    found = placed(true.glances(middles), true.carried(right), UP, PlacingOptions())
+    assert found.ahead @ [0, 0, np.sign(speed_m_s)] > 0.98
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_or_two_frames_are_enough(count: int) -> None:
     true = street(3.0)

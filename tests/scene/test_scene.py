@@ -5,7 +5,7 @@ import pytest
 import torch
 from tests.scene.scenes import make_scene
 
-from dreamdrive.scene.actor import Actor, Track
+from dreamdrive.scene.actor import Actor, Box, Track
 from dreamdrive.scene.scene import Scene
 
 
@@ -50,7 +50,7 @@ def test_actor_tracks() -> None:
     with pytest.raises(ValueError, match="increasing"):
         Track(np.array([1.0, 1.0]), np.zeros((2, 3)), np.zeros(2))
     with pytest.raises(ValueError, match="2 spreads for 3 points"):
-        Actor(0, "a", "vehicle", 9, track, np.zeros(2))
+        Actor(0, "a", "vehicle", 9, track, spread_m=np.zeros(2))
 
 
 def test_a_track_goes_on_at_its_rate() -> None:
@@ -101,3 +101,16 @@ def test_scenes_are_frozen() -> None:
     with pytest.raises(AttributeError):
         make_scene().static = None  # type: ignore[misc]
     assert isinstance(make_scene(), Scene)
+
+
+def test_a_box_points_where_its_actor_turns() -> None:
+    up = np.array([0.0, -1.0, 0.0])
+    box = Box(np.array([4.4, 1.8, 1.5]), np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(box.pointing(0.0, up), [0, 0, 1])
+    np.testing.assert_allclose(box.pointing(np.pi / 2, up), [-1, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("size_m", "ahead"), [([4.4, 0, 1.5], [0, 0, 1]), ([4.4, 1.8, 1.5], [0, 0, 2])])
+def test_a_box_has_lengths(size_m: list[float], ahead: list[float]) -> None:
+    with pytest.raises(ValueError, match="box: "):
+        Box(np.array(size_m), np.array(ahead, float))

@@ -70,6 +70,8 @@ WRONG = {
     "actors.0.positions_m": [[], [[1e300, 0, 0]], [[1, 2]], None],
     "actors.0.times_s": [[], None, [3.0, 2.0, 1.0]],
     "actors.0.count": [-1, 10**12, "x"],
+    "actors.0.size_m": [[0, 1, 1], [1, 1], [-1, 1, 1]],
+    "actors.0.ahead": [[0, 0, 2], [0, 0], [1e300, 0, 0]],
     "deformation.width": [10**7, 0, -1, None, 1e300, "x"],
     "deformation.depth": [10**7, 0, 10**3],
     "deformation.track_times": [10**7, 0, -1],

@@ -11,7 +11,7 @@ from dreamdrive.cli.scene import open_scene
 from dreamdrive.cli.tables import fixed, print_table, write_json
 
 if TYPE_CHECKING:
-    from dreamdrive.evaluate import Decomposition
+    from dreamdrive.evaluate import BoxError, Decomposition
 
 
 def decomposition(
@@ -57,6 +57,19 @@ def _rows(figures: "Decomposition") -> list[tuple[str, str, str]]:
     rows.append(("road users: place", fixed(actors.offset_median_m, 2), "m, median"))
     rows.append(("road users: way gone", fixed(actors.displacement_median_m, 2), "m, median error"))
     rows.append(("", fixed(actors.displacement_90_m, 2), "m, 90 % below"))
+    rows += _of_boxes(figures.boxes) if figures.boxes is not None else []
     rows.append(("scale", fixed(figures.scale, 4), "true m for a metre of the scene"))
     rows.append(("path", fixed(figures.path_rms_m, 3), "m off, at this scale"))
     return rows
+
+
+def _of_boxes(boxes: "BoxError") -> list[tuple[str, str, str]]:
+    missed = ", ".join(f"{m.kind} {m.instance} in {m.missed} of {m.frames}" for m in boxes.misses)
+    return [
+        ("boxes of actors: place", fixed(boxes.position_median_m, 2), f"m, median of {boxes.pairs} pairs"),
+        ("boxes of actors: heading", fixed(boxes.heading_median_deg, 1), "degrees, median"),
+        ("", fixed(boxes.heading_5_deg, 0, 100), "% within 5 degrees"),
+        ("boxes of actors: length", fixed(boxes.length_median_m, 2), "m, median error"),
+        ("number of actors right", fixed(boxes.count_right, 0, 100), "% of frames, within one"),
+        ("missed", str(len(boxes.misses)), f"{missed} frames" if missed else ""),
+    ]

@@ -16,6 +16,8 @@ from scipy.spatial import KDTree
 from dreamdrive.scene.camera import Camera
 
 _LIKE_DEPTH = 0.12  # in the logarithm
+_LEAST_THROUGH = 2  # frames that see through what is misplaced, and ...
+_MOST_THROUGH = 0.5  # ... their share of those that should see it
 _WIDTH = (
     0.6  # standard deviation over half the length of a long life: at its ends a copy keeps half its opacity
 )
@@ -82,14 +84,37 @@ def unseen_by(glimpse: Glimpse, places: Float[np.ndarray, "n 3"], reach_px: floa
 
     One that would stand in front of what the frame saw, or beside the actor, is misplaced: it counts as seen.
     """
+    return _looked_for(glimpse, places, reach_px)[0]
+
+
+def misplaced(
+    places: Float[np.ndarray, "n 3"], glimpses: Sequence[Glimpse], reach_px: float
+) -> Bool[np.ndarray, " n"]:
+    """Which surfaces most of the frames that should see them show beside the actor, where they see through.
+
+    Depth is least sure at outlines. What one frame puts at the wrong distance there, others see past.
+    """
+    looked = [_looked_for(glimpse, places, reach_px) for glimpse in glimpses]
+    unseen, beside = (np.stack(each) for each in zip(*looked, strict=True))
+    through = beside.sum(axis=0)
+    return (through >= _LEAST_THROUGH) & (through > _MOST_THROUGH * (~unseen).sum(axis=0))
+
+
+def _looked_for(
+    glimpse: Glimpse, places: Float[np.ndarray, "n 3"], reach_px: float
+) -> tuple[Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Which surfaces a frame cannot see, and which of the others it does not show as the actor's."""
     moved = glimpse.world_from_canonical
     projected = glimpse.camera.project(places @ moved[:3, :3].T + moved[:3, 3])
     in_view = glimpse.camera.shows(projected)
     unseen, where = ~in_view, projected[in_view, :2]
     shown_m = glimpse.depth_m[where[:, 1].astype(int), where[:, 0].astype(int)].astype(np.float64)
+    own = np.zeros(len(where), bool)
     if len(glimpse.copies) and len(where):
         distance, nearest = KDTree(glimpse.copies[:, :2]).query(where, distance_upper_bound=reach_px)
         own = np.isfinite(distance)
         shown_m[own] = glimpse.copies[np.asarray(nearest)[own], 2]
     unseen[in_view] = (shown_m > 0) & (projected[in_view, 2] > np.exp(_LIKE_DEPTH) * shown_m)
-    return unseen
+    beside = np.zeros(len(places), bool)
+    beside[in_view] = ~own
+    return unseen, beside & ~unseen

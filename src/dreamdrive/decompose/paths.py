@@ -59,8 +59,8 @@ def find_path(
     shown: list[Float[np.ndarray, "_ 3"]],
     options: PlacingOptions,
     reach_px: float,
-) -> Path:
-    """The path of a thing, of which frames show places (column, row, depth along z).
+) -> Path | None:
+    """The path of a thing, of which frames show places (column, row, depth along z); None for no likely one.
 
     The depth alone gives a first path. From there flow is looked for where the path leads, for between two
     frames oncoming traffic moves farther than flow finds by itself. Places at most ``reach_px`` apart are
@@ -76,7 +76,14 @@ def find_path(
         found = [_carried(*pair, pictures, geometry, path, shown, options, reach_px) for pair in among]
         carried = [each for each in found if each is not None]
         path = _path(frames, placed(glances, carried, up, options), up, shown)
-    return path
+    return path if _likely(path.placement, clip.times_s[frames], options) else None
+
+
+def _likely(placement: Placement, times_s: Float[np.ndarray, " k"], options: PlacingOptions) -> bool:
+    """Whether a thing can have gone so; a few stray points leap, or their place is nowhere sure."""
+    steps_m = np.linalg.norm(np.diff(placement.place_m, axis=0), axis=1)
+    speed_m_s = float(np.median(steps_m / np.diff(times_s))) if len(steps_m) else 0.0
+    return speed_m_s < options.most_m_s and float(np.median(placement.spread_m)) < options.most_spread_m
 
 
 def _path(

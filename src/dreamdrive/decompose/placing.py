@@ -49,6 +49,8 @@ def placed(
     factor, spread_m = np.exp(state[:, 4]), _spread_m(np.linalg.inv(normal)[:-1, :-1], count)
     yaw_rad = state[:, 3] - state[count // 2, 3]
     ahead = motion.ahead(course_rad + state[count // 2, 3])
+    # Slip does not tell forwards from backwards; hardly anything drives backwards.
+    ahead = -ahead if ahead @ (state[-1, :3] - state[0, :3]) < 0 else ahead
     return Placement(state[:, :3], yaw_rad, factor, spread_m, ahead, points.depths(factor) if points else ())
 
 

@@ -1,5 +1,6 @@
 """How good results are: figures with their sample counts, floors and intervals."""
 
+from dreamdrive.evaluate.actor_boxes import BoxError
 from dreamdrive.evaluate.consistency import Consistency, evaluate_consistency
 from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition
 from dreamdrive.evaluate.estimate import Estimate

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from dreamdrive.evaluate.actor_boxes import BoxError, box_error
 from dreamdrive.evaluate.actor_places import ActorError, actor_error
 from dreamdrive.evaluate.retrieval import Retrieval, retrieval
 from dreamdrive.evaluate.truth import Truth, views_of
@@ -52,6 +53,7 @@ class Decomposition:
         labels: Gaussians of moving things; see ``true_labels``.
         fake: How much the static street moves; None where the truth holds no static surface.
         actors: Where moving road users are, over time.
+        boxes: Boxes of the actors; None where the truth holds none.
     """
 
     frames: int
@@ -62,6 +64,7 @@ class Decomposition:
     labels: Retrieval
     fake: FakeMotion | None
     actors: ActorError
+    boxes: BoxError | None
 
 
 def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
@@ -90,6 +93,7 @@ def evaluate_decomposition(scene: Scene, truth: Truth) -> Decomposition:
         labels=retrieval(moving[judged], labels[judged]),
         fake=_fake_motion(seen, _static_surface(truth), similarity.scale),
         actors=actor_error(scene, views, truth, similarity),
+        boxes=box_error(scene, views, truth, similarity),
     )
 
 

@@ -1,7 +1,7 @@
 """What a simulated world knows about the frames of a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from dreamdrive.data.layout_file import read_layout
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
-from dreamdrive.world import Drive, drive, read_world
+from dreamdrive.world import Drive, WorldBox, drive, read_world
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,14 @@ class Truth:
         depth_m: Depth along z (F, H, W); 0 in the sky.
         instance: Label of the road user in each pixel (F, H, W), 0 for none.
         moving: Pixels of road users that move (F, H, W).
+        boxes: Hulls of the road users, with a pose a frame; may be left out.
     """
 
     cameras: tuple[Camera, ...]
     depth_m: Float[np.ndarray, "f h w"]
     instance: Int[np.ndarray, "f h w"]
     moving: Bool[np.ndarray, "f h w"]
+    boxes: tuple[WorldBox, ...] = ()
 
     def __post_init__(self) -> None:
         shape = len(self.cameras), self.cameras[0].height_px, self.cameras[0].width_px
@@ -41,7 +43,8 @@ class Truth:
         """The truth of a drive, or of some of its frames."""
         rows = np.arange(len(drive.cameras)) if index is None else np.asarray(index, dtype=np.int64)
         cameras = tuple(drive.cameras[i] for i in rows.tolist())
-        return Truth(cameras, drive.depth_m[rows], drive.instance[rows], drive.moving[rows])
+        boxes = tuple(replace(box, world_from_box=box.world_from_box[rows]) for box in drive.boxes)
+        return Truth(cameras, drive.depth_m[rows], drive.instance[rows], drive.moving[rows], boxes)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -105,7 +105,7 @@ def densify(
         moving = moving * ~sky
         if look is not None and found is not None:
             nearer = too_near(found.inverse, inverse, confidence, options.users)
-            moving, users = whole_users(view, look, flows, moving, nearer)
+            moving, users = whole_users(view, look, flows, moving, nearer, found.inverse)
             still = moving < FLAGGED
             found = with_stereo(view, found, still & (users > 0), inverse, confidence)
             inverse, confidence = settled_in_time(view, found.inverse, found.spread, still), found.confidence

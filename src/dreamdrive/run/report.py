@@ -60,6 +60,7 @@ def describe(
                 "first_s": actor.track.first_s,
                 "last_s": actor.track.last_s,
                 "path_m": actor.track.length_m,
+                "size_m": None if actor.box is None else actor.box.size_m.tolist(),
                 "speed_m_s": float(np.median(actor.track.speed_m_s)),
                 "spread_m": None if actor.spread_m is None else float(np.median(actor.spread_m)),
                 "completed": actor.completed,

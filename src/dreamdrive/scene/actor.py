@@ -10,7 +10,7 @@ _RATE_S = 0.5  # over which the rate at the ends of a track is taken
 
 @dataclass(frozen=True)
 class Track:
-    """Where a thing is over time: places of one point of it in the world, and its yaw.
+    """Where a thing is over time: places of the middle of its bottom in the world, and its yaw.
 
     Times increase strictly. The yaw is about the up axis of the scene, right-handed, against the attitude of
     the thing in its canonical place.
@@ -67,6 +67,29 @@ class Track:
         return float(self.times_s[-1])
 
 
+UNKNOWN = "unknown"
+"""Kind of an actor of which nobody said what it is."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """How large an actor is, length, width and height, and where it points at yaw 0, in the world."""
+
+    size_m: Float[np.ndarray, "3"]
+    ahead: Float[np.ndarray, "3"]
+
+    def __post_init__(self) -> None:
+        if not (self.size_m > 0).all():
+            raise ValueError(f"box: size {self.size_m}, expected lengths above 0")
+        if abs(np.linalg.norm(self.ahead) - 1) > 1e-3:
+            raise ValueError(f"box: direction {self.ahead}, expected one of length 1")
+
+    def pointing(self, yaw_rad: float, up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """Where it points at a yaw about the up axis, in the world."""
+        left = np.cross(up, self.ahead)
+        return np.cos(yaw_rad) * self.ahead + np.sin(yaw_rad) * left
+
+
 @dataclass(frozen=True)
 class Actor:
     """A group of dynamic Gaussians that move as one: those whose ``Gaussians.actor`` is ``id``.
@@ -74,9 +97,10 @@ class Actor:
     Attributes:
         id: See above.
         name: Unique, for people, such as ``"actor 3"``.
-        kind: Such as ``"vehicle"`` or ``"unknown"``.
+        kind: ``"vehicle"``, ``"two-wheeler"``, ``"person"`` or ``"unknown"``.
         count: Number of its Gaussians.
-        track: Where it is at the frames that saw it.
+        track: Where the middle of its bottom is at the frames that saw it.
+        box: Its size and where it points, as far as frames and what is usual tell; None where nothing does.
         spread_m: Standard deviation of its place at these (T,) along the axis in which it is known least, as
             the estimate of its track believes; None where nothing tells.
         completed: Whether a side that no frame saw was mirrored from one that some did.
@@ -87,6 +111,7 @@ class Actor:
     kind: str
     count: int
     track: Track
+    box: Box | None = None
     spread_m: Float[np.ndarray, " t"] | None = None
     completed: bool = False
 

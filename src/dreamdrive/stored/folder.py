@@ -23,7 +23,7 @@ from dreamdrive.files.json_file import of_type, parse_json
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
-from dreamdrive.scene.actor import Actor, Track
+from dreamdrive.scene.actor import Actor, Box, Track
 from dreamdrive.scene.camera import FARTHEST_M, Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
@@ -47,6 +47,7 @@ MAX_PIXELS = 64_000_000
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _Point = tuple[_Metres, _Metres, _Metres]
+_Length = Annotated[float, Meta(ge=0, le=FARTHEST_M)]
 _Angle = Annotated[float, Meta(ge=-1e4, le=1e4)]
 
 
@@ -68,7 +69,7 @@ class _StoredCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What moves, as ``Actor``."""
+    """What moves, as ``Actor``; ``size_m`` and ``ahead`` are its box."""
 
     id: Annotated[int, Meta(ge=0, le=10**6)]
     name: Annotated[str, Meta(max_length=200)]
@@ -77,7 +78,9 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     times_s: list[float]
     positions_m: list[_Point]
     yaw_rad: list[_Angle] | None = None
-    spread_m: list[Annotated[float, Meta(ge=0, le=FARTHEST_M)]] | None = None
+    size_m: tuple[_Length, _Length, _Length] | None = None
+    ahead: _Point | None = None
+    spread_m: list[_Length] | None = None
     completed: bool = False
 
     def actor(self) -> Actor:
@@ -88,15 +91,19 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             np.array(self.times_s, dtype=np.float64), positions_m, np.array(yaw_rad, dtype=np.float64)
         )
         spread_m = None if self.spread_m is None else np.array(self.spread_m, dtype=np.float64)
-        return Actor(self.id, self.name, self.kind, self.count, track, spread_m, self.completed)
+        box = None
+        if self.size_m is not None and self.ahead is not None:
+            box = Box(np.array(self.size_m), np.array(self.ahead))
+        return Actor(self.id, self.name, self.kind, self.count, track, box, spread_m, self.completed)
 
     @classmethod
     def of(cls, actor: Actor) -> "_StoredActor":
         """What is stored of one."""
         track = actor.track
         path = track.times_s.tolist(), track.positions_m.tolist(), track.yaw_rad.tolist()
+        box = (None, None) if actor.box is None else (actor.box.size_m.tolist(), actor.box.ahead.tolist())
         spread_m = None if actor.spread_m is None else actor.spread_m.tolist()
-        return cls(actor.id, actor.name, actor.kind, actor.count, *path, spread_m, actor.completed)
+        return cls(actor.id, actor.name, actor.kind, actor.count, *path, *box, spread_m, actor.completed)
 
 
 class _StoredSky(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

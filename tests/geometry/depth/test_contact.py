@@ -49,6 +49,28 @@ def test_a_side_that_recedes_gets_farther() -> None:
     assert found[30, 22] > 1.3 * found[30, 57] > 0
 
 
+def test_corners_above_the_road_are_no_contact() -> None:
+    """A truck from behind: beside its wheels the body ends half a metre above the road, seen below it."""
+    instances, _ = standing(45, slice(28, 52))
+    instances[40:46, 28:31] = instances[40:46, 49:52] = 0
+    ground = (instances == 0) & (plane() > 0)
+    found = on_the_road(instances, ground, plane(), 1.5, NONE, FusionOptions()).inverse
+    foot = (46 - HORIZON) / 150
+    assert np.allclose(found[36, 31:49], foot, rtol=1e-5)
+    assert (found[36, [28, 51]] > 0.9 * foot).all()  # at the corners' own rows it were 0.77
+
+
+def test_a_side_along_the_road_is_left_as_it_is() -> None:
+    """Its line of contact leads to the middle of the horizon."""
+    instances = np.zeros((HEIGHT, WIDTH), np.int32)
+    for column in range(5, 30):
+        instances[15 : round(HORIZON + 0.7 * (40 - column)), column] = 1
+    ground = (instances == 0) & (plane() > 0)
+    found = on_the_road(instances, ground, plane(), 1.5, NONE, FusionOptions()).inverse
+    expected = 0.7 * (40 - np.arange(5, 30)) / 150
+    assert np.allclose(found[17, 5:30], expected, rtol=0.12)
+
+
 def test_nothing_is_said_where_the_foot_is_hidden() -> None:
     instances, _ = standing(45)
     nowhere = np.zeros((HEIGHT, WIDTH), bool)

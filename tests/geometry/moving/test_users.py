@@ -8,6 +8,7 @@ from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.depth import make_view
 from dreamdrive.geometry.moving import FLAGGED, too_near, whole_users
+from dreamdrive.geometry.moving.users import Sighting, off_place
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.look import Look
 
@@ -36,10 +37,11 @@ class Scene:
             instances=self.block.astype(np.uint16),
         )
         self.nearer = np.zeros(shape, bool)
+        self.depth_m = np.full(shape, 100.0, np.float32)
 
     def found(self, evidence: np.ndarray) -> np.ndarray:
         """What is flagged in the end."""
-        return whole_users(self.view, self.look, {}, evidence, self.nearer)[0] >= FLAGGED
+        return whole_users(self.view, self.look, {}, evidence, self.nearer, 1 / self.depth_m)[0] >= FLAGGED
 
 
 def test_a_user_of_which_enough_is_flagged_moves_in_all_frames() -> None:
@@ -92,3 +94,28 @@ def test_stereo_contradicts_contact_where_it_is_sure_and_near() -> None:
     confidence = np.array([[[0.9, 0.9, 0.1, 0.9]]], np.float32)
     found = too_near(1 / metres, 1 / stereo, confidence, UserOptions())
     assert found.tolist() == [[[True, False, False, False]]]
+
+
+def test_a_user_that_keeps_its_distance_needs_less_that_tells() -> None:
+    """A truck beside the camera: the road goes by, but it does not come nearer."""
+    scene = Scene()
+    evidence = np.zeros(scene.block.shape, np.float32)
+    evidence[1][scene.block[1]] = 0.8
+    evidence[2][scene.block[2] & (np.arange(scene.block.shape[2]) % 2 == 0)] = 0.8
+    assert not scene.found(evidence).any()
+    scene.depth_m[:] = 2.5
+    assert off_place_of(scene) > 0.25
+    used = list(scene.view.frames)
+    assert (scene.found(evidence)[used] == scene.block[used]).all()
+    assert not scene.found(np.zeros_like(evidence)).any()
+    for frame in used:
+        travelled_m = scene.view.cameras[frame].world_from_camera[2, 3]
+        scene.depth_m[frame] = 12.0 - travelled_m
+    assert off_place_of(scene) < 0.05
+    assert not scene.found(evidence).any()
+
+
+def off_place_of(scene: Scene) -> float:
+    pixels = int(scene.block[0].sum())
+    track = [Sighting(frame, 1, pixels, 0) for frame in scene.view.frames]
+    return off_place(scene.view, scene.look, 1 / scene.depth_m, track)

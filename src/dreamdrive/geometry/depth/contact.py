@@ -14,6 +14,9 @@ _BELOW_PX = 2  # rows under a thing's lowest pixel in which the ground is looked
 _SEEN_SHARE = 0.1  # of a thing's columns whose contact has to be seen
 _SEEN_COLUMNS = 3
 _LEAST_INVERSE = 1 / 250  # 1/m; a contact farther away is the horizon
+_ENDS = 0.2  # of a thing's columns on each side
+_MOST_END_PX = 15  # of pictures that are 480 wide
+_TURNED = 1.0  # metres by which a side recedes a metre, at most
 _ROW_PX = 0.7  # by which a contact is off
 
 
@@ -59,15 +62,18 @@ def on_the_road(
             continue
         foot = _hull(columns[seen], lowest[seen] + 1, columns)
         contact = _at_rows(plane_inverse, foot, columns)
+        # A row is that share of the camera's height at the distance of the foot.
         a_row = (contact - _at_rows(plane_inverse, foot - 1, columns)) / np.maximum(contact, 1e-6)
+        row_m = camera_height_m * a_row
+        right_px = columns + 0.5 - width / 2
+        if columns[0] > 0 and columns[-1] < width - 1:
+            contact = _without_leaps(contact, right_px, row_m, round(grown(_MOST_END_PX, width)))
         near = contact > _LEAST_INVERSE
         if not near.any():
             continue
-        # A row is that share of the camera's height at the distance of the foot.
-        row_m = camera_height_m * a_row
         if is_vehicle[label]:
             tall_m = float(((foot - mask[:, columns].argmax(axis=0)) * row_m)[near].max())
-            contact = _overhanging(contact, (columns + 0.5 - width / 2) * row_m, tall_m, options)
+            contact = _overhanging(contact, right_px * row_m, tall_m, options)
         place = np.zeros((2, width), np.float32)
         place[0, columns[near]] = contact[near]
         place[1, columns[near]] = np.hypot(_ROW_PX * a_row[near], options.contact_spread)
@@ -84,6 +90,31 @@ def _at_rows(
     above = np.minimum(np.floor(at).astype(np.intp), len(image) - 2)
     share = at - above
     return (1 - share) * image[above, columns] + share * image[above + 1, columns]
+
+
+def _without_leaps(
+    contact: Float[np.ndarray, " n"],
+    right_px: Float[np.ndarray, " n"],
+    column_m: Float[np.ndarray, " n"],
+    most_px: int,
+) -> Float[np.ndarray, " n"]:
+    """A line of contact (inverse depth) whose ends recede no faster than sides do.
+
+    Beside the wheels a thing ends above the road, and what is seen below its corners is road far behind it.
+    Sides that are seen run along the road, towards the middle of the picture; or else a thing has turned,
+    and they recede by no more than ``_TURNED`` metres a metre. ``column_m`` is what a column spans there;
+    an end has at most ``most_px`` columns.
+    """
+    depth_m = 1 / np.maximum(contact, 1e-6)
+    ends = min(round(_ENDS * len(depth_m)), most_px)
+    for way, first in ((1, len(depth_m) - ends), (-1, ends - 1)):
+        for at in range(max(first, 1), len(depth_m)) if way > 0 else range(first, -1, -1):
+            before = at - way
+            step_px = abs(right_px[at] - right_px[before])
+            along = abs(right_px[before]) / max(abs(right_px[at]), 0.5)
+            turned = 1 + _TURNED * step_px * column_m[before] / depth_m[before]
+            depth_m[at] = min(depth_m[at], depth_m[before] * max(along, turned))
+    return 1 / depth_m
 
 
 def _overhanging(

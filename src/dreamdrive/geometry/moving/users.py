@@ -11,10 +11,12 @@ from dreamdrive.geometry.depth import View
 from dreamdrive.geometry.moving.evidence import FLAGGED
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.options import UserOptions
+from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.look import Look
 
 _LEAST_PX = 12  # of a road user that is followed
 _MOST_COUNTED_PX = 2000  # in one frame: a near view does not outvote many far ones
+_LEAST_SIGHTINGS = 3  # that tell whether it keeps its place
 _FARTHEST_INVERSE = 1 / 60  # 1/m; farther away contact with the road tells too little
 
 
@@ -49,13 +51,15 @@ def whole_users(
     flows: Mapping[int, Sequence[PairFlow]],
     evidence: Float[np.ndarray, "f h w"],
     nearer: Bool[np.ndarray, "f h w"],
+    inverse: Float[np.ndarray, "f h w"],
 ) -> tuple[Float[np.ndarray, "f h w"], UInt16[np.ndarray, "f h w"]]:
     """Evidence of motion in [0, 1] with each road user moving as a whole, in all its frames, or not at all.
 
     With it the number of the road user of each pixel, from 1, the same in all frames.
 
-    A road user moves if enough of its pixels are flagged or nearer than they can be if it stands. What surely
-    is no road user does not move.
+    A road user moves if enough of its pixels are flagged or nearer than they can be if it stands; less is
+    enough if its distances (inverse depth in 1/m) belong to no one place. What surely is no road user does
+    not move.
     """
     options = view.options.users
     whole, users = evidence.copy(), np.zeros(evidence.shape, np.uint16)
@@ -64,7 +68,7 @@ def whole_users(
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
     tracks = follow(view, look.instances, flows, (evidence >= FLAGGED) | nearer)
     for number, track in enumerate(tracks, start=1):
-        moves = is_moving(track, options)
+        moves = _moves(view, look, inverse, track, options)
         for seen in track:
             own = look.instances[seen.frame] == seen.label
             users[seen.frame][own] = number
@@ -86,11 +90,57 @@ def _thin(flagged: Bool[np.ndarray, "h w"], rim: float) -> Bool[np.ndarray, "h w
     return flagged & (deepest[labels] < rim * flagged.shape[1])
 
 
-def is_moving(track: Sequence[Sighting], options: UserOptions) -> bool:
-    """Whether a road user that was followed moves."""
+def _moves(
+    view: View,
+    look: Look,
+    inverse: Float[np.ndarray, "f h w"],
+    track: Sequence[Sighting],
+    options: UserOptions,
+) -> bool:
+    share = telling_share(track)
+    if share > options.moving_share:
+        return True
+    return share > options.doubtful_share and off_place(view, look, inverse, track) > options.off_place
+
+
+def telling_share(track: Sequence[Sighting]) -> float:
+    """Share of the pixels of a road user that was followed which tell that it moves."""
     counted = np.array([min(seen.pixels, _MOST_COUNTED_PX) for seen in track], np.float64)
-    share = counted @ [seen.telling / seen.pixels for seen in track] / counted.sum()
-    return bool(share > options.moving_share)
+    return float(counted @ [seen.telling / seen.pixels for seen in track] / counted.sum())
+
+
+def off_place(
+    view: View, look: Look, inverse: Float[np.ndarray, "f h w"], track: Sequence[Sighting]
+) -> float:
+    """By how much the distances of a road user are wrong if it stands: a median of logarithms of ratios.
+
+    It is that of the place which explains most, among those where single frames see it. What drives beside
+    the camera at its speed shows no flow at all, but neither does it come nearer. 0 where fewer than three
+    frames see it.
+    """
+    seen = [(each, _seen_at(view, look, inverse, each)) for each in track]
+    near = [(each, place) for each, place in seen if place[2] < 1 / _FARTHEST_INVERSE]
+    if len(near) < _LEAST_SIGHTINGS:
+        return 0.0
+    cameras = [view.cameras[each.frame] for each, _ in near]
+    weight = np.array([min(each.pixels, _MOST_COUNTED_PX) for each, _ in near], np.float64)
+    depth_m = np.array([place[2] for _, place in near])
+    places = np.stack([c.lift(place[None])[0] for c, (_, place) in zip(cameras, near, strict=True)])
+    there_m = np.stack([camera.project(places)[:, 2] for camera in cameras], axis=1)
+    wrong = np.abs(np.log(np.maximum(there_m, NEAR_M) / depth_m))
+    order = np.argsort(wrong, axis=1)
+    below = np.cumsum(weight[order], axis=1) >= 0.5 * weight.sum()
+    medians = np.take_along_axis(wrong, order, axis=1)[np.arange(len(wrong)), below.argmax(axis=1)]
+    return float(medians.min())
+
+
+def _seen_at(
+    view: View, look: Look, inverse: Float[np.ndarray, "f h w"], seen: Sighting
+) -> Float[np.ndarray, "3"]:
+    """The middle of a sighting: column, row, depth."""
+    rows, columns = np.nonzero(look.instances[seen.frame] == seen.label)
+    depth_m = 1 / max(float(np.median(inverse[seen.frame][rows, columns])), 1e-6)
+    return np.array([np.median(columns) + 0.5, np.median(rows) + 0.5, depth_m])
 
 
 def follow(
