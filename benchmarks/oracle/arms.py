@@ -24,7 +24,7 @@ from dreamdrive.scene.scene import Scene
 from oracle.truth import true_labels, true_paths, with_true_depth
 from oracle.views import Seen
 from street.case import Case, clip_of, world_of
-from street.measure import frames_of
+from street.measure import frames_of, told_apart
 
 PARTS = ("labels", "tracks", "moving", "standing")
 """What truth can stand in place of: the vote, the paths, the depth of what moves, that of what stands."""
@@ -123,9 +123,10 @@ def _psnr(wrong: np.ndarray, inside: Bool[np.ndarray, "f h w"], by_frame: bool) 
 
 
 def judged(case: Case, options: Options, arm: tuple[str, ...], views: dict[str, Seen]) -> dict[str, Any]:
-    """The figures of one arm, view by view."""
+    """The figures of one arm, view by view, and how well what moves is told apart."""
     scene = scene_of(case, options, arm)
-    return {name: likeness(frames_of(scene, case.seed, name), view) for name, view in views.items()}
+    shown = {name: likeness(frames_of(scene, case.seed, name), view) for name, view in views.items()}
+    return {**shown, "apart": told_apart(scene, case.seed)}
 
 
 def ceiling(views: dict[str, Seen]) -> dict[str, Any]:

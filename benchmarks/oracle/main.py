@@ -101,6 +101,8 @@ def tables(rows: list[Row]) -> str:
                 f"{view}, {poses} poses, {references} references, {len({r['seed'] for r in same})} worlds\n"
             )
             texts.append(_table(same, view))
+        told = [row for row in same if "apart" in row]
+        texts += [f"what moves, {poses} poses, {references} references\n", _apart(told)] if told else []
     return "\n".join(texts)
 
 
@@ -115,6 +117,42 @@ def _table(rows: list[Row], view: str) -> str:
         told = "" if arm in (WITHOUT, CEILING) else " / ".join(number(gain, ".0f") for gain in gains)
         lines.append([arm, *(number(values[g]) for g in GROUPS), told])
     return grid(lines)
+
+
+def _apart(rows: list[Row]) -> str:
+    """What moves and its boxes: means over the worlds, of places and headings medians over them."""
+    lines = [
+        [
+            "truth in place of",
+            "mask IoU",
+            "fake motion, mm",
+            "box off, m",
+            "heading off, degrees",
+            "number right, %",
+        ]
+    ]
+    for arm in dict.fromkeys(row["arm"] for row in rows):
+        told = [row["apart"] for row in rows if row["arm"] == arm]
+        boxes = [each["boxes"] for each in told if each["boxes"] and each["boxes"]["pairs"]]
+        middle = [
+            _median([box[name] for box in boxes]) for name in ("position_median_m", "heading_median_deg")
+        ]
+        fake_m, right = _mean([t["fake_m"] for t in told]), _mean([box["count_right"] for box in boxes])
+        lines.append(
+            [
+                arm,
+                number(_mean([t["mask_iou"] for t in told]), ".3f"),
+                number(fake_m and 1000 * fake_m, ".0f"),
+                number(middle[0]),
+                number(middle[1], ".1f"),
+                number(right and 100 * right, ".0f"),
+            ]
+        )
+    return grid(lines)
+
+
+def _median(values: list[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def _mean(values: list[float | None]) -> float | None:

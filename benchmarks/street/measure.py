@@ -1,5 +1,6 @@
 """How good a fitted scene is: its views against the truth, their features, what it takes for moving."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -117,13 +118,15 @@ def networks_key(toolbox: Toolbox) -> list[object]:
 
 
 def told_apart(scene: Scene, seed: int) -> dict[str, Any]:
-    """How well static and moving are told apart, and how much the static street moves."""
+    """How well static and moving are told apart, how much the static street moves, and the actors' boxes."""
     found = evaluate_decomposition(scene, Truth.of(world_of(seed)))
+    boxes = found.boxes
     return {
         "mask_iou": found.mask.iou,
         "mask_precision": found.mask.precision,
         "label_iou": found.labels.iou,
         "fake_m": None if found.fake is None else found.fake.mean_m,
+        "boxes": None if boxes is None else asdict(boxes),
         "path_rms_m": found.path_rms_m,
         "scale": found.scale,
     }

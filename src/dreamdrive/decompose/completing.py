@@ -19,6 +19,7 @@ from dreamdrive.decompose.lives import Glimpse, unseen_by
 from dreamdrive.scene.gaussians import Gaussians
 
 _LENGTH_M, _HEIGHT_M = (2.5, 9.0), (0.8, 4.0)  # of what is believed to be the flank of a vehicle
+_SEEN_SHARE = 0.7  # of the width from which on it counts as seen
 _LEAST_FRAMES = 5  # that saw it
 _APART_M = 0.08  # of what is added, from one another and ...
 _BESIDE_M = 0.2  # ... from what was seen
@@ -57,7 +58,7 @@ def _is_flank(body: Body) -> bool:
     """Whether one side alone was seen of what may be a vehicle."""
     long_m, wide_m, tall_m = np.ptp(body.seen_m, axis=1)
     vehicle = _LENGTH_M[0] < long_m < _LENGTH_M[1] and _HEIGHT_M[0] < tall_m < _HEIGHT_M[1]
-    return bool(vehicle and wide_m < np.ptp(body.whole_m[1]))
+    return bool(vehicle and wide_m < _SEEN_SHARE * np.ptp(body.whole_m[1]))
 
 
 def _thinned(places: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " m"]:
