@@ -34,7 +34,9 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
     half = torch.arange(count) % 2 == 0
     labels = Grouping(half, torch.where(half, 0, -1))
     known = Given(geometry, made["static"], labels)  # type: ignore[arg-type]
-    again = build_scene(clip, TINY, given=known, run=noted)
+    # All copies are kept: what other frames see past would go.
+    kept = replace(TINY, cast=replace(TINY.cast, carve=False))
+    again = build_scene(clip, kept, given=known, run=noted)
     assert made["group"] is labels
     assert len(again.dynamic) == int(half.sum())
     tracks = replace(TINY.cast, tracks=False)
