@@ -16,7 +16,6 @@ from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.world import Drive, WorldBox, make_street
 
 FRAMES, SIZE = 4, (320, 192)
-UP = np.array([0.0, -1.0, 0.0])
 
 
 @pytest.fixture(scope="module")

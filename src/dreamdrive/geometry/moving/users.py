@@ -118,7 +118,7 @@ def off_place(
     the camera at its speed shows no flow at all, but neither does it come nearer. 0 where fewer than three
     frames see it.
     """
-    seen = [(each, _seen_at(view, look, inverse, each)) for each in track]
+    seen = [(each, _seen_at(look, inverse, each)) for each in track]
     near = [(each, place) for each, place in seen if place[2] < 1 / _FARTHEST_INVERSE]
     if len(near) < _LEAST_SIGHTINGS:
         return 0.0
@@ -134,9 +134,7 @@ def off_place(
     return float(medians.min())
 
 
-def _seen_at(
-    view: View, look: Look, inverse: Float[np.ndarray, "f h w"], seen: Sighting
-) -> Float[np.ndarray, "3"]:
+def _seen_at(look: Look, inverse: Float[np.ndarray, "f h w"], seen: Sighting) -> Float[np.ndarray, "3"]:
     """The middle of a sighting: column, row, depth."""
     rows, columns = np.nonzero(look.instances[seen.frame] == seen.label)
     depth_m = 1 / max(float(np.median(inverse[seen.frame][rows, columns])), 1e-6)
