@@ -1,10 +1,11 @@
-"""Real clips through ``dreamdrive generate``: held-out quality, moving masks, camera path, seconds, memory.
+"""Real clips through ``dreamdrive generate``: held-out quality, what moves, camera path, seconds, memory.
 
     python benchmarks/clips.py [NAME ...] [--resume] [--runs runs/clips] [--json FILE]
 
 Each run is a folder below ``--runs``; with ``--resume`` those that are finished count, whatever code made
-them, so that an interrupted benchmark goes on. A run that fails is named at the end. The clips are found
-through ``DREAMDRIVE_DATA`` (default ``../shared/data``). Truth is used to measure only.
+them, so that an interrupted benchmark goes on. A run that fails is named at the end. Rows of KITTI 04 tell
+which of its oncoming cars approach, see ``common/kitti04_oncoming.py``. The clips are found through
+``DREAMDRIVE_DATA`` (default ``../shared/data``). Truth is used to measure only.
 """
 
 import json
@@ -17,6 +18,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from common import kitti04_oncoming
 from common.options import parser_of
 from common.pandaset_truth import camera_path, moving_masks
 from common.places import DATA, DREAMDRIVE
@@ -128,6 +130,8 @@ def measure(name: str, run: Run, out: Path) -> dict:
         rows = np.loadtxt(DATA / "clips" / run.clip / "poses.txt").reshape(-1, 3, 4)
         poses = np.concatenate([rows, np.broadcast_to([0.0, 0, 0, 1], (len(rows), 1, 4))], axis=1)
         row |= path_figures(scene, poses[report["frames"]["source_index"]])
+    if run.clip == kitti04_oncoming.CLIP:
+        row |= kitti04_oncoming.figures(scene, report["frames"]["source_index"])
     return row
 
 
