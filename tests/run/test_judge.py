@@ -73,6 +73,13 @@ ROUGH = {
             "place, such as --frames 12:47:2",
         ),
     ),
+    "everything moves": (
+        replace(GOOD, all_moves=True),
+        (
+            "everything in the clip counts as moving: no street is left that stands, and views from "
+            "elsewhere have nothing to rest on. Choose frames that show more of the street, with --frames",
+        ),
+    ),
     "worse than blending": (
         replace(GOOD, psnr=21.2, blended_psnr=23.0),
         (
@@ -139,6 +146,8 @@ def test_views_aside_are_not_promised_where_distances_are_a_guess() -> None:
     expected = "views beside the recorded path cannot be trusted here, since distances are a guess"
     assert limits_of(replace(GOOD, fallback="blank"))[1] == expected
     assert limits_of(replace(GOOD, scenes=((0, 10), (12, 46))))[1] == expected
+    without = "views beside the recorded path cannot be trusted here, since nothing stands"
+    assert limits_of(replace(GOOD, all_moves=True))[1] == without
 
 
 def test_facts_are_those_of_the_result() -> None:
@@ -165,6 +174,22 @@ def test_facts_are_those_of_the_result() -> None:
         spread=0.2,
     )
     assert facts_of(clip, geometry, "draft", {}, {}).fallback is None
+
+
+def test_everything_moves_where_all_but_a_few_pixels_of_the_frames_that_may_be_seen_do() -> None:
+    street = small_street(frames=6)
+    clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
+    solid = (geometry.depth_m > 0).astype(np.float32)
+    held_out = clip.held_out[:, None, None]
+    # Nobody looks at what moves in held-out frames.
+    seen = replace(geometry, moving=np.where(held_out, 0, solid))
+    assert facts_of(clip, seen, "draft", {}, {}).all_moves
+    most = replace(geometry, moving=solid * (np.arange(solid.shape[2]) % 10 > 0))
+    assert not facts_of(clip, most, "draft", {}, {}).all_moves
+    assert not facts_of(clip, geometry, "draft", {}, {}).all_moves
+    assert facts_of(clip, geometry, "draft", {}, {}, none_stands=True).all_moves
+    nowhere = replace(geometry, depth_m=0 * geometry.depth_m)
+    assert not facts_of(clip, nowhere, "draft", {}, {}).all_moves
 
 
 def test_figures_that_look_alike_are_told_apart() -> None:

@@ -54,6 +54,13 @@ def test_what_was_not_measured_is_not_told() -> None:
     assert said[0].startswith("made    a scene of 7 Gaussians with nothing that moves, from 24 frames")
 
 
+def test_what_moves_without_a_track_is_not_called_all_of_the_scene() -> None:
+    parts = lines(actors=[], gaussians={"static": 7, "dynamic": 2})[0]
+    assert parts.startswith("made    a scene of 9 Gaussians with parts that move and have no track, from 24")
+    whole = lines(actors=[], gaussians={"static": 0, "dynamic": 9})[0]
+    assert whole.startswith("made    a scene of 9 Gaussians with all of it free to move, from 24 frames")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -7,6 +7,7 @@ import numpy as np
 from dreamdrive.run.held_out import Likeness
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Basis, Fallback, Geometry
+from dreamdrive.scene.scene import Scene
 
 ENOUGH_FRAMES = 8
 """Fewer frames with a place on the path show too little of a street."""
@@ -14,6 +15,8 @@ SLOW_S = 0.35
 """Frames further apart in time share too little of the street to be followed."""
 ASIDE_M = 2
 """As far beside the recorded path a view is drawn by every run."""
+EVERYTHING = 0.95
+"""Share of the pixels that count as moving from which on all do: some are always taken wrongly."""
 
 _SHORTER = "a shorter stretch, chosen with --frames, is easier"
 _BETTER: dict[str, str] = {
@@ -31,7 +34,7 @@ class Facts:
     ``placed`` frames found their place on the path; ``scenes`` are first and last index in the source of each
     piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the held-out frames in
     decibels, and that of blending their neighbours along the motion in the picture. ``basis`` is what metres
-    rest on, ``spread`` how far they may be off, as a fraction.
+    rest on, ``spread`` how far they may be off, as a fraction. ``all_moves`` where nothing is known to stand.
     """
 
     frames: int
@@ -46,6 +49,7 @@ class Facts:
     focal_observed: bool
     basis: Basis
     spread: float
+    all_moves: bool = False
 
 
 def facts_of(
@@ -54,8 +58,13 @@ def facts_of(
     quality: str,
     held_out: dict[int, Likeness],
     blended: dict[int, Likeness],
+    *,
+    none_stands: bool = False,
 ) -> Facts:
-    """What there is to say of a result, of its first camera; ``blended`` is of blending the neighbours."""
+    """What there is to say of a result, of its first camera; ``blended`` is of blending the neighbours.
+
+    ``none_stands`` says that a scene which tells static from moving has no static Gaussian.
+    """
     lead = clip.of_camera(int(clip.camera[0]))
     source, times_s = clip.source_index[lead], clip.times_s[lead]
     kind = geometry.fallback_kind or (None if geometry.fallback is None else "refused")
@@ -72,6 +81,27 @@ def facts_of(
         focal_observed=geometry.focal.observed,
         basis=geometry.scale.basis,
         spread=geometry.scale.spread,
+        all_moves=none_stands or _moving_share(clip, geometry, lead) >= EVERYTHING,
+    )
+
+
+def _moving_share(clip: Clip, geometry: Geometry, lead: np.ndarray) -> float:
+    """Share of the pixels with depth that count as moving, over the frames that may be seen."""
+    seen = lead[~clip.held_out[lead]]
+    solid = geometry.depth_m[seen] > 0
+    return float((geometry.moving[seen][solid] >= 0.5).mean()) if solid.any() else 0.0
+
+
+def untracked(scene: Scene) -> str | None:
+    """What to know of what moves and belongs to no actor; None where there is nothing."""
+    if scene.dynamic.actor is None:
+        return None
+    count = int((scene.dynamic.actor < 0).sum())
+    if not count:
+        return None
+    return (
+        f"{count:,} Gaussians of what moves have no track, as too few frames saw it, or none that is likely: "
+        "they show beside the frames that saw them alone."
     )
 
 
@@ -86,7 +116,7 @@ def _mean_psnr(scores: dict[int, Likeness]) -> float | None:
 
 def rough_because(facts: Facts) -> tuple[str, ...]:
     """Why the result is rough, and what helps, a sentence each; nothing where it is not."""
-    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_held_out(facts)]
+    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_motion(facts), _of_held_out(facts)]
     return tuple(reason for reason in reasons if reason is not None)
 
 
@@ -124,6 +154,15 @@ def _of_cuts(facts: Facts) -> str | None:
     return (
         f"the recording jumps to another place at {where}, and one scene was made of all. Choose one place, "
         f"such as --frames {first}:{last + 1}{step}"
+    )
+
+
+def _of_motion(facts: Facts) -> str | None:
+    if not facts.all_moves:
+        return None
+    return (
+        "everything in the clip counts as moving: no street is left that stands, and views from "
+        "elsewhere have nothing to rest on. Choose frames that show more of the street, with --frames"
     )
 
 
@@ -196,6 +235,8 @@ def _percent(facts: Facts) -> str:
 
 
 def _aside(facts: Facts) -> str:
+    if facts.all_moves:
+        return "views beside the recorded path cannot be trusted here, since nothing stands"
     if facts.fallback is not None or len(facts.scenes) > 1:
         return "views beside the recorded path cannot be trusted here, since distances are a guess"
     return f"views up to {ASIDE_M} m beside the recorded path hold best; further away gaps show"

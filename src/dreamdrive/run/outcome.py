@@ -125,7 +125,7 @@ def _made(outcome: Outcome) -> str:
         outcome.things, f"{outcome.things} moving things"
     )
     if outcome.moving and not outcome.things:
-        things = "all of it free to move"
+        things = "parts that move and have no track" if outcome.still else "all of it free to move"
     blobs = outcome.still + outcome.moving
     return (
         f"a scene of {blobs:,} Gaussians with {things}, from {outcome.frames} frames of {width}x{height}, in "

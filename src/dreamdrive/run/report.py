@@ -11,8 +11,9 @@ import numpy as np
 from dreamdrive import __version__
 from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
 from dreamdrive.evaluate import compare_paths
+from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.run.held_out import Likeness
-from dreamdrive.run.judge import facts_of, limits_of, rough_because
+from dreamdrive.run.judge import facts_of, limits_of, rough_because, untracked
 from dreamdrive.run.stages import StageRecord
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -39,7 +40,9 @@ def describe(
     """
     options = request["options"]
     blended = baselines.get("flow_interpolation", {})
-    facts = facts_of(clip, geometry, options["quality"], held_out, blended)
+    none_stands = REPRESENTATIONS[options["representation"]].moves == "scored" and not len(scene.static)
+    facts = facts_of(clip, geometry, options["quality"], held_out, blended, none_stands=none_stands)
+    remark = untracked(scene)
     outside = PRIORS.package(options["prior"]) | BACKENDS.package(options["geometry"])
     outside |= DATASETS.package(options["dataset"])
     report = {
@@ -74,7 +77,7 @@ def describe(
         "fallback": geometry.fallback,
         "rough": list(rough_because(facts)),
         "limits": list(limits_of(facts)),
-        "notes": list(clip.provenance.get("notes", [])),
+        "notes": [*clip.provenance.get("notes", []), *([] if remark is None else [remark])],
         "features": sorted(clip.features),
         "geometry": geometry.details,
         "held_out": _by_source_index(clip, held_out),
