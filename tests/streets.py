@@ -3,9 +3,12 @@
 from functools import lru_cache
 
 import numpy as np
+import torch
 
+from dreamdrive.decompose import Grouping, source_pixels
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
 from dreamdrive.scene.layout import Area, Box, Ego, Layout, TrackPoint
 from dreamdrive.world import Drive, drive, make_street
@@ -63,3 +66,26 @@ def bare_street() -> Drive:
     road = Area("road", [(-20.0, -5.0), (60.0, -5.0), (60.0, 5.0), (-20.0, 5.0)])
     layout = Layout(Ego([TrackPoint(0, 0, 0, 0), TrackPoint(2, 14, 2, 0)]), areas=[road], boxes=[car])
     return drive(layout, 5, size=(80, 48))
+
+
+def car(name: str, points: list[tuple[float, float, float, float]], look: int = 0) -> Box:
+    """A car that is at these places (time, x ahead, y to the left, yaw) of the map."""
+    return Box(name, "car", (4.4, 1.8, 1.5), [TrackPoint(*point) for point in points], look)
+
+
+def traffic(*boxes: Box, frames: int, fps: float = 10.0, size: tuple[int, int] = (96, 64)) -> Drive:
+    """Road users on a bare road, seen by a camera that drives at 7 m/s."""
+    road = Area("road", [(-20.0, -8.0), (120.0, -8.0), (120.0, 8.0), (-20.0, 8.0)])
+    ego = Ego([TrackPoint(0, 0, 0, 0), TrackPoint(6, 42, 0, 0)])
+    return drive(Layout(ego, areas=[road], boxes=list(boxes)), frames, fps, size)
+
+
+def true_labels(street: Drive, geometry: Geometry, seeds: Gaussians) -> Grouping:
+    """What moves, a cluster for each thing in the order of the boxes."""
+    every = np.arange(len(seeds))
+    column, row = np.floor(source_pixels(geometry, seeds, every)[:, :2]).astype(int).T
+    shown = street.instance[seeds.source_frame.numpy(), row, column]
+    cluster = np.full(len(seeds), -1)
+    for number, box in enumerate(box for box in street.boxes if box.moving):
+        cluster[shown == box.instance] = number
+    return Grouping(torch.from_numpy(cluster >= 0), torch.from_numpy(cluster))
