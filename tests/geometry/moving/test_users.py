@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tests.geometry import toy
 from tests.scene.test_look import small_look
 
@@ -11,6 +12,7 @@ from dreamdrive.geometry.moving import FLAGGED, too_near, whole_users
 from dreamdrive.geometry.moving.users import Sighting, off_place
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.look import Look
+from dreamdrive.scene.street_class import StreetClass
 
 FRAMES = 6
 
@@ -51,6 +53,31 @@ def test_a_user_of_which_enough_is_flagged_moves_in_all_frames() -> None:
     flagged = scene.found(evidence)
     used = list(scene.view.frames)
     assert (flagged[used] == scene.block[used]).all()
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "same"),
+    [
+        (StreetClass.VEHICLE, StreetClass.VEHICLE, True),
+        (StreetClass.VEHICLE, StreetClass.PERSON, False),
+        (StreetClass.PERSON, StreetClass.VEHICLE, False),
+        # Riders are often taken for persons, motorcycles for cars.
+        (StreetClass.TWO_WHEELER, StreetClass.PERSON, True),
+        (StreetClass.VEHICLE, StreetClass.TWO_WHEELER, True),
+    ],
+)
+def test_a_vehicle_does_not_go_on_as_a_person(was: StreetClass, becomes: StreetClass, same: bool) -> None:
+    """Where a car has left the picture, what stands behind it shares its pixels."""
+    scene = Scene()
+    user, half = scene.look.road_users[0][0], FRAMES // 2
+    users = [(replace(user, kind=was if frame < half else becomes),) for frame in range(FRAMES)]
+    scene.look = replace(scene.look, road_users=tuple(users))
+    evidence = np.zeros(scene.block.shape, np.float32)
+    evidence[:half][scene.block[:half]] = 0.8
+    flagged = scene.found(evidence)
+    used = np.array(scene.view.frames)
+    assert flagged[used[used < half]].any(axis=(1, 2)).all()
+    assert flagged[used[used >= half]].any(axis=(1, 2)).all() == same
 
 
 def test_a_user_of_which_little_is_flagged_stands() -> None:

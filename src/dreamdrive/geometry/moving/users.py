@@ -13,6 +13,7 @@ from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.look import Look
+from dreamdrive.scene.street_class import StreetClass
 
 _LEAST_PX = 12  # of a road user that is followed
 _MOST_COUNTED_PX = 2000  # in one frame: a near view does not outvote many far ones
@@ -66,7 +67,7 @@ def whole_users(
     for frame in view.frames:
         street = (look.instances[frame] == 0) & (look.confidence[frame] >= options.sure)
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
-    tracks = follow(view, look.instances, flows, (evidence >= FLAGGED) | nearer)
+    tracks = follow(view, look, flows, (evidence >= FLAGGED) | nearer)
     for number, track in enumerate(tracks, start=1):
         moves = _moves(view, look, inverse, track, options)
         for seen in track:
@@ -143,11 +144,15 @@ def _seen_at(look: Look, inverse: Float[np.ndarray, "f h w"], seen: Sighting) ->
 
 def follow(
     view: View,
-    instances: Integer[np.ndarray, "f h w"],
+    look: Look,
     flows: Mapping[int, Sequence[PairFlow]],
     telling: Bool[np.ndarray, "f h w"],
 ) -> list[list[Sighting]]:
-    """Road users from frame to frame: each goes on as the one that it shares most pixels with."""
+    """Road users from frame to frame: each goes on as the one that it shares most pixels with.
+
+    A vehicle never goes on as a person: where one has left the picture, a sign behind it is taken for one.
+    """
+    instances = look.instances
     tracks: list[list[Sighting]] = []
     open_: dict[int, list[Sighting]] = {}
     for at, frame in enumerate(view.frames):
@@ -155,7 +160,7 @@ def follow(
         labels = [label for label in range(1, len(counts)) if counts[label] >= _LEAST_PX]
         going_on: dict[int, list[Sighting]] = {}
         before = view.frames[at - 1] if at else frame
-        linked = _linked(instances, before, frame, flows.get(before, ())) if open_ else {}
+        linked = _linked(look, before, frame, flows.get(before, ())) if open_ else {}
         for label in labels:
             track = open_.get(linked.get(label, 0))
             if track is None:
@@ -168,14 +173,12 @@ def follow(
     return tracks
 
 
-def _linked(
-    instances: Integer[np.ndarray, "f h w"], before: int, after: int, flows: Sequence[PairFlow]
-) -> dict[int, int]:
+def _linked(look: Look, before: int, after: int, flows: Sequence[PairFlow]) -> dict[int, int]:
     """Of each label in a frame that of the frame before, where both share most pixels with one another.
 
     Pixels are carried along the flow, or stay where they are: of fast traffic the flow may be lost.
     """
-    first, second = instances[before], instances[after]
+    first, second = look.instances[before], look.instances[after]
     shape = int(first.max(initial=0)) + 1, int(second.max(initial=0)) + 1
     shared = _counts(first, second, shape)
     for flow in flows:
@@ -185,12 +188,23 @@ def _linked(
             y = np.clip(np.rint(flow.y), 0, height - 1).astype(np.intp)
             shared = np.maximum(shared, _counts(first, second[y, x], shape))
     shared[0], shared[:, 0] = 0, 0
+    was, becomes = _kinds(look, before, shape[0]), _kinds(look, after, shape[1])
+    shared[np.outer(was == StreetClass.VEHICLE, becomes == StreetClass.PERSON)] = 0
+    shared[np.outer(was == StreetClass.PERSON, becomes == StreetClass.VEHICLE)] = 0
     forward, back = shared.argmax(axis=1), shared.argmax(axis=0)
     return {
         label: int(back[label])
         for label in range(1, shape[1])
         if shared[back[label], label] > 0 and forward[back[label]] == label
     }
+
+
+def _kinds(look: Look, frame: int, count: int) -> Integer[np.ndarray, " n"]:
+    """The class of each label of a frame, the first so many; that of 0, which is none, is -1."""
+    kinds = np.full(count, -1)
+    known = [int(user.kind) for user in look.road_users[frame]][: count - 1]
+    kinds[1 : 1 + len(known)] = known
+    return kinds
 
 
 def _counts(
