@@ -94,7 +94,7 @@ def with_method(options: Options, method: MethodName) -> Options:
 
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
 QUALITIES: dict[QualityName, Options] = {
-    "draft": Options(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=300, plane_rate=5e-2)),
-    "standard": Options(FitOptions(steps=400), ScoreOptions(), FitOptions(steps=1600)),
-    "high": Options(FitOptions(steps=1500), ScoreOptions(steps=300), FitOptions(steps=8000)),
+    "draft": Options(FitOptions(steps=75), ScoreOptions(), FitOptions(steps=150, plane_rate=5e-2)),
+    "standard": Options(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=500)),
+    "high": Options(FitOptions(steps=500), ScoreOptions(steps=300), FitOptions(steps=2500)),
 }

@@ -97,7 +97,11 @@ def score(
         raise ValueError("score: the Gaussians carry no features")
     inputs = _inputs(gaussians, options.position_frequencies)
     targets = _targets(clip, geometry, errors, options)
-    visible = {frame: _in_window(gaussians, clip, frame, options.window) for frame in targets}
+    bare = gaussians.without_features()
+    shown = dict.fromkeys(targets, (bare, inputs))
+    if options.window is not None:
+        windows = {frame: _in_window(gaussians, clip, frame, options.window) for frame in targets}
+        shown = {frame: (bare.select(rows), inputs[rows]) for frame, rows in windows.items()}
     network = ScoreNetwork(gaussians.features.shape[1], options, seed)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate)
     generator = torch.Generator().manual_seed(seed)
@@ -109,8 +113,8 @@ def score(
         frame = order.pop()
         camera = geometry.cameras[frame]
         small = camera.resized(camera.width_px // options.shrink, camera.height_px // options.shrink)
-        rows = visible[frame]
-        splatted, alpha = _splat(gaussians.select(rows), network(inputs[rows]), small)
+        near, of_near = shown[frame]
+        splatted, alpha = _splat(near, network(of_near), small)
         target, weight = targets[frame]
         loss = nn.functional.binary_cross_entropy(splatted, target, weight=weight * alpha)
         optimiser.zero_grad(set_to_none=True)
@@ -131,10 +135,8 @@ def _splat(
     return mean.clamp(1e-4, 1 - 1e-4), alpha
 
 
-def _in_window(gaussians: Gaussians, clip: Clip, frame: int, window: int | None) -> Int[Tensor, " m"]:
+def _in_window(gaussians: Gaussians, clip: Clip, frame: int, window: int) -> Int[Tensor, " m"]:
     """Gaussians whose source is within ``window`` training frames of ``frame``, each in its own camera."""
-    if window is None:
-        return torch.arange(len(gaussians))
     rank = np.zeros(len(clip), dtype=np.int64)
     for camera in np.unique(clip.camera).tolist():
         seen = clip.seen_of(camera)

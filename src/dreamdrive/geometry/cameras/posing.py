@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.cameras import contradiction, odometry
+from dreamdrive.geometry.cameras import contradiction, odometry, turning
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
@@ -84,7 +84,7 @@ def pose_clip(
         reason = "the frames are too dark or too blank to follow anything: the camera is taken to stand still"
         return replace(_standing(clip, evidence, camera_height_m, reason), fallback_kind="blank")
     if evidence.motion.standing:
-        reason = "the camera stands still: all frames share one pose, and depth cannot be seen from motion"
+        reason = "the camera stands still: all frames share one place, and depth cannot be seen from motion"
         return _standing(clip, evidence, camera_height_m, reason)
     outcome = reconstruct(clip, evidence, options.gate, seed, tell)
     if outcome.settled is None:
@@ -178,8 +178,8 @@ def _with_known(
 
 
 def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: str) -> Posed:
-    """One pose for all frames above a road that is taken to be level."""
-    poses = np.tile(np.eye(4), (len(clip), 1, 1))
+    """One place for all frames above a road that is taken to be level; what turns the camera is measured."""
+    poses = turning.turned(evidence.grey, evidence.street, evidence.small)
     points = depth_points(clip)
     camera = clip.rig[0]
     street = Street.of(clip, evidence, camera, poses, points)
