@@ -130,9 +130,13 @@ class Camera:
         inside = (column >= 0) & (column < self.width_px) & (row >= 0) & (row < self.height_px)
         return inside & (z > NEAR_M)
 
-    def rays(self) -> Float[np.ndarray, "h w 3"]:
-        """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
+    def tangents(self) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"]]:
+        """x of the pixel centres of all columns and y of those of all rows, in the camera frame at z = 1."""
         x = (np.arange(self.width_px) + 0.5 - self.cx_px) / self.fx_px
         y = (np.arange(self.height_px) + 0.5 - self.cy_px) / self.fy_px
-        grid_x, grid_y = np.meshgrid(x, y)
+        return x, y
+
+    def rays(self) -> Float[np.ndarray, "h w 3"]:
+        """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
+        grid_x, grid_y = np.meshgrid(*self.tangents())
         return np.stack([grid_x, grid_y, np.ones_like(grid_x)], axis=-1)

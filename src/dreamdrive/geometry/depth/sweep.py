@@ -50,11 +50,15 @@ class Warp:
 
     def __init__(self, reference: Camera, source: Camera) -> None:
         relative = source.camera_from_world @ reference.world_from_camera
-        rotated = reference.rays() @ relative[:3, :3].T
         self.reference, self.source = reference, source
         self.rotation = relative[:3, :3]
         self.translation = relative[:3, 3]
-        self.rotated = np.ascontiguousarray(np.moveaxis(rotated, -1, 0)).astype(np.float32)
+        # Rays in the source's frame: what a pixel's column gives and what its row gives, added.
+        right, down = reference.tangents()
+        by_column = self.rotation[:, :1] * right + self.rotation[:, 2:]
+        by_row = self.rotation[:, 1:2] * down
+        self.rotated = np.empty((3, len(down), len(right)), np.float32)
+        np.add(by_column[:, None], by_row[..., None], out=self.rotated, casting="same_kind")
 
     def homography(self, inverse_depth: float) -> Float[np.ndarray, "3 3"]:
         """Source from reference pixel indices (3, 3) for the plane z = 1 / inverse_depth of the reference."""
@@ -69,17 +73,18 @@ class Warp:
         self, inverse_depth: Float[np.ndarray, "h w"] | float
     ) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
         """Source pixel indices (x, y) for ``cv2.remap``; far outside where the point is behind the source."""
-        x, y, z = (
-            self.rotated[k] + np.float32(self.translation[k]) * np.asarray(inverse_depth, np.float32)
-            for k in range(3)
-        )
-        front = z > _MIN_Z
-        z = np.where(front, z, 1).astype(np.float32)
-        camera = self.source
-        u = np.float32(camera.fx_px) * x / z + np.float32(camera.cx_px - 0.5)
-        v = np.float32(camera.fy_px) * y / z + np.float32(camera.cy_px - 0.5)
-        outside = np.float32(_OUTSIDE_PX)
-        return np.where(front, u, outside), np.where(front, v, outside)
+        inverse, camera = np.asarray(inverse_depth, np.float32), self.source
+        x, y, z = (self.rotated[k] + np.float32(self.translation[k]) * inverse for k in range(3))
+        behind = None if z.min() > _MIN_Z else ~(z > _MIN_Z)
+        if behind is not None:
+            z[behind] = 1
+        for at, focal, middle in ((x, camera.fx_px, camera.cx_px), (y, camera.fy_px, camera.cy_px)):
+            at *= np.float32(focal)
+            at /= z
+            at += np.float32(middle - 0.5)
+            if behind is not None:
+                at[behind] = _OUTSIDE_PX
+        return x, y
 
 
 class Correlation:
