@@ -26,6 +26,9 @@ void network_backward(const NetworkTask&);
 void planes(const PlanesTask&);
 void planes_backward(const PlanesTask&);
 void steepness(const SteepnessTask&);
+void sweep_cost(const SweepTask&);
+void sweep_misfit(const SweepTask&);
+void smooth(const SmoothTask&);
 
 extern const Kernels kTable;
 

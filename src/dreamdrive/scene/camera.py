@@ -131,7 +131,7 @@ class Camera:
         return inside & (z > NEAR_M)
 
     def tangents(self) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"]]:
-        """x of the pixel centres of all columns and y of those of all rows, in the camera frame at z = 1."""
+        """Where the rays of all columns and of all rows meet z = 1: x and y in the camera frame."""
         x = (np.arange(self.width_px) + 0.5 - self.cx_px) / self.fx_px
         y = (np.arange(self.height_px) + 0.5 - self.cy_px) / self.fy_px
         return x, y

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.geometry.depth import View, Warp, by_frame, inside, on_plane, sample
+from dreamdrive.geometry.depth import View, Warp, by_frame, inside, misfits, sample
 from dreamdrive.geometry.moving.outline import TALLEST_M
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
@@ -131,13 +131,13 @@ def _misfits(view: View, frame: int) -> _Misfits:
     sources = [(warp, view.grey[o], view.usable[o]) for warp, o in zip(warps, near, strict=True)]
     inverse = np.array([*_BACKGROUND, *_INVERSE])
     grey = view.grey[frame]
-    upright = [_misfit(grey, [on_plane(source, one) for source in sources]) for one in inverse.tolist()]
+    upright = misfits(grey, sources, inverse, _MOST_LEVELS)
     places = [warp(view.plane_inverse[frame]) for warp in warps]
     road = [
         (sample(picture, *place), inside(*place, usable))
         for (_, picture, usable), place in zip(sources, places, strict=True)
     ]
-    return _Misfits(inverse, np.stack(upright), _misfit(grey, road))
+    return _Misfits(inverse, upright, _misfit(grey, road))
 
 
 def _misfit(
