@@ -160,25 +160,32 @@ def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -
     above_px = np.clip((_ABOVE_M * fy_px * plane).astype(int), 3, height)
     top = np.maximum(rows - above_px, 0)
     possible = (rows > above_px) & (plane > 0) & (rows < height - 3)
+    nearest, farthest = plane.max(axis=1), plane.min(axis=1)
     best, label, row = np.zeros(width), np.zeros(width, np.intp), np.zeros(width, np.intp)
     for number in range(len(_BACKGROUND), len(misfits.inverse)):
-        inverse = float(misfits.inverse[number])
-        window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
-        thing, road = cv2.blur(misfits.upright[number], window), cv2.blur(misfits.road, window)
-        gain = np.cumsum(np.where(plane > 0, road - thing, 0), axis=0)
-        cost = np.cumsum(thing, axis=0)
+        inverse, most = float(misfits.inverse[number]), _RATIO[1] * 1.1
+        # Few rows of the road are so far away that a thing may meet it there which seems to be at this distance.
+        band = np.flatnonzero((inverse >= farthest) & (inverse <= most * nearest))
+        if not len(band):
+            continue
+        at = slice(band[0], band[-1] + 1)
         # A standing thing would hide the road down to here.
         stands = (plane < inverse).sum(axis=0)
-        bottom = np.minimum(np.maximum(rows + 2, stands), height - 1)
-        above = (gain - gain[top, columns]) / above_px
-        below = (gain - gain[bottom, columns]) / np.maximum(bottom - rows, 1)
-        fit = (cost - cost[top, columns]) / above_px
-        meets = (inverse >= plane) & (inverse <= _RATIO[1] * 1.1 * plane)
+        bottom = np.minimum(np.maximum(rows[at] + 2, stands), height - 1)
+        down_to = int(bottom.max()) + 1
+        window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
+        thing, road = (cv2.blur(each[:down_to], window) for each in (misfits.upright[number], misfits.road))
+        gain = np.cumsum(np.where(plane[:down_to] > 0, road - thing, 0), axis=0)
+        cost = np.cumsum(thing, axis=0)
+        above = (gain[at] - gain[top[at], columns[at]]) / above_px[at]
+        below = (gain[at] - gain[bottom, columns[at]]) / np.maximum(bottom - rows[at], 1)
+        fit = (cost[at] - cost[top[at], columns[at]]) / above_px[at]
+        meets = (inverse >= plane[at]) & (inverse <= most * plane[at])
         good = (above > _GAIN_LEVELS) & (below > _ROAD_GAIN_LEVELS) & (fit < _FIT_LEVELS)
-        score = np.where(possible & meets & good, above + below - fit / 2, 0)
-        at = score.argmax(axis=0)
-        here = score[at, columns[0]]
-        label, row = np.where(here > best, number, label), np.where(here > best, at, row)
+        score = np.where(possible[at] & meets & good, above + below - fit / 2, 0)
+        found = score.argmax(axis=0)
+        here = score[found, columns[0]]
+        label, row = np.where(here > best, number, label), np.where(here > best, band[0] + found, row)
         best = np.maximum(best, here)
     return _Columns(best, label, row)
 
