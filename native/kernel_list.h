@@ -29,6 +29,7 @@ void steepness(const SteepnessTask&);
 void sweep_cost(const SweepTask&);
 void sweep_misfit(const SweepTask&);
 void smooth(const SmoothTask&);
+void weighted_median(const MedianTask&);
 
 extern const Kernels kTable;
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "cut.h"
 #include "module_arrays.h"
 #include "module_fit.h"
 #include "types.h"
@@ -12,6 +13,8 @@
 namespace {
 
 using Flags = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
+using Marks = nb::ndarray<bool, nb::c_contig, nb::device::cpu>;
+using Whole = nb::ndarray<const int32_t, nb::c_contig, nb::device::cpu>;
 using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 
 // Pictures laid over a reference, see dd::SweepSource; the arrays are held by who calls.
@@ -102,6 +105,33 @@ void smooth(In cost, In jump_down, In jump_right, float step, Out total, Out lab
   dd::kernels().smooth(task);
 }
 
+void weighted_median(In values, In weights, Out median) {
+  if (values.ndim() < 1 || values.shape(0) < 1) throw nb::value_error("values: expected (n, ...), n at least 1");
+  dd::MedianTask task = {};
+  task.count = int(values.shape(0));
+  task.columns = int64_t(values.size() / values.shape(0));
+  expect_size("weights", weights.size(), values.size());
+  expect_size("median", median.size(), task.columns);
+  task.values = values.data();
+  task.weights = weights.data();
+  task.out = median.data();
+  nb::gil_scoped_release release;
+  std::vector<float> scratch(2 * 16 * size_t(task.count));
+  task.scratch = scratch.data();
+  dd::kernels().weighted_median(task);
+}
+
+void minimum_cut(Whole gain, Whole right, Whole below, Marks labelled) {
+  if (gain.ndim() != 2) throw nb::value_error("gain: expected (h, w)");
+  const int height = int(gain.shape(0)), width = int(gain.shape(1));
+  expect_size("right", right.size(), size_t(height) * (width - 1));
+  expect_size("below", below.size(), size_t(height - 1) * width);
+  expect_size("labelled", labelled.size(), gain.size());
+  auto* out = reinterpret_cast<uint8_t*>(labelled.data());
+  nb::gil_scoped_release release;
+  dd::minimum_cut(height, width, gain.data(), right.data(), below.data(), out);
+}
+
 }  // namespace
 
 void bind_geometry(nb::module_& m) {
@@ -111,4 +141,6 @@ void bind_geometry(nb::module_& m) {
         array("misfit"));
   m.def("smooth", &smooth, array("cost"), array("jump_down"), array("jump_right"), "step"_a, array("total"),
         array("label"));
+  m.def("weighted_median", &weighted_median, array("values"), array("weights"), array("median"));
+  m.def("minimum_cut", &minimum_cut, array("gain"), array("right"), array("below"), array("labelled"));
 }

@@ -1,4 +1,4 @@
-// What the kernels of the plane sweep exchange, see types.h.
+// What the kernels that find depth exchange, see types.h.
 #pragma once
 #include <cstdint>
 
@@ -45,5 +45,14 @@ static inline int padded_labels(int labels) { return (labels + 15) / 16 * 16; }
 static inline int64_t smooth_scratch(int width, int labels) {
   return int64_t(width) * (2 * labels + 3 * padded_labels(labels) + 2) + 2 * (padded_labels(labels) + 32);
 }
+
+// The least of the values of each column that, with all that are no greater, has half of the weight.
+struct MedianTask {
+  const float *values, *weights;                // (count, columns)
+  int count;
+  int64_t columns;
+  float* out;                                   // (columns)
+  float* scratch;                               // 2 * 16 * count
+};
 
 }  // namespace dd

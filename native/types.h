@@ -168,6 +168,7 @@ struct Kernels {
   void (*sweep_cost)(const SweepTask&);     // (h, labels, w): 1 less the mean of the two best correlations; 1 unseen
   void (*sweep_misfit)(const SweepTask&);   // (labels, h, w): mean absolute difference in grey levels
   void (*smooth)(const SmoothTask&);
+  void (*weighted_median)(const MedianTask&);
 };
 
 const Kernels& kernels();                       // the set chosen at run time

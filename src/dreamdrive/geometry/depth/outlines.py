@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive import _native
 from dreamdrive.geometry.depth.view import View, by_frame
 from dreamdrive.scene.windows import grown, window_px
 
@@ -70,9 +71,8 @@ def redrawn(
 def weighted_median(
     values: Float[np.ndarray, "n *shape"], weight: Float[np.ndarray, "n *shape"]
 ) -> Float[np.ndarray, "*shape"]:
-    """Along the first axis."""
-    order = np.argsort(values, axis=0)
-    values, weight = (np.take_along_axis(each, order, axis=0) for each in (values, weight))
-    total = np.cumsum(weight, axis=0)
-    first = (total >= 0.5 * total[-1]).argmax(axis=0)
-    return np.take_along_axis(values, first[None], axis=0)[0]
+    """Along the first axis: the least value that, with all that are no greater, has half of the weight."""
+    median = np.empty(values.shape[1:], np.float32)
+    contiguous = [np.ascontiguousarray(each, np.float32) for each in (values, weight)]
+    _native.weighted_median(contiguous[0], contiguous[1], median)
+    return median

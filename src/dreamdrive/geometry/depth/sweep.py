@@ -207,7 +207,9 @@ def _laid_on_planes(
     sources: Sequence[Source], inverse_depth: Float[np.ndarray, " n"]
 ) -> tuple[list[np.ndarray], list[np.ndarray], Float[np.ndarray, "s n 3 3"]]:
     """Pictures and usable pixels of the sources, and where planes put the reference's pixels in them."""
-    places = np.stack([warp.homographies(inverse_depth) for warp, _, _ in sources])
+    places = np.array([warp.homographies(inverse_depth) for warp, _, _ in sources]).reshape(
+        -1, len(inverse_depth), 3, 3
+    )
     return [grey for _, grey, _ in sources], [usable for _, _, usable in sources], places
 
 

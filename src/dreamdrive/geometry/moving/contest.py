@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth import Correlation, View, Warp, sample
+from dreamdrive.geometry.depth import Correlation, View, Warp, sample, weighted_median
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.scene.windows import window_px
 
@@ -77,22 +77,13 @@ def _excess(
 ) -> Float[np.ndarray, "h w"]:
     if not wanted:
         return np.zeros(plane.shape, np.float32)
-    apparent = _weighted_median(np.stack(wanted), np.square(np.stack(weight)))
+    apparent = weighted_median(np.stack(wanted), np.square(np.stack(weight)))
     px_per_inverse = np.max(weight, axis=0)
     if known:
         beyond = np.abs(apparent - inverse_depth) - _KNOWN_TOLERANCE * inverse_depth
     else:
         beyond = np.where(plane > _MIN_PLANE_INVERSE, _PLANE_SHARE * plane - apparent, 0)
     return np.maximum(beyond * px_per_inverse, 0).astype(np.float32)
-
-
-def _weighted_median(
-    values: Float[np.ndarray, "n h w"], weights: Float[np.ndarray, "n h w"]
-) -> Float[np.ndarray, "h w"]:
-    order = np.argsort(values, axis=0, kind="stable")
-    cumulative = np.cumsum(np.take_along_axis(weights, order, axis=0), axis=0)
-    middle = (cumulative >= cumulative[-1] / 2).argmax(axis=0)
-    return np.take_along_axis(np.take_along_axis(values, order, axis=0), middle[None], axis=0)[0]
 
 
 class _Pair:

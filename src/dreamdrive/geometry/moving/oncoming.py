@@ -164,7 +164,7 @@ def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -
     best, label, row = np.zeros(width), np.zeros(width, np.intp), np.zeros(width, np.intp)
     for number in range(len(_BACKGROUND), len(misfits.inverse)):
         inverse, most = float(misfits.inverse[number]), _RATIO[1] * 1.1
-        # Few rows of the road are so far away that a thing may meet it there which seems to be at this distance.
+        # A thing that seems to be at this distance meets the road in few of the rows.
         band = np.flatnonzero((inverse >= farthest) & (inverse <= most * nearest))
         if not len(band):
             continue

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
+from dreamdrive import _native
 from dreamdrive.geometry.depth import View, Warp, inside, sample
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
 from dreamdrive.scene.windows import window_px
@@ -39,7 +38,7 @@ _NEVER = 100.0
 _EDGE = 6.0  # weight of two equal neighbours
 _EDGE_FLOOR = 0.3
 _CAP_LEVELS, _WINDOW_PX = 25.0, 3  # of a misfit
-_UNIT = 100  # the flow of a cut is found in whole numbers
+_UNIT = 100  # cuts are found in whole numbers
 _EDGE_LEVELS = 15.0  # difference in colour at which the weight is 0.6 of that
 
 
@@ -206,27 +205,9 @@ def minimum_cut(
     neighbour on the right or below. Gains and weights count in steps of 1/100. Of equally good labellings it
     is that of the fewest pixels.
     """
-    pixel = np.arange(gain.size).reshape(gain.shape)
-    source, sink = gain.size, gain.size + 1
-    worth, cost = _whole(np.maximum(gain, 0)).ravel(), _whole(np.maximum(-gain, 0)).ravel()
-    edges = [
-        (np.full(gain.size, source), pixel.ravel(), worth),
-        (pixel.ravel(), np.full(gain.size, sink), cost),
-    ]
-    for start, end, weight in (
-        (pixel[:, :-1], pixel[:, 1:], right),
-        (pixel[:-1], pixel[1:], below),
-    ):
-        both = _whole(weight).ravel()
-        edges += [(start.ravel(), end.ravel(), both), (end.ravel(), start.ravel(), both)]
-    rows, columns, values = (np.concatenate(part) for part in zip(*edges, strict=True))
-    network = csr_array((values, (rows, columns)), shape=(gain.size + 2, gain.size + 2))
-    left = network - maximum_flow(network, source, sink).flow
-    left.data[left.data < 0] = 0
-    left.eliminate_zeros()
-    labelled = np.zeros(gain.size + 2, bool)
-    labelled[breadth_first_order(left, source, return_predecessors=False)] = True
-    return labelled[: gain.size].reshape(gain.shape)
+    labelled = np.empty(gain.shape, bool)
+    _native.minimum_cut(_whole(gain), _whole(right), _whole(below), labelled)
+    return labelled
 
 
 def _whole(values: np.ndarray) -> np.ndarray:
