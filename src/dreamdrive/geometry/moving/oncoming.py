@@ -156,7 +156,7 @@ def _misfit(
 def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -> _Columns:
     """For each column the distance and the row with which thing above and road below gain most."""
     height, width = plane.shape
-    rows, columns = np.mgrid[:height, :width]
+    rows = np.arange(height)[:, None]
     above_px = np.clip((_ABOVE_M * fy_px * plane).astype(int), 3, height)
     top = np.maximum(rows - above_px, 0)
     possible = (rows > above_px) & (plane > 0) & (rows < height - 3)
@@ -172,21 +172,24 @@ def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -
         # A standing thing would hide the road down to here.
         stands = (plane < inverse).sum(axis=0)
         bottom = np.minimum(np.maximum(rows[at] + 2, stands), height - 1)
-        down_to = int(bottom.max()) + 1
+        part = slice(int(top[at].min()), int(bottom.max()) + 1)
         window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
-        thing, road = (cv2.blur(each[:down_to], window) for each in (misfits.upright[number], misfits.road))
-        gain = np.cumsum(np.where(plane[:down_to] > 0, road - thing, 0), axis=0)
+        thing, road = (cv2.blur(each[part], window) for each in (misfits.upright[number], misfits.road))
+        gain = np.cumsum(np.where(plane[part] > 0, road - thing, 0), axis=0)
         cost = np.cumsum(thing, axis=0)
-        above = (gain[at] - gain[top[at], columns[at]]) / above_px[at]
-        below = (gain[at] - gain[bottom, columns[at]]) / np.maximum(bottom - rows[at], 1)
-        fit = (cost[at] - cost[top[at], columns[at]]) / above_px[at]
+        here, from_top = np.s_[at.start - part.start : at.stop - part.start], top[at] - part.start
+        above = (gain[here] - np.take_along_axis(gain, from_top, axis=0)) / above_px[at]
+        below = gain[here] - np.take_along_axis(gain, bottom - part.start, axis=0)
+        below /= np.maximum(bottom - rows[at], 1)
+        fit = (cost[here] - np.take_along_axis(cost, from_top, axis=0)) / above_px[at]
         meets = (inverse >= plane[at]) & (inverse <= most * plane[at])
         good = (above > _GAIN_LEVELS) & (below > _ROAD_GAIN_LEVELS) & (fit < _FIT_LEVELS)
         score = np.where(possible[at] & meets & good, above + below - fit / 2, 0)
         found = score.argmax(axis=0)
-        here = score[found, columns[0]]
-        label, row = np.where(here > best, number, label), np.where(here > best, band[0] + found, row)
-        best = np.maximum(best, here)
+        most_here = score.max(axis=0)
+        better = most_here > best
+        label, row = np.where(better, number, label), np.where(better, band[0] + found, row)
+        best = np.maximum(best, most_here)
     return _Columns(best, label, row)
 
 
