@@ -106,6 +106,13 @@ class Camera:
             height_px=height_px,
         )
 
+    def cropped(self, rows: slice, columns: slice) -> "Camera":
+        """The part of the same picture that shows these rows and columns."""
+        top, bottom, _ = rows.indices(self.height_px)
+        left, right, _ = columns.indices(self.width_px)
+        middle = {"cx_px": self.cx_px - left, "cy_px": self.cy_px - top}
+        return replace(self, width_px=right - left, height_px=bottom - top, **middle)
+
     def project(self, points_world: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Column and row in pixels and depth along z in metres (N, 3) of points in the world.
 
