@@ -124,15 +124,15 @@ class Correlation:
 
 
 def sample(
-    image: Float[np.ndarray, "h w"], x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"]
-) -> Float[np.ndarray, "h w"]:
+    image: Float[np.ndarray, "h w"], x: Float[np.ndarray, "u v"], y: Float[np.ndarray, "u v"]
+) -> Float[np.ndarray, "u v"]:
     """Bilinear samples at pixel indices (x, y); the edge is repeated outside."""
     return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def inside(
-    x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"], valid: Bool[np.ndarray, "h w"]
-) -> Bool[np.ndarray, "h w"]:
+    x: Float[np.ndarray, "u v"], y: Float[np.ndarray, "u v"], valid: Bool[np.ndarray, "h w"]
+) -> Bool[np.ndarray, "u v"]:
     """Whether pixel indices (x, y) fall on valid pixels of the source."""
     height, width = valid.shape
     within = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
