@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "buffer.h"
 #include "cut.h"
 #include "module_arrays.h"
 #include "module_fit.h"
@@ -59,15 +60,15 @@ void sweep_cost(In grey, In mean, In variance, std::vector<In> greys, std::vecto
   expect_size("mean", mean.size(), grey.size());
   expect_size("variance", variance.size(), grey.size());
   expect_size("cost", cost.size(), grey.size() * task.labels);
-  if (side < 1 || side % 2 == 0) throw nb::value_error("side: expected an odd number");
+  if (side < 1 || side % 2 == 0 || side > dd::kMostSide) throw nb::value_error("side: expected an odd number up to 127");
   task.mean = mean.data();
   task.variance = variance.data();
   task.side = side;
   task.centre = centre;
   task.noise = noise;
   nb::gil_scoped_release release;
-  std::vector<float> scratch(dd::sweep_scratch(task.width, side, task.n_sources));
-  task.scratch = scratch.data();
+  dd::Buffer<float> scratch;
+  task.scratch = scratch.resize(dd::sweep_scratch(task.width, side, task.n_sources));
   dd::kernels().sweep_cost(task);
 }
 
@@ -78,8 +79,8 @@ void sweep_misfit(In grey, std::vector<In> greys, std::vector<Flags> usable, Dou
   expect_size("misfit", misfit.size(), grey.size() * task.labels);
   task.most = most;
   nb::gil_scoped_release release;
-  std::vector<float> scratch(dd::sweep_scratch(task.width, 1, 0));
-  task.scratch = scratch.data();
+  dd::Buffer<float> scratch;
+  task.scratch = scratch.resize(dd::sweep_scratch(task.width, 1, 0));
   dd::kernels().sweep_misfit(task);
 }
 
@@ -100,8 +101,8 @@ void smooth(In cost, In jump_down, In jump_right, float step, Out total, Out lab
   task.total = total.data();
   task.label = label.data();
   nb::gil_scoped_release release;
-  std::vector<float> scratch(dd::smooth_scratch(task.width, task.labels));
-  task.scratch = scratch.data();
+  dd::Buffer<float> scratch;
+  task.scratch = scratch.resize(dd::smooth_scratch(task.width, task.labels));
   dd::kernels().smooth(task);
 }
 
@@ -116,8 +117,8 @@ void weighted_median(In values, In weights, Out median) {
   task.weights = weights.data();
   task.out = median.data();
   nb::gil_scoped_release release;
-  std::vector<float> scratch(2 * 16 * size_t(task.count));
-  task.scratch = scratch.data();
+  dd::Buffer<float> scratch;
+  task.scratch = scratch.resize(2 * 16 * size_t(task.count));
   dd::kernels().weighted_median(task);
 }
 

@@ -94,17 +94,23 @@ struct Correlating {
       }
     }
   }
-  // Correlation of a source with the reference from column x of row y on.
-  V score(const Windows& of, int y, int x, V mean, V variance) const {
-    V sums[3] = {};
-    for (int k = -radius; k <= radius; k++) {
-      const float* from = of.slot(reflected(y + k, task.height), 0) + x;
-      for (int map = 0; map < 3; map++) sums[map] += load(from + map * stride);
-    }
+  // Takes the correlations of a source with row y of the reference into the best two of each pixel.
+  void add_scores(const Windows& of, int y, float* best, float* second) const {
+    const float* from[kMostSide];
+    for (int k = 0; k < task.side; k++) from[k] = of.slot(reflected(y + k - radius, task.height), 0);
+    const float *seen = of.seen(y), *means = task.mean + int64_t(y) * task.width, *variances = task.variance + int64_t(y) * task.width;
     const float share = 1.0f / float(task.side * task.side);
-    const V other = sums[0] * share, spread = vmax(sums[1] * share - other * other, V{}) + task.noise;
-    const V score = (sums[2] * share - mean * other) / vsqrt(spread * (variance + task.noise));
-    return load(of.seen(y) + x) > V{} ? score : broadcast(kUnseen);
+    for (int x = 0; x < task.width; x += kLanes) {
+      V sums[3] = {};
+      for (int k = 0; k < task.side; k++)
+        for (int map = 0; map < 3; map++) sums[map] += load(from[k] + map * stride + x);
+      const V mean = load_part(means + x, task.width - x), variance = load_part(variances + x, task.width - x);
+      const V other = sums[0] * share, spread = vmax(sums[1] * share - other * other, V{}) + task.noise;
+      V score = (sums[2] * share - mean * other) / vsqrt(spread * (variance + task.noise));
+      score = load(seen + x) > V{} ? score : broadcast(kUnseen);
+      store(second + x, vmax(load(second + x), vmin(load(best + x), score)));
+      store(best + x, vmax(load(best + x), score));
+    }
   }
 };
 
@@ -113,23 +119,22 @@ struct Correlating {
 void sweep_cost(const SweepTask& task) {
   Correlating correlating(task);
   const int w = task.width, ahead = correlating.radius;
+  float *best = correlating.windows(task.n_sources).rows, *second = best + correlating.stride;
   __builtin_memset(task.scratch, 0, sizeof(float) * sweep_scratch(w, task.side, task.n_sources));
   for (int label = 0; label < task.labels; label++) {
     for (int y = 0; y < ahead && y < task.height; y++) correlating.add_row(label, y);
     for (int y = 0; y < task.height; y++) {
       if (y + ahead < task.height) correlating.add_row(label, y + ahead);
+      for (int x = 0; x < w; x += kLanes) {
+        store(best + x, broadcast(kUnseen));
+        store(second + x, broadcast(kUnseen));
+      }
+      for (int s = 0; s < task.n_sources; s++) correlating.add_scores(correlating.windows(s), y, best, second);
       float* out = task.out + (int64_t(y) * task.labels + label) * w;
       for (int x = 0; x < w; x += kLanes) {
-        const int64_t at = int64_t(y) * w + x;
-        const V mean = load_part(task.mean + at, w - x), variance = load_part(task.variance + at, w - x);
-        V best = broadcast(kUnseen), second = best;
-        for (int s = 0; s < task.n_sources; s++) {
-          const V score = correlating.score(correlating.windows(s), y, x, mean, variance);
-          second = vmax(second, vmin(best, score));
-          best = vmax(best, score);
-        }
-        const V found = second > kUnseen ? (best + second) * 0.5f : best;
-        store_part(out + x, 1.0f - masked(best > kUnseen, found), w - x);
+        const V one = load(best + x), other = load(second + x);
+        const V found = other > kUnseen ? (one + other) * 0.5f : one;
+        store_part(out + x, 1.0f - masked(one > kUnseen, found), w - x);
       }
     }
   }

@@ -20,15 +20,16 @@ struct SweepTask {
   float* scratch;
   // Of the cost alone.
   const float *mean, *variance;                 // (h, w) of the reference over the window
-  int side;                                     // of the window, odd
+  int side;                                     // of the window, odd, up to kMostSide
   float centre, noise;                          // taken from grey levels, added to both variances
   // Of the misfit alone.
   float most;                                   // grey levels: differences that are larger, or not seen
 };
+constexpr int kMostSide = 127;
 // Floats of a row over which the window may reach at both ends, rounded up so that whole lanes may be read past the end.
 static inline int sweep_row(int width, int side) { return (width + side - 1 + 31) / 16 * 16; }
 static inline int64_t sweep_scratch(int width, int side, int n_sources) {
-  return int64_t(sweep_row(width, side)) * (4 + 4 * side * n_sources);
+  return int64_t(sweep_row(width, side)) * (6 + 4 * side * n_sources);
 }
 
 // Semi-global smoothing of a volume of costs.
