@@ -98,7 +98,8 @@ struct Correlating {
   void add_scores(const Windows& of, int y, float* best, float* second) const {
     const float* from[kMostSide];
     for (int k = 0; k < task.side; k++) from[k] = of.slot(reflected(y + k - radius, task.height), 0);
-    const float *seen = of.seen(y), *means = task.mean + int64_t(y) * task.width, *variances = task.variance + int64_t(y) * task.width;
+    const int64_t row_at = int64_t(y) * task.width;
+    const float *seen = of.seen(y), *means = task.mean + row_at, *variances = task.variance + row_at;
     const float share = 1.0f / float(task.side * task.side);
     for (int x = 0; x < task.width; x += kLanes) {
       V sums[3] = {};
@@ -142,7 +143,8 @@ void sweep_cost(const SweepTask& task) {
 
 void sweep_misfit(const SweepTask& task) {
   const int w = task.width;
-  float *grey = task.scratch, *seen = grey + sweep_row(w, 1), *total = seen + sweep_row(w, 1), *count = total + sweep_row(w, 1);
+  const int stride = sweep_row(w, 1);
+  float *grey = task.scratch, *seen = grey + stride, *total = seen + stride, *count = total + stride;
   for (int label = 0; label < task.labels; label++)
     for (int y = 0; y < task.height; y++) {
       for (int x = 0; x < w; x += kLanes) {

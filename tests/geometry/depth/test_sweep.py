@@ -39,6 +39,14 @@ def test_warp_and_homography_agree_with_projection(angle, shift, inverse):
         np.testing.assert_allclose(mapped[:2] / mapped[2], expected, atol=1e-6)
 
 
+def test_a_cropped_camera_sees_the_same_part_of_the_picture():
+    camera = Camera(90.0, 100.0, 33.0, 22.0, 64, 48)
+    window = np.s_[5:60, 7:20]
+    part = camera.cropped(*window)
+    assert (part.height_px, part.width_px) == (43, 13)
+    np.testing.assert_allclose(part.rays(), camera.rays()[window], atol=1e-12)
+
+
 def test_correlation_ignores_gain_and_noise_on_flat_pictures():
     texture = toy.TEXTURES[0][:40, :50].astype(np.float32)
     correlation = sweep.Correlation(texture)
