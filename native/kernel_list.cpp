@@ -9,6 +9,7 @@ namespace dd::DD_ISA {
 const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, cover, composite, composite_backward, inspect, ssim, ssim_backward,
                         l1_ssim, l1_ssim_backward, over_sky, over_sky_backward, geometry_loss, adam, activate,
                         activate_backward, network, network_backward, planes, planes_backward,
-                        steepness};
+                        steepness, sweep_cost, sweep_misfit, smooth,
+                        weighted_median};
 
 }  // namespace dd::DD_ISA

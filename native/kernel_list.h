@@ -26,6 +26,10 @@ void network_backward(const NetworkTask&);
 void planes(const PlanesTask&);
 void planes_backward(const PlanesTask&);
 void steepness(const SteepnessTask&);
+void sweep_cost(const SweepTask&);
+void sweep_misfit(const SweepTask&);
+void smooth(const SmoothTask&);
+void weighted_median(const MedianTask&);
 
 extern const Kernels kTable;
 

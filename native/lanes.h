@@ -2,6 +2,10 @@
 #pragma once
 #include <cstdint>
 
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
 #if defined(__AVX512F__)
 #define DD_LANES 16
 #elif defined(__AVX__)
@@ -41,6 +45,19 @@ static inline I load(const int32_t* p) {
   return v;
 }
 static inline void store(int32_t* p, I v) { __builtin_memcpy(p, &v, sizeof(v)); }
+
+// p[i] in each lane.
+static inline V gather(const float* p, I i) {
+#if defined(__AVX512F__)
+  return (V)_mm512_mask_i32gather_ps((__m512)V{}, 0xffff, (__m512i)i, p, 4);
+#elif defined(__AVX2__)
+  return (V)_mm256_i32gather_ps(p, (__m256i)i, 4);
+#else
+  V v;
+  for (int l = 0; l < kLanes; l++) v[l] = p[i[l]];
+  return v;
+#endif
+}
 
 static inline V broadcast(float x) { return x - V{}; }
 static inline I broadcast(int32_t x) { return x - I{}; }

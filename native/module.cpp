@@ -189,5 +189,6 @@ NB_MODULE(_native, m) {
   m.def("threads", &dd::thread_count);
   m.def("isa", [] { return std::string(dd::kernels().isa); });
   bind_fit(m);
+  bind_geometry(m);
   bind_motion(m);
 }

@@ -3,4 +3,5 @@
 #include <nanobind/nanobind.h>
 
 void bind_fit(nanobind::module_& m);
+void bind_geometry(nanobind::module_& m);
 void bind_motion(nanobind::module_& m);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "fit_types.h"
+#include "sweep_types.h"
 
 namespace dd {
 
@@ -164,6 +165,10 @@ struct Kernels {
   void (*planes)(const PlanesTask&);
   void (*planes_backward)(const PlanesTask&);
   void (*steepness)(const SteepnessTask&);  // one image
+  void (*sweep_cost)(const SweepTask&);     // (h, labels, w): 1 less the mean of the two best correlations; 1 unseen
+  void (*sweep_misfit)(const SweepTask&);   // (labels, h, w): mean absolute difference in grey levels
+  void (*smooth)(const SmoothTask&);
+  void (*weighted_median)(const MedianTask&);
 };
 
 const Kernels& kernels();                       // the set chosen at run time

@@ -1,9 +1,10 @@
-"""Types of the compiled core (native/module.cpp, native/module_fit.cpp, native/module_motion.cpp).
+"""Types of the compiled core: native/module.cpp and what that binds from its neighbours.
 
-Arrays are contiguous float32 CPU tensors; ``visible``, ``mask`` and the ``sky`` of the geometry loss are
-bool, ``actor`` is int64.
+Arrays are contiguous float32 CPU tensors, or NumPy's of geometry; ``visible``, ``mask``, ``usable`` and the
+``sky`` of the geometry loss are bool, ``actor`` is int64, homographies are float64.
 """
 
+import numpy as np
 from torch import Tensor
 
 class Frame:
@@ -209,3 +210,35 @@ def all_usable(gaussians: Gaussians) -> bool: ...
 def set_threads(count: int) -> None: ...
 def threads() -> int: ...
 def isa() -> str: ...
+def sweep_cost(
+    grey: np.ndarray,
+    mean: np.ndarray,
+    variance: np.ndarray,
+    greys: list[np.ndarray],
+    usable: list[np.ndarray],
+    homographies: np.ndarray,
+    side: int,
+    centre: float,
+    noise: float,
+    least_z: float,
+    cost: np.ndarray,
+) -> None: ...
+def sweep_misfit(
+    grey: np.ndarray,
+    greys: list[np.ndarray],
+    usable: list[np.ndarray],
+    homographies: np.ndarray,
+    least_z: float,
+    most: float,
+    misfit: np.ndarray,
+) -> None: ...
+def smooth(
+    cost: np.ndarray,
+    jump_down: np.ndarray,
+    jump_right: np.ndarray,
+    step: float,
+    total: np.ndarray,
+    label: np.ndarray,
+) -> None: ...
+def weighted_median(values: np.ndarray, weights: np.ndarray, median: np.ndarray) -> None: ...
+def minimum_cut(gain: np.ndarray, right: np.ndarray, below: np.ndarray, labelled: np.ndarray) -> None: ...

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
+from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 from dreamdrive.decompose.body import Body, body_of
@@ -117,7 +118,11 @@ def cast(
         seen = np.unique(frames[rows])
         shown = [pixels[rows[frames[rows] == frame]] for frame in seen]
         tracked = len(seen) >= options.least_frames
-        paths.append(find_path(clip, geometry, seen, shown, options.placing, reach_px) if tracked else None)
+        # Systems are small: with threads they take twice the time, and differ in the last digits.
+        with threadpool_limits(1, "blas"):
+            paths.append(
+                find_path(clip, geometry, seen, shown, options.placing, reach_px) if tracked else None
+            )
     return _merge(clip, geometry, chosen, pixels, cluster, paths, options, reach_px)
 
 

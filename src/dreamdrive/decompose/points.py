@@ -70,7 +70,9 @@ class Points:
         self._stiff = self._of_points((weighted_own * own).sum(axis=1)) + self._prior
         self._pull = self._of_points((weighted_own * off).sum(axis=1)) + self._prior * self._change
         self._tied = self._ties(np.einsum("nri,nr->ni", weighted, own), state.size)
-        normal -= (self._tied.T @ self._tied.multiply(1 / self._stiff[:, None]).tocsr()).toarray()
+        eased = self._tied.copy()
+        eased.data *= np.repeat(1 / self._stiff, np.diff(eased.indptr))
+        normal -= (self._tied.T @ eased).toarray()
         gradient -= self._tied.T @ (self._pull / self._stiff)
         return normal, gradient
 

@@ -56,7 +56,9 @@ class CameraVotes(nn.Module):
         super().__init__()
         self.enter = ConvNorm(channels, FINE * 2, 3)
         self.votes = nn.Conv2d(FINE * 2, 10, 1)
-        nn.init.normal_(self.votes.weight, std=1e-3)
+        # Where weights follow anyway torch would load its compiler for this, which takes 1.5 s.
+        if not self.votes.weight.is_meta:
+            nn.init.normal_(self.votes.weight, std=1e-3)
 
     def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n 7"]:
         """Means, logarithms of standard deviations and a logit, see ``Prediction.camera``."""

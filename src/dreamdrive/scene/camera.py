@@ -106,6 +106,13 @@ class Camera:
             height_px=height_px,
         )
 
+    def cropped(self, rows: slice, columns: slice) -> "Camera":
+        """The part of the same picture that shows these rows and columns."""
+        top, bottom, _ = rows.indices(self.height_px)
+        left, right, _ = columns.indices(self.width_px)
+        middle = {"cx_px": self.cx_px - left, "cy_px": self.cy_px - top}
+        return replace(self, width_px=right - left, height_px=bottom - top, **middle)
+
     def project(self, points_world: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Column and row in pixels and depth along z in metres (N, 3) of points in the world.
 
@@ -130,9 +137,13 @@ class Camera:
         inside = (column >= 0) & (column < self.width_px) & (row >= 0) & (row < self.height_px)
         return inside & (z > NEAR_M)
 
-    def rays(self) -> Float[np.ndarray, "h w 3"]:
-        """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
+    def tangents(self) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"]]:
+        """Where the rays of all columns and of all rows meet z = 1: x and y in the camera frame."""
         x = (np.arange(self.width_px) + 0.5 - self.cx_px) / self.fx_px
         y = (np.arange(self.height_px) + 0.5 - self.cy_px) / self.fy_px
-        grid_x, grid_y = np.meshgrid(x, y)
+        return x, y
+
+    def rays(self) -> Float[np.ndarray, "h w 3"]:
+        """Directions (H, W, 3) of the pixel centres in the camera frame, scaled to z = 1."""
+        grid_x, grid_y = np.meshgrid(*self.tangents())
         return np.stack([grid_x, grid_y, np.ones_like(grid_x)], axis=-1)

@@ -64,7 +64,7 @@ def _sweep_frame(
     bonus = _plane_bonus(plane, plane_score)
     _add_at_plane(work.cost, plane, -bonus)
     work.cost[:, 0] -= sky
-    label = smoothing.best_label(smoothing.semi_global(work, view.grey[frame]))
+    label = smoothing.best_label(work, view.grey[frame])
     _add_at_plane(work.cost, plane, bonus)
     work.cost[:, 0] += sky
     return _read(label, work.cost, plane, plane_score)

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive import _native
 from dreamdrive.geometry.depth.view import View, by_frame
 from dreamdrive.scene.windows import grown, window_px
 
@@ -47,19 +48,19 @@ def redrawn(
         return inverse
     step = max(1, round(grown(_REACH_PX, width) / _SAMPLES))
     reach = step * _SAMPLES
-    around = (reach, reach), (reach, reach), (0, 0)
-    colour = np.pad(rgb, around, mode="edge").reshape(-1, 3).astype(np.float32)
+    channels = [np.pad(rgb[..., c], reach, mode="edge").ravel().astype(np.float32) for c in range(3)]
     depth = np.pad(level, reach).ravel()
     known = np.pad((inverse > 0).astype(np.float32), reach).ravel()
     line = width + 2 * reach
     at = (row + reach) * line + column + reach
     values = np.empty(((2 * _SAMPLES + 1) ** 2, len(at)), np.float32)
     weight = np.empty_like(values)
+    own = [channel[at] for channel in channels]
     offsets = range(-reach, reach + 1, step)
     fall, spread = grown(_FALL_PX, width), 255 * _COLOUR
     for k, (down, right) in enumerate((a, b) for a in offsets for b in offsets):
         there = at + down * line + right
-        unlike = ((colour[there] - colour[at]) ** 2).sum(axis=1) / spread**2
+        unlike = sum((each[there] - mine) ** 2 for each, mine in zip(channels, own, strict=True)) / spread**2
         weight[k] = np.exp(-(unlike + (down**2 + right**2) / fall**2) / 2) * known[there]
         values[k] = depth[there]
     drawn = inverse.copy()
@@ -70,9 +71,8 @@ def redrawn(
 def weighted_median(
     values: Float[np.ndarray, "n *shape"], weight: Float[np.ndarray, "n *shape"]
 ) -> Float[np.ndarray, "*shape"]:
-    """Along the first axis."""
-    order = np.argsort(values, axis=0)
-    values, weight = (np.take_along_axis(each, order, axis=0) for each in (values, weight))
-    total = np.cumsum(weight, axis=0)
-    first = (total >= 0.5 * total[-1]).argmax(axis=0)
-    return np.take_along_axis(values, first[None], axis=0)[0]
+    """Along the first axis: the least value that, with all that are no greater, has half of the weight."""
+    median = np.empty(values.shape[1:], np.float32)
+    contiguous = [np.ascontiguousarray(each, np.float32) for each in (values, weight)]
+    _native.weighted_median(contiguous[0], contiguous[1], median)
+    return median

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive import _native
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.windows import window_px
 
@@ -19,8 +20,6 @@ _CENTRE = 128.0
 _OUTSIDE_PX = -10.0
 _UNSEEN = np.float32(-2)
 _MIN_Z = 0.05  # of the reference's depth; nearer to the source's image plane a point is not projected
-_LINEAR = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-_NEAREST = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
 
 
 def choose_sources(
@@ -50,36 +49,41 @@ class Warp:
 
     def __init__(self, reference: Camera, source: Camera) -> None:
         relative = source.camera_from_world @ reference.world_from_camera
-        rotated = reference.rays() @ relative[:3, :3].T
         self.reference, self.source = reference, source
         self.rotation = relative[:3, :3]
         self.translation = relative[:3, 3]
-        self.rotated = np.ascontiguousarray(np.moveaxis(rotated, -1, 0)).astype(np.float32)
+        # Rays in the source's frame: what a pixel's column gives and what its row gives, added.
+        right, down = reference.tangents()
+        by_column = self.rotation[:, :1] * right + self.rotation[:, 2:]
+        by_row = self.rotation[:, 1:2] * down
+        self.rotated = np.empty((3, len(down), len(right)), np.float32)
+        np.add(by_column[:, None], by_row[..., None], out=self.rotated, casting="same_kind")
 
-    def homography(self, inverse_depth: float) -> Float[np.ndarray, "3 3"]:
-        """Source from reference pixel indices (3, 3) for the plane z = 1 / inverse_depth of the reference."""
+    def homographies(self, inverse_depth: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3 3"]:
+        """Source from reference pixel indices for planes z = 1 / inverse_depth of the reference (1/m)."""
         shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
-        plane = self.rotation.copy()
-        plane[:, 2] += inverse_depth * self.translation
+        planes = np.tile(self.rotation, (len(inverse_depth), 1, 1))
+        planes[:, :, 2] += inverse_depth[:, None] * self.translation
         return (
-            np.linalg.inv(shift) @ self.source.matrix @ plane @ np.linalg.inv(self.reference.matrix) @ shift
+            np.linalg.inv(shift) @ self.source.matrix @ planes @ np.linalg.inv(self.reference.matrix) @ shift
         )
 
     def __call__(
         self, inverse_depth: Float[np.ndarray, "h w"] | float
     ) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
         """Source pixel indices (x, y) for ``cv2.remap``; far outside where the point is behind the source."""
-        x, y, z = (
-            self.rotated[k] + np.float32(self.translation[k]) * np.asarray(inverse_depth, np.float32)
-            for k in range(3)
-        )
-        front = z > _MIN_Z
-        z = np.where(front, z, 1).astype(np.float32)
-        camera = self.source
-        u = np.float32(camera.fx_px) * x / z + np.float32(camera.cx_px - 0.5)
-        v = np.float32(camera.fy_px) * y / z + np.float32(camera.cy_px - 0.5)
-        outside = np.float32(_OUTSIDE_PX)
-        return np.where(front, u, outside), np.where(front, v, outside)
+        inverse, camera = np.asarray(inverse_depth, np.float32), self.source
+        x, y, z = (self.rotated[k] + np.float32(self.translation[k]) * inverse for k in range(3))
+        behind = None if z.min() > _MIN_Z else ~(z > _MIN_Z)
+        if behind is not None:
+            z[behind] = 1
+        for at, focal, middle in ((x, camera.fx_px, camera.cx_px), (y, camera.fy_px, camera.cy_px)):
+            at *= np.float32(focal)
+            at /= z
+            at += np.float32(middle - 0.5)
+            if behind is not None:
+                at[behind] = _OUTSIDE_PX
+        return x, y
 
 
 class Correlation:
@@ -89,8 +93,8 @@ class Correlation:
     """
 
     def __init__(self, grey: Float[np.ndarray, "h w"], window: int = _WINDOW_PX) -> None:
-        side = window_px(window, grey.shape[1])
-        self._row = np.full(side, 1 / side, np.float32)
+        self.side = window_px(window, grey.shape[1])
+        self._row = np.full(self.side, 1 / self.side, np.float32)
         # Centred values keep the differences of squares exact enough in float32.
         self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(_CENTRE)
         self._buffers = [np.empty_like(self.grey) for _ in range(4)]
@@ -120,15 +124,15 @@ class Correlation:
 
 
 def sample(
-    image: Float[np.ndarray, "h w"], x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"]
-) -> Float[np.ndarray, "h w"]:
+    image: Float[np.ndarray, "h w"], x: Float[np.ndarray, "u v"], y: Float[np.ndarray, "u v"]
+) -> Float[np.ndarray, "u v"]:
     """Bilinear samples at pixel indices (x, y); the edge is repeated outside."""
     return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def inside(
-    x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"], valid: Bool[np.ndarray, "h w"]
-) -> Bool[np.ndarray, "h w"]:
+    x: Float[np.ndarray, "u v"], y: Float[np.ndarray, "u v"], valid: Bool[np.ndarray, "h w"]
+) -> Bool[np.ndarray, "u v"]:
     """Whether pixel indices (x, y) fall on valid pixels of the source."""
     height, width = valid.shape
     within = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
@@ -178,25 +182,35 @@ def matching_cost(
     correlation: Correlation, sources: Sequence[Source], cost: Float[np.ndarray, "h labels w"]
 ) -> None:
     """One minus ``similarity`` for every plane, uniform in 1/m from 0, into ``cost`` (H, labels, W)."""
-    for label, inverse in enumerate(np.linspace(0.0, MAX_INVERSE_DEPTH, LABELS).tolist()):
-        found = BestTwo(correlation.grey.shape)
-        for source in sources:
-            warped, seen = on_plane(source, inverse)
-            found.add(correlation(warped), seen)
-        np.subtract(1, found.mean(), out=cost[:, label])
+    laid = _laid_on_planes(sources, np.linspace(0.0, MAX_INVERSE_DEPTH, LABELS))
+    reference = correlation.grey, correlation.mean, correlation.variance
+    _native.sweep_cost(*reference, *laid, correlation.side, _CENTRE, _NOISE, _MIN_Z, cost)
 
 
-def on_plane(source: Source, inverse: float) -> tuple[Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """A source on the reference's grid if all were on the plane z = 1 / inverse, and where it sees that."""
-    warp, grey, usable = source
-    # A plane parallel to the image maps by a homography, which OpenCV walks faster than a map.
-    homography, size = warp.homography(inverse), grey.shape[::-1]
-    warped = cv2.warpPerspective(grey, homography, size, flags=_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    seen = cv2.warpPerspective(usable.view(np.uint8), homography, size, flags=_NEAREST).view(np.bool_)
-    z = warp.rotated[2] + np.float32(warp.translation[2] * inverse)
-    if z.min() <= _MIN_Z:
-        seen &= z > _MIN_Z
-    return warped, seen
+def misfits(
+    grey: Float[np.ndarray, "h w"],
+    sources: Sequence[Source],
+    inverse_depth: Float[np.ndarray, " n"],
+    most_levels: float,
+) -> Float[np.ndarray, "n h w"]:
+    """Mean absolute difference to the sources that see a point, if all were on planes z = 1 / inverse_depth.
+
+    In grey levels, for each inverse depth in 1/m; no difference counts for more than ``most_levels``, which
+    also stands where no source sees the point.
+    """
+    found = np.empty((len(inverse_depth), *grey.shape), np.float32)
+    _native.sweep_misfit(grey, *_laid_on_planes(sources, inverse_depth), _MIN_Z, most_levels, found)
+    return found
+
+
+def _laid_on_planes(
+    sources: Sequence[Source], inverse_depth: Float[np.ndarray, " n"]
+) -> tuple[list[np.ndarray], list[np.ndarray], Float[np.ndarray, "s n 3 3"]]:
+    """Pictures and usable pixels of the sources, and where planes put the reference's pixels in them."""
+    places = np.array([warp.homographies(inverse_depth) for warp, _, _ in sources]).reshape(
+        -1, len(inverse_depth), 3, 3
+    )
+    return [grey for _, grey, _ in sources], [usable for _, _, usable in sources], places
 
 
 def nearest_label(inverse_depth: Float[np.ndarray, "h w"]) -> Int[np.ndarray, "h w"]:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth import Correlation, View, Warp, sample
+from dreamdrive.geometry.depth import Correlation, View, Warp, sample, weighted_median
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.scene.windows import window_px
 
@@ -77,22 +77,13 @@ def _excess(
 ) -> Float[np.ndarray, "h w"]:
     if not wanted:
         return np.zeros(plane.shape, np.float32)
-    apparent = _weighted_median(np.stack(wanted), np.square(np.stack(weight)))
+    apparent = weighted_median(np.stack(wanted), np.square(np.stack(weight)))
     px_per_inverse = np.max(weight, axis=0)
     if known:
         beyond = np.abs(apparent - inverse_depth) - _KNOWN_TOLERANCE * inverse_depth
     else:
         beyond = np.where(plane > _MIN_PLANE_INVERSE, _PLANE_SHARE * plane - apparent, 0)
     return np.maximum(beyond * px_per_inverse, 0).astype(np.float32)
-
-
-def _weighted_median(
-    values: Float[np.ndarray, "n h w"], weights: Float[np.ndarray, "n h w"]
-) -> Float[np.ndarray, "h w"]:
-    order = np.argsort(values, axis=0, kind="stable")
-    cumulative = np.cumsum(np.take_along_axis(weights, order, axis=0), axis=0)
-    middle = (cumulative >= cumulative[-1] / 2).argmax(axis=0)
-    return np.take_along_axis(np.take_along_axis(values, order, axis=0), middle[None], axis=0)[0]
 
 
 class _Pair:
@@ -108,8 +99,10 @@ class _Pair:
         plane = view.plane_inverse[frame]
         floor = np.float32(_FLOOR_SHARE) * plane
         self.floor = inverse_depth if known else floor
-        self.static = [inverse_depth] if known else [np.maximum(inverse_depth, floor), plane]
+        static = [inverse_depth] if known else [np.maximum(inverse_depth, floor), plane]
         self.known = known
+        self.by_flow = sample(self.grey, flow.x, flow.y)
+        self.if_static = [sample(self.grey, *self.warp(inverse)) for inverse in static]
 
     def wanted(self) -> tuple[np.ndarray, np.ndarray]:
         """Inverse depth (1/m) nearest to the flow, unbounded, and pixels of flow per 1/m."""
@@ -124,20 +117,19 @@ class _Pair:
 
     def gain(self) -> np.ndarray:
         """Grey levels by which the flow matches better than the best static explanation."""
-        static = [self._error(*self.warp(inverse)) for inverse in self.static]
-        return np.min(static, axis=0) - self._error(self.flow.x, self.flow.y)
+        return np.min([self._error(each) for each in self.if_static], axis=0) - self._error(self.by_flow)
 
-    def _error(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        difference = np.minimum(np.abs(sample(self.grey, x, y) - self.reference), np.float32(_ERROR_CAP))
-        side = window_px(_GAIN_WINDOW_PX, x.shape[1])
+    def _error(self, picture: np.ndarray) -> np.ndarray:
+        difference = np.minimum(np.abs(picture - self.reference), np.float32(_ERROR_CAP))
+        side = window_px(_GAIN_WINDOW_PX, picture.shape[1])
         return cv2.boxFilter(difference, cv2.CV_32F, (side, side))
 
     def wins(self, correlation: Correlation) -> np.ndarray:
         """Flow clearly better correlated than the best static explanation, some slack granted to that one."""
         x, y, residual = self._nearest_allowed()
-        places = [(x, y), *(self.warp(inverse) for inverse in self.static)]
-        best = np.max([correlation(sample(self.grey, *at)) for at in places], axis=0)
-        by_flow = correlation(sample(self.grey, self.flow.x, self.flow.y))
+        explained = [sample(self.grey, x, y), *self.if_static]
+        best = np.max([correlation(each) for each in explained], axis=0)
+        by_flow = correlation(self.by_flow)
         return (by_flow > _FLOW_CORRELATION) & (by_flow - best > _LEAD) & (residual > _SLACK_PX)
 
     def _nearest_allowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

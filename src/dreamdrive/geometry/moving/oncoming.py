@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.geometry.depth import View, Warp, by_frame, inside, on_plane, sample
+from dreamdrive.geometry.depth import View, Warp, by_frame, inside, misfits, sample
 from dreamdrive.geometry.moving.outline import TALLEST_M
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
@@ -131,13 +131,13 @@ def _misfits(view: View, frame: int) -> _Misfits:
     sources = [(warp, view.grey[o], view.usable[o]) for warp, o in zip(warps, near, strict=True)]
     inverse = np.array([*_BACKGROUND, *_INVERSE])
     grey = view.grey[frame]
-    upright = [_misfit(grey, [on_plane(source, one) for source in sources]) for one in inverse.tolist()]
+    upright = misfits(grey, sources, inverse, _MOST_LEVELS)
     places = [warp(view.plane_inverse[frame]) for warp in warps]
     road = [
         (sample(picture, *place), inside(*place, usable))
         for (_, picture, usable), place in zip(sources, places, strict=True)
     ]
-    return _Misfits(inverse, np.stack(upright), _misfit(grey, road))
+    return _Misfits(inverse, upright, _misfit(grey, road))
 
 
 def _misfit(
@@ -156,30 +156,40 @@ def _misfit(
 def _columns(misfits: _Misfits, plane: Float[np.ndarray, "h w"], fy_px: float) -> _Columns:
     """For each column the distance and the row with which thing above and road below gain most."""
     height, width = plane.shape
-    rows, columns = np.mgrid[:height, :width]
+    rows = np.arange(height)[:, None]
     above_px = np.clip((_ABOVE_M * fy_px * plane).astype(int), 3, height)
     top = np.maximum(rows - above_px, 0)
     possible = (rows > above_px) & (plane > 0) & (rows < height - 3)
+    nearest, farthest = plane.max(axis=1), plane.min(axis=1)
     best, label, row = np.zeros(width), np.zeros(width, np.intp), np.zeros(width, np.intp)
     for number in range(len(_BACKGROUND), len(misfits.inverse)):
-        inverse = float(misfits.inverse[number])
-        window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
-        thing, road = cv2.blur(misfits.upright[number], window), cv2.blur(misfits.road, window)
-        gain = np.cumsum(np.where(plane > 0, road - thing, 0), axis=0)
-        cost = np.cumsum(thing, axis=0)
+        inverse, most = float(misfits.inverse[number]), _RATIO[1] * 1.1
+        # A thing that seems to be at this distance meets the road in few of the rows.
+        band = np.flatnonzero((inverse >= farthest) & (inverse <= most * nearest))
+        if not len(band):
+            continue
+        at = slice(band[0], band[-1] + 1)
         # A standing thing would hide the road down to here.
         stands = (plane < inverse).sum(axis=0)
-        bottom = np.minimum(np.maximum(rows + 2, stands), height - 1)
-        above = (gain - gain[top, columns]) / above_px
-        below = (gain - gain[bottom, columns]) / np.maximum(bottom - rows, 1)
-        fit = (cost - cost[top, columns]) / above_px
-        meets = (inverse >= plane) & (inverse <= _RATIO[1] * 1.1 * plane)
+        bottom = np.minimum(np.maximum(rows[at] + 2, stands), height - 1)
+        part = slice(int(top[at].min()), int(bottom.max()) + 1)
+        window = (max(3, int(_WIDTH_M * fy_px * inverse / 2)) | 1, 1)
+        thing, road = (cv2.blur(each[part], window) for each in (misfits.upright[number], misfits.road))
+        gain = np.cumsum(np.where(plane[part] > 0, road - thing, 0), axis=0)
+        cost = np.cumsum(thing, axis=0)
+        here, from_top = np.s_[at.start - part.start : at.stop - part.start], top[at] - part.start
+        above = (gain[here] - np.take_along_axis(gain, from_top, axis=0)) / above_px[at]
+        below = gain[here] - np.take_along_axis(gain, bottom - part.start, axis=0)
+        below /= np.maximum(bottom - rows[at], 1)
+        fit = (cost[here] - np.take_along_axis(cost, from_top, axis=0)) / above_px[at]
+        meets = (inverse >= plane[at]) & (inverse <= most * plane[at])
         good = (above > _GAIN_LEVELS) & (below > _ROAD_GAIN_LEVELS) & (fit < _FIT_LEVELS)
-        score = np.where(possible & meets & good, above + below - fit / 2, 0)
-        at = score.argmax(axis=0)
-        here = score[at, columns[0]]
-        label, row = np.where(here > best, number, label), np.where(here > best, at, row)
-        best = np.maximum(best, here)
+        score = np.where(possible[at] & meets & good, above + below - fit / 2, 0)
+        found = score.argmax(axis=0)
+        most_here = score.max(axis=0)
+        better = most_here > best
+        label, row = np.where(better, number, label), np.where(better, band[0] + found, row)
+        best = np.maximum(best, most_here)
     return _Columns(best, label, row)
 
 

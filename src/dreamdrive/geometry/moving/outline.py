@@ -7,14 +7,12 @@ Where both do, its edges in the picture decide.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
+from dreamdrive import _native
 from dreamdrive.geometry.depth import View, Warp, inside, sample
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
 from dreamdrive.scene.windows import window_px
@@ -39,16 +37,12 @@ _NEVER = 100.0
 _EDGE = 6.0  # weight of two equal neighbours
 _EDGE_FLOOR = 0.3
 _CAP_LEVELS, _WINDOW_PX = 25.0, 3  # of a misfit
-_UNIT = 100  # the flow of a cut is found in whole numbers
+_UNIT = 100  # cuts are found in whole numbers
 _EDGE_LEVELS = 15.0  # difference in colour at which the weight is 0.6 of that
 
 
-@dataclass(frozen=True)
-class _Neighbour:
-    """What another frame says of the static street: where a point would land, and how badly that fits."""
-
-    flow: PairFlow
-    explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+Window = tuple[slice, slice]
+"""Rows and columns of a picture, which may reach beyond its lower and right edges."""
 
 
 def outline(
@@ -65,35 +59,27 @@ def outline(
     """
     if not flagged.any():
         return flagged.copy()
-    near = [_neighbour(view, frame, flow, inverse_depth) for flow in flows if abs(flow.offset) <= _REACH]
+    near = [flow for flow in flows if abs(flow.offset) <= _REACH]
     count, found, stats, _ = cv2.connectedComponentsWithStats(flagged.astype(np.uint8))
     labels = np.asarray(found, np.intp)
     whole = np.zeros_like(flagged)
     for label in range(1, count):
         region = labels == label
         window = _window(view, frame, stats[label])
-        gain = _gain(view, frame, near, region, window)
+        around, inner = _with_rim(window, window_px(_WINDOW_PX, region.shape[1]) // 2)
+        gain = _gain(view, frame, near, inverse_depth, region, around)
         if gain is None:
             whole |= region
             continue
         part = region[window]
-        worth = gain + _prior(part, window, stats[label])
+        worth = gain[inner] + _prior(part, window, stats[label])
         worth[sky[window] | ~view.usable[frame][window]] = -_NEVER
         cut = minimum_cut(worth, *_edges(view.rgb[frame][window]))
         whole[window] |= _hanging_together(cut, part)
     return whole
 
 
-def _neighbour(view: View, frame: int, flow: PairFlow, inverse_depth: Float[np.ndarray, "h w"]) -> _Neighbour:
-    warp, plane = Warp(view.cameras[frame], view.cameras[flow.source]), view.plane_inverse[frame]
-    explanations: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    for inverse in (inverse_depth, np.maximum(inverse_depth, np.float32(_PLANE_SHARE) * plane), plane):
-        x, y = warp(inverse)
-        explanations.append((x, y, _misfit(view, frame, flow.source, x, y)))
-    return _Neighbour(flow, explanations)
-
-
-def _window(view: View, frame: int, box: np.ndarray) -> tuple[slice, slice]:
+def _window(view: View, frame: int, box: np.ndarray) -> Window:
     """Rows and columns that a thing may fill whose part has this bounding box (left, top, width, height)."""
     left, top, width, height = (int(value) for value in box[:4])
     bottom, middle = top + height - 1, left + width // 2
@@ -106,27 +92,40 @@ def _window(view: View, frame: int, box: np.ndarray) -> tuple[slice, slice]:
     return rows, slice(max(0, left - side), left + width + side)
 
 
+def _with_rim(window: Window, rim_px: int) -> tuple[Window, Window]:
+    """The window with a rim, as far as the picture has one, and where the window is in that."""
+    rows, columns = (slice(max(0, each.start - rim_px), each.stop + rim_px) for each in window)
+    inner = (slice(a.start - b.start, a.stop - b.start) for a, b in zip(window, (rows, columns), strict=True))
+    return (rows, columns), (next(inner), next(inner))
+
+
 def _gain(
     view: View,
     frame: int,
-    near: Sequence[_Neighbour],
+    near: Sequence[PairFlow],
+    inverse_depth: Float[np.ndarray, "h w"],
     region: Bool[np.ndarray, "h w"],
-    window: tuple[slice, slice],
+    window: Window,
 ) -> Float[np.ndarray, "u v"] | None:
     """What the region's own motion, if it has one, is worth in the window over that of the static street."""
+    camera = view.cameras[frame].cropped(*window)
+    inverse, plane = inverse_depth[window], view.plane_inverse[frame][window]
+    static = inverse, np.maximum(inverse, np.float32(_PLANE_SHARE) * plane), plane
     gains: list[np.ndarray] = []
-    for neighbour in near:
-        motion = _motion(neighbour.flow, region)
+    for flow in near:
+        motion = _motion(flow, region, window)
         if motion is None:
             continue
         x, y = motion
-        own = _misfit(view, frame, neighbour.flow.source, x, y)[window]
-        static = np.full(own.shape, np.float32(np.inf))
-        for at_x, at_y, error in neighbour.explanations:
-            apart = np.hypot(at_x[window] - x[window], at_y[window] - y[window]) >= _SAME_PX
-            static = np.where(apart, np.fmin(static, error[window]), static)
-        gain = np.clip(static - own, -_MAX_LEVELS, _MAX_LEVELS)
-        gains.append(np.where(np.isfinite(static), gain, np.float32(np.nan)))
+        own = _misfit(view, frame, flow.source, window, x, y)
+        warp, least = Warp(camera, view.cameras[flow.source]), np.full(own.shape, np.float32(np.inf))
+        for each in static:
+            at_x, at_y = warp(each)
+            apart = np.hypot(at_x - x, at_y - y) >= _SAME_PX
+            error = _misfit(view, frame, flow.source, window, at_x, at_y)
+            least = np.where(apart, np.fmin(least, error), least)
+        gain = np.clip(least - own, -_MAX_LEVELS, _MAX_LEVELS)
+        gains.append(np.where(np.isfinite(least), gain, np.float32(np.nan)))
     if not gains:
         return None
     known = np.isfinite(gains)
@@ -134,8 +133,10 @@ def _gain(
     return (_WORTH * mean).astype(np.float32)
 
 
-def _motion(flow: PairFlow, region: Bool[np.ndarray, "h w"]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Where all pixels would go with the affine motion that most of the region follows."""
+def _motion(
+    flow: PairFlow, region: Bool[np.ndarray, "h w"], window: Window
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where the window's pixels would go with the affine motion that most of the region follows."""
     rows, columns = np.nonzero(region & flow.trusted)
     if len(rows) < _MIN_FLOW_PX:
         return None
@@ -145,14 +146,12 @@ def _motion(flow: PairFlow, region: Bool[np.ndarray, "h w"]) -> tuple[np.ndarray
     affine, follows = cv2.estimateAffine2D(here, there, method=cv2.RANSAC, ransacReprojThreshold=_FOLLOWS_PX)
     if follows.mean() < _MIN_SHARE:  # also where none was found at all
         return None
-    x, y = pixel_grid(*region.shape)
+    x, y = (each[window] for each in pixel_grid(*region.shape))
     a = affine.astype(np.float32)
     return a[0, 0] * x + a[0, 1] * y + a[0, 2], a[1, 0] * x + a[1, 1] * y + a[1, 2]
 
 
-def _prior(
-    part: Bool[np.ndarray, "u v"], window: tuple[slice, slice], box: np.ndarray
-) -> Float[np.ndarray, "u v"]:
+def _prior(part: Bool[np.ndarray, "u v"], window: Window, box: np.ndarray) -> Float[np.ndarray, "u v"]:
     """What a pixel is worth by its place alone: nothing above the region, less beside and below it."""
     top, height = int(box[1]), int(box[3])
     rows = np.arange(window[0].start, window[0].start + len(part))[:, None]
@@ -180,17 +179,20 @@ def _hanging_together(cut: Bool[np.ndarray, "u v"], part: Bool[np.ndarray, "u v"
 
 
 def _misfit(
-    view: View, frame: int, other: int, x: Float[np.ndarray, "h w"], y: Float[np.ndarray, "h w"]
-) -> Float[np.ndarray, "h w"]:
-    """How badly a frame fits another one where its pixels are said to have gone, by column and row.
+    view: View,
+    frame: int,
+    other: int,
+    window: Window,
+    x: Float[np.ndarray, "u v"],
+    y: Float[np.ndarray, "u v"],
+) -> Float[np.ndarray, "u v"]:
+    """How badly a frame fits another one where its window's pixels are said to have gone, by column and row.
 
     Mean difference in grey levels over a small window, capped; NaN outside the other frame.
     """
-    difference = np.minimum(
-        np.abs(sample(view.grey[other], x, y) - view.grey[frame]), np.float32(_CAP_LEVELS)
-    )
-    side = window_px(_WINDOW_PX, x.shape[1])
-    mean = cv2.boxFilter(difference, cv2.CV_32F, (side, side))
+    difference = np.abs(sample(view.grey[other], x, y) - view.grey[frame][window])
+    side = window_px(_WINDOW_PX, view.grey.shape[2])
+    mean = cv2.boxFilter(np.minimum(difference, np.float32(_CAP_LEVELS)), cv2.CV_32F, (side, side))
     return np.where(inside(x, y, view.usable[other]), mean, np.float32(np.nan))
 
 
@@ -206,27 +208,9 @@ def minimum_cut(
     neighbour on the right or below. Gains and weights count in steps of 1/100. Of equally good labellings it
     is that of the fewest pixels.
     """
-    pixel = np.arange(gain.size).reshape(gain.shape)
-    source, sink = gain.size, gain.size + 1
-    worth, cost = _whole(np.maximum(gain, 0)).ravel(), _whole(np.maximum(-gain, 0)).ravel()
-    edges = [
-        (np.full(gain.size, source), pixel.ravel(), worth),
-        (pixel.ravel(), np.full(gain.size, sink), cost),
-    ]
-    for start, end, weight in (
-        (pixel[:, :-1], pixel[:, 1:], right),
-        (pixel[:-1], pixel[1:], below),
-    ):
-        both = _whole(weight).ravel()
-        edges += [(start.ravel(), end.ravel(), both), (end.ravel(), start.ravel(), both)]
-    rows, columns, values = (np.concatenate(part) for part in zip(*edges, strict=True))
-    network = csr_array((values, (rows, columns)), shape=(gain.size + 2, gain.size + 2))
-    left = network - maximum_flow(network, source, sink).flow
-    left.data[left.data < 0] = 0
-    left.eliminate_zeros()
-    labelled = np.zeros(gain.size + 2, bool)
-    labelled[breadth_first_order(left, source, return_predecessors=False)] = True
-    return labelled[: gain.size].reshape(gain.shape)
+    labelled = np.empty(gain.shape, bool)
+    _native.minimum_cut(_whole(gain), _whole(right), _whole(below), labelled)
+    return labelled
 
 
 def _whole(values: np.ndarray) -> np.ndarray:

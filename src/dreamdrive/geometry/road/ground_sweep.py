@@ -101,12 +101,15 @@ class Road:
         relative = second[:3, :3].T @ first[:3, :3]
         shift = second[:3, :3].T @ (first[:3, 3] - second[:3, 3])
         plane = relative - np.outer(shift, first[:3, :3].T @ normal) * inverse_height
-        mapped = (self.pixels @ (self.intrinsics @ plane @ self.inverse).T).astype(np.float32)
-        depth = np.maximum(mapped[..., 2], 1e-6)
-        x, y = mapped[..., 0] / depth - 0.5, mapped[..., 1] / depth - 0.5
+        mapping = self.intrinsics @ plane @ self.inverse
+        by_column = mapping[:, :1] * self.pixels[0, :, 0] + mapping[:, 2:]
+        by_row = mapping[:, 1:2] * self.pixels[:, 0, 1]
+        mapped = np.empty((3, *self.pixels.shape[:2]), np.float32)
+        np.add(by_column[:, None], by_row[..., None], out=mapped, casting="same_kind")
+        x, y = mapped[:2] / np.maximum(mapped[2], 1e-6) - 0.5
         warped = cv2.remap(self.grey[pair.source], x, y, cv2.INTER_LINEAR, borderValue=0).astype(np.float32)
         rows, columns = self.grey.shape[1:]
-        inside = (mapped[..., 2] > 0) & (x > 2) & (y > 2) & (x < columns - 3) & (y < rows - 3)
+        inside = (mapped[2] > 0) & (x > 2) & (y > 2) & (x < columns - 3) & (y < rows - 3)
         mean = _box(warped)
         covariance = _box(self.patches[pair.reference] * warped) - self.mean[pair.reference] * mean
         variance = np.maximum(_box(warped**2) - mean**2, 0) + NOISE
