@@ -127,7 +127,7 @@ def split_ms(rounds: list[dict[tuple[str, str], float]], whole_ms: float) -> lis
 def steps_of(scene: FitScene, trainer: Trainer | PlainTrainer) -> Callable[[int], None]:
     """Takes the step of a round."""
     sky = scene.sky.colour(scene.views[0].camera).contiguous()
-    return lambda index: trainer.step(FIRST_STEP + index, scene.views[index], sky, 1)
+    return lambda index: trainer.step(FIRST_STEP + index, scene.views[index], sky)
 
 
 def print_table(report: dict[str, object]) -> None:

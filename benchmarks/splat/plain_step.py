@@ -123,7 +123,7 @@ class PlainTrainer:
         self.pull = torch.zeros(len(self.static.anchors) + len(self.dynamic.anchors))
         self.seen = torch.zeros_like(self.pull)
 
-    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> None:
+    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"]) -> None:
         """Render a frame, compare, learn."""
         options = self.options
         done = step / options.steps
@@ -154,5 +154,5 @@ class PlainTrainer:
         static = len(self.static.anchors)
         half_size = torch.tensor([view.camera.width_px / 2, view.camera.height_px / 2])
         index = torch.cat([torch.arange(static), static + rows])
-        self.pull[index] += torch.linalg.vector_norm(offsets_px.grad / shrink * half_size, dim=1)
+        self.pull[index] += torch.linalg.vector_norm(offsets_px.grad * half_size, dim=1)
         self.seen[index] += rendered.visible

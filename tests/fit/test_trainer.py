@@ -33,7 +33,7 @@ def parts():
     life = torch.stack([torch.linspace(0, float(clip.times_s[-1]), count), torch.full((count,), 0.3)], 1)
     actor = torch.where(torch.arange(count) % 3 == 0, torch.arange(count) % 2, -1)
     seeds = replace(seeds, sh=colour, lifespan=life, actor=actor)
-    return training_views(clip, geometry)[1], seeds, estimate_sky(clip, geometry)
+    return training_views(clip, geometry), seeds, estimate_sky(clip, geometry)
 
 
 def model_of(parts) -> Model:
@@ -63,7 +63,7 @@ def trainer_of(parts) -> Trainer:
 def take_steps(trainer: Trainer | PlainTrainer, views: list[View], sky, count: int) -> None:
     with one_torch_thread():
         for step in range(count):
-            trainer.step(step, views[step], sky.colour(views[step].camera), 1)
+            trainer.step(step, views[step], sky.colour(views[step].camera))
 
 
 def state(model: Model) -> dict[str, torch.Tensor]:
@@ -131,10 +131,9 @@ class Greedy(Densifier):
 
 
 def test_what_is_drawn_for_splits_leaves_the_order_of_the_frames(parts) -> None:
-    views = {1: parts[0], 2: parts[0]}
     ends = []
     for draws in (0, 3):
         model = model_of(parts)
-        optimise(model, views, [Greedy(draws), Greedy(draws)], OPTIONS, 0, lambda done, total: None)
+        optimise(model, parts[0], [Greedy(draws), Greedy(draws)], OPTIONS, 0, lambda done, total: None)
         ends.append(state(model))
     assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])

@@ -48,8 +48,8 @@ class ScoreOptions:
     target: TargetName = "error_and_evidence"
     error_scale: float = 0.2
     error_sigma_px: float = 2.0
-    steps: int = 150
-    rate: float = 5e-3
+    steps: int = 75
+    rate: float = 1e-2
     width: int = 64
     position_frequencies: int = 4
     shrink: int = 2

@@ -1,6 +1,6 @@
 """G_init: pixel-aligned points become Gaussians that carry features and their source frame (eq. 4)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -26,7 +26,8 @@ class SeedOptions:
     """How pixels become Gaussians.
 
     Attributes:
-        stride_px: Distance between static seeds of one frame.
+        stride_px: Distance between static seeds of one frame. Where the camera stays at one place, every
+            pixel is a seed: no later frame comes nearer. On a standing clip two pixels lose 0.7 dB.
         moving_stride_px: Distance between seeds on pixels with moving evidence, added by every frame.
         reach: Seeds on one moving thing have a neighbour within this many of those distances: the diagonal of
             their lattice is 1.41 of them.
@@ -74,6 +75,8 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         InputError: No pixel of any frame has depth.
     """
     options = options or SeedOptions()
+    if _at_one_place(geometry):
+        options = replace(options, stride_px=1)
     kept: list[_Seeds] = []
     for frame in np.flatnonzero(~clip.held_out)[::-1].tolist():
         usable = _usable(clip, geometry, frame, options)
@@ -91,6 +94,12 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
             "choose other --frames"
         )
     return _gaussians(kept, options)
+
+
+def _at_one_place(geometry: Geometry) -> bool:
+    """Whether cameras that look different ways, if at all, are all where the first is."""
+    places = np.stack([camera.world_from_camera[:3, 3] for camera in geometry.cameras])
+    return len(places) > 1 and not np.ptp(places, axis=0).any()
 
 
 @dataclass(frozen=True)

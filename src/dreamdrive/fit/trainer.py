@@ -34,7 +34,6 @@ class FitOptions:
         steps: Optimisation steps, one frame each.
         loss: Weights of L1 and SSIM, see ``losses.WEIGHTS``. On four drawn streets with corrupted references
             (``benchmarks/ablation.py``) the paper's lose 0.08 dB in held-out frames, 0.07 dB in novel views.
-        half_size_share: Share of the steps, from the first, that look at half-size frames.
         sh_after: Share of the steps after which view-dependent colour is learned.
         depth_weight: Weight of the inverse-depth term (1/m). Without it the median error of rendered depth
             grows by a quarter. On drawn streets 0, 3, 4 and 6 half of it, decayed to a tenth over the fit,
@@ -45,14 +44,14 @@ class FitOptions:
         plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times the
             network's, as in 4D-GS and S3Gaussian. On held-out frames of the built-in street 5e-2 lost 1 dB in
             1,000 steps and won 3 dB in 300, where this left cars standing.
-        track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth. Tracks come nearly
-            right: on drawn streets 5e-3 loses 0.4 dB of what moves in held-out frames, 1.5e-2 another 2 dB.
+        track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth. Tracks are nearly
+            right before: on drawn streets 5e-3 loses 0.4 dB of what moves in held-out frames, 1.5e-2 another
+            2 dB.
         exposure_rate: Adam's step for the exposure network.
     """
 
     steps: int
     loss: LossName = "field"
-    half_size_share: float = 0.3
     sh_after: float = 0.4
     depth_weight: float = 1.0
     sky_weight: float = 0.05
@@ -141,11 +140,10 @@ class Trainer:
         self.generator = generator
         self._optimiser = _shared_optimiser(model, options)
 
-    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"], shrink: int) -> Float[Tensor, ""]:
+    def step(self, step: int, view: View, sky: Float[Tensor, "h w 3"]) -> Float[Tensor, ""]:
         """Render a frame, compare, learn and densify; the loss before that, on the device.
 
-        ``step`` counts from 0, ``sky`` is what the view's camera sees of the sky alone, ``shrink`` how much
-        the frame is shrunk.
+        ``step`` counts from 0, ``sky`` is what the view's camera sees of the sky alone.
         """
         model, options = self.model, self.options
         done = step / options.steps
@@ -159,18 +157,14 @@ class Trainer:
         loss.backward()
         _decay(model, self._optimiser, options, done)
         _step(model, self._optimiser)
-        self._observe(None if moved is None else moved.rows, offsets_px, rendered, shrink)
+        self._observe(None if moved is None else moved.rows, offsets_px, rendered)
         for part, densifier in zip(model.parts(), self.densifiers, strict=True):
             densifier.update(part, step, options.steps, self.generator)
         return loss.detach()
 
-    def _observe(
-        self, rows: Int[Tensor, " m"] | None, offsets_px: Tensor, rendered: Render, shrink: int
-    ) -> None:
+    def _observe(self, rows: Int[Tensor, " m"] | None, offsets_px: Tensor, rendered: Render) -> None:
         """Hand each part its share of the screen gradients."""
         gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
-        if shrink != 1:
-            gradient = gradient / shrink  # a pixel of a half-size frame is two pixels wide
         static = 0 if self.model.static is None else len(self.model.static)
         densifiers = iter(self.densifiers)
         if static:
@@ -184,13 +178,13 @@ class Trainer:
 @one_torch_thread()
 def optimise(
     model: Model,
-    views: dict[int, list[View]],
+    views: Sequence[View],
     densifiers: Sequence[Densifier],
     options: FitOptions,
     seed: int,
     progress: Progress,
 ) -> None:
-    """Fit ``model`` in place to training frames, by how much they are shrunk: 1 and 2.
+    """Fit ``model`` in place to training frames.
 
     There is a densifier for each of ``model.parts()``; the seed decides the order of the frames and where
     split Gaussians come to lie.
@@ -200,17 +194,13 @@ def optimise(
     # both, a change of one thing in the input changed everything else in the scene.
     frame_order = torch.Generator("cpu").manual_seed(seed)
     trainer = Trainer(model, densifiers, options, torch.Generator("cpu").manual_seed(seed))
-    skies = {
-        shrink: [model.sky.colour(v.camera).contiguous().to(model.device) for v in shrunk]
-        for shrink, shrunk in views.items()
-    }
+    skies = [model.sky.colour(view.camera).contiguous().to(model.device) for view in views]
     order: list[int] = []
     for step in range(options.steps):
         if not order:
-            order = torch.randperm(len(views[1]), generator=frame_order, device="cpu").tolist()
-        shrink = 2 if step / options.steps < options.half_size_share else 1
+            order = torch.randperm(len(views), generator=frame_order, device="cpu").tolist()
         which = order.pop()
-        trainer.step(step, views[shrink][which], skies[shrink][which], shrink)
+        trainer.step(step, views[which], skies[which])
         progress(step + 1, options.steps)
 
 

@@ -1,8 +1,7 @@
-"""The frames a fit may see, as tensors, at full and at half size."""
+"""The frames a fit may see, as tensors."""
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
@@ -44,32 +43,21 @@ class View:
         return replace(self, **{name: getattr(self, name).to(device) for name in names})
 
 
-def training_views(clip: Clip, geometry: Geometry, device: torch.device = CPU) -> dict[int, list[View]]:
-    """All frames that are not held out, on a device, by how much they are shrunk: 1 and 2."""
-    seen = np.flatnonzero(~clip.held_out).tolist()
-    return {shrink: [_view(clip, geometry, i, shrink).to(device) for i in seen] for shrink in (1, 2)}
+def training_views(clip: Clip, geometry: Geometry, device: torch.device = CPU) -> list[View]:
+    """All frames that are not held out, on a device."""
+    return [_view(clip, geometry, i).to(device) for i in np.flatnonzero(~clip.held_out).tolist()]
 
 
-def _view(clip: Clip, geometry: Geometry, index: int, shrink: int) -> View:
-    width, height = clip.size[0] // shrink, clip.size[1] // shrink
-
-    def area(values: np.ndarray) -> np.ndarray:
-        values = np.ascontiguousarray(values, dtype=np.float32)
-        return values if shrink == 1 else cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)
-
-    def nearest(values: np.ndarray) -> np.ndarray:
-        values = np.ascontiguousarray(values, dtype=np.float32)
-        return values if shrink == 1 else cv2.resize(values, (width, height), interpolation=cv2.INTER_NEAREST)
-
+def _view(clip: Clip, geometry: Geometry, index: int) -> View:
     street = geometry.fixed_regions[clip.camera[index]] == 0
     trust = geometry.confidence[index] * (geometry.moving[index] < 0.5) * (geometry.depth_m[index] > 0)
     return View(
         index=index,
         time_s=float(clip.times_s[index]),
-        camera=geometry.cameras[index].resized(width, height),
-        image=torch.from_numpy(area(clip.frames[index] / np.float32(255))),
-        mask=torch.from_numpy(area(clip.valid[index] & street) > 0.99),
-        sky=torch.from_numpy(area(geometry.sky[index]) > 0.99),
-        depth_m=torch.from_numpy(nearest(geometry.depth_m[index])),
-        depth_weight=torch.from_numpy(nearest(trust)),
+        camera=geometry.cameras[index],
+        image=torch.from_numpy(clip.frames[index] / np.float32(255)),
+        mask=torch.from_numpy(clip.valid[index] & street),
+        sky=torch.from_numpy(geometry.sky[index].copy()),
+        depth_m=torch.from_numpy(geometry.depth_m[index].astype(np.float32)),
+        depth_weight=torch.from_numpy(trust.astype(np.float32)),
     )

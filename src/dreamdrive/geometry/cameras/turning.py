@@ -53,5 +53,6 @@ def _rotation(
 
 
 def _rays(camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    rays = np.column_stack([(pixels - [camera.cx_px, camera.cy_px]) / [camera.fx_px, camera.fy_px], np.ones(len(pixels))])
+    across = (pixels - [camera.cx_px, camera.cy_px]) / [camera.fx_px, camera.fy_px]
+    rays = np.column_stack([across, np.ones(len(pixels))])
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
