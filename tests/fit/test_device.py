@@ -82,7 +82,7 @@ def test_every_representation_has_the_same_losses_off_the_cpu(street, losses, na
         there = fitted(street, name, device)
     found = losses[2:]
     assert len(found) == len(expected) == STEPS
-    assert found[:FIRST_SPLIT] == pytest.approx(expected[:FIRST_SPLIT], rel=BEFORE.get(name, 1e-4))
+    assert found[:FIRST_SPLIT] == pytest.approx(expected[:FIRST_SPLIT], rel=BEFORE.get(name, 3e-4))
     assert found == pytest.approx(expected, rel=AFTER)
     for one, other in ((here.static, there.static), (here.dynamic, there.dynamic)):
         assert abs(len(one) - len(other)) <= 0.02 * len(one)

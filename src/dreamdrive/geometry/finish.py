@@ -63,7 +63,7 @@ def finish(
 
     The metre comes from the unit where that is one, else from known depth in metres, else from the height of
     the camera above the road, by default 1.5 m. Of a clip that stands still the measured path is noise: all
-    frames get one pose, or the known ones where these are in metres.
+    frames get one place, or the known ones where these are in metres.
     """
     still = stands(clip, evidence)
     factor = 1.0 if measured.unit is not None else _rough_factor(measured)

@@ -62,7 +62,7 @@ def pose_clip(
 ) -> Posed:
     """Pose every frame of a clip of one camera.
 
-    Known poses are used as they are. A clip that stands still gets one pose; it never reaches structure from
+    Known poses are used as they are. A clip that stands still gets one place; it never reaches structure from
     motion, which would register it on whatever drives through the picture. Else structure from motion is
     tried and judged, and frame-to-frame odometry takes over when it is refused. Without a camera height 1.5 m
     is assumed. ``tell`` is called for the first look, and for the steps of ``reconstruct.STEPS``.
