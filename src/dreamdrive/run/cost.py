@@ -19,26 +19,27 @@ from dreamdrive.scene.control import Control
 
 
 class _Measured:
-    """Seconds of one core and bytes, of 17 runs on two cores of an AMD EPYC (AVX2), 2026-11-23.
+    """Seconds of one core and bytes, of six runs on one core of an Intel Xeon (AVX-512), 2026-11-25.
 
-    Runs of PandaSet 002 and of a motorway of Udacity with 12 to 160 frames of 160x90, 320x180 and 480x270, as
-    draft and standard. These figures meet the seconds of one core within 30 % and the memory within 15 %.
-    Gaussians, and with them the time of a step, grow more slowly than the frames, which see the same street.
+    Runs of PandaSet 002 with 12 to 60 frames of 320x180 and 480x270, as draft and standard. These figures
+    meet the seconds within 20 % and the memory within 15 %. What they say of longer clips is their growth
+    alone. Gaussians, and with them the time of a step, grow more slowly than the frames, which see the same
+    street.
     """
 
-    start: float = 3.0
-    frame: float = 0.3
-    frame_megapixel: float = 6.2
-    frame_growth: float = 0.2
-    step: float = 0.003
-    step_megapixel: float = 0.44
-    step_growth: float = 0.6
-    score_megapixel: float = 0.6
-    video: float = 0.03
-    video_megapixel: float = 3.3
+    start: float = 1.0
+    frame: float = 0.37
+    frame_megapixel: float = 4.5
+    frame_growth: float = 0.15
+    step: float = 0.005
+    step_megapixel: float = 0.58
+    step_growth: float = 0.5
+    score_megapixel: float = 0.7
+    video: float = 0.04
+    video_megapixel: float = 4.9
     usual_frames: float = 24.0
     serial: float = 1 / 3
-    base_bytes: float = 580e6
+    base_bytes: float = 640e6
     pixel_bytes: float = 200.0
 
 
