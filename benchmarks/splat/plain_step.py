@@ -99,9 +99,12 @@ class PlainLeaves:
         return Gaussians(**fields)
 
     def set_progress(self, done: float) -> None:
-        """Decay the step of the positions."""
+        """Decay the steps."""
         rates = LearningRates()
-        self.optimiser.param_groups[0]["lr"] = rates.offsets * (rates.offsets_end / rates.offsets) ** done
+        of_positions, of_others = rates.shares(done)
+        for group in self.optimiser.param_groups:
+            share = of_positions if group["name"] == "offsets" else of_others
+            group["lr"] = getattr(rates, group["name"]) * share
 
 
 class PlainTrainer:

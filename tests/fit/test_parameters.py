@@ -193,3 +193,19 @@ def test_nothing_grows_below_the_threshold():
 
 def test_transparent_ones_are_pruned():
     assert len(densified(gradient=0.0, log_scale=-3.0, prune_opacity=0.6)) == 0
+
+
+def test_steps_settle_late_and_those_of_positions_all_along() -> None:
+    rates = LearningRates()
+    assert rates.shares(0.0) == (1.0, 1.0)
+    assert rates.shares(rates.settle_after)[1] == 1.0
+    assert rates.shares(1.0) == pytest.approx((rates.offsets_end / rates.offsets, rates.settled))
+
+    def moved(done: float) -> torch.Tensor:
+        p = parameters()
+        before = p.log_scales.detach().clone()
+        p.set_progress(done)
+        one_step(p)
+        return (p.log_scales.detach() - before).abs().mean()
+
+    assert moved(1.0).item() == pytest.approx(rates.settled * moved(0.0).item(), rel=1e-3)

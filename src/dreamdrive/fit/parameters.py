@@ -58,6 +58,11 @@ class LearningRates:
     log_span: float = 0.01
     interval_s: float = 0.1
 
+    def shares(self, done: float) -> tuple[float, float]:
+        """What is left of the steps of positions, and of the others that settle; ``done`` in [0, 1]."""
+        late = max(0.0, done - self.settle_after) / (1 - self.settle_after)
+        return (self.offsets_end / self.offsets) ** done, self.settled**late
+
 
 class Parameters:
     """N Gaussians as leaf tensors with Adam's moments; a fit works on this and returns frozen ``Gaussians``.
@@ -140,10 +145,7 @@ class Parameters:
 
     def set_progress(self, done: float) -> None:
         """Decay the steps; ``done`` runs from 0 to 1."""
-        rates = self.rates
-        self._decay = (rates.offsets_end / rates.offsets) ** done
-        late = max(0.0, done - rates.settle_after) / (1 - rates.settle_after)
-        self._settling = rates.settled**late
+        self._decay, self._settling = self.rates.shares(done)
 
     def step(self) -> None:
         """One Adam step, then forget the gradients."""
