@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.scene import Scene
@@ -113,15 +112,11 @@ def forward_m_s(scene: Scene, actor: Actor, views: Sequence[int]) -> float:
 
 def _overlap(scene: Scene, actor: Actor, view: int, box: np.ndarray) -> float:
     """Intersection over union of a box and the one around an actor's living Gaussians in a view."""
-    t_s, dynamic = float(scene.times_s[view]), scene.dynamic.without_features()
-    living = dynamic.select(dynamic.alive_at(t_s))
-    if living.actor is None or scene.deformation is None:
+    living = scene.dynamic_at(float(scene.times_s[view]))
+    if living.actor is None:
         return 0.0
-    own = living.select(torch.nonzero(living.actor == actor.id).squeeze(1))
-    if not len(own):
-        return 0.0
-    means = scene.deformation.apply_at(own, t_s).means.numpy().astype(np.float64)
-    shown = scene.cameras[view].project(means)
+    own = living.means[living.actor == actor.id].numpy().astype(np.float64)
+    shown = scene.cameras[view].project(own)
     shown = shown[scene.cameras[view].shows(shown), :2]
     if not len(shown):
         return 0.0
