@@ -115,13 +115,13 @@ def test_options_that_cannot_be(run: Run, clip: Path, tmp_path: Path) -> None:
 def test_a_clip_that_memory_cannot_hold_is_refused_before_it_is_read(
     run: Run, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(production, "free_bytes", lambda: 600_000_000)
+    monkeypatch.setattr(production, "free_bytes", lambda: 700_000_000)
     expect(
         run,
         tmp_path / "out",
         *(clip, "--size", "3200x2000"),
-        message="error: 4 frames at 3200x2000 need about 5.7 GB of memory, and 0.6 GB are free; give "
-        "--size 200x124",
+        message="error: 4 frames at 3200x2000 need about 5.8 GB of memory, and 0.7 GB are free; give "
+        "--size 346x216",
     )
 
 
