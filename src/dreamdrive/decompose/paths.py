@@ -75,7 +75,9 @@ def find_path(
         among = [pair for pair in pairs if 0 <= pair[1] < len(frames)]
         found = [_carried(*pair, pictures, geometry, path, shown, options, reach_px) for pair in among]
         carried = [each for each in found if each is not None]
-        path = _path(frames, placed(glances, carried, up, options), up, shown)
+        better = _path(frames, placed(glances, carried, up, options), up, shown)
+        # Of a few wrong points motion may run away; then the path stays that from which they were looked for.
+        path = better if _likely(better.placement, clip.times_s[frames], options) else path
     return path if _likely(path.placement, clip.times_s[frames], options) else None
 
 

@@ -142,6 +142,8 @@ class UserOptions:
         rim: Regions beside road users that are flagged, and nowhere wider than twice this share of the width,
             do not move: four fifths of their pixels are street that a user has just left. With 0 standing
             things of drawn streets 0-7 seem to move 15 mm in place of 13, and KITTI 04 loses 0.4 dB.
+        alike: A road user does not go on as one that has less of its colours than this share, see
+            ``following``.
     """
 
     sure: float = 0.8
@@ -151,6 +153,7 @@ class UserOptions:
     doubtful_share: float = 0.2
     off_place: float = 0.25
     rim: float = 0.02
+    alike: float = 0.45
 
 
 @dataclass(frozen=True)

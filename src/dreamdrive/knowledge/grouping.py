@@ -51,7 +51,7 @@ def group(
     """
     height, width = classes.shape
     numbers = np.zeros((height, width), np.uint16)
-    free = ~np.isin(classes.numpy(), (*ROAD_USERS, StreetClass.OWN_CAR))
+    may_be = free(classes.numpy())
     found: list[tuple[RoadUser, Int[np.ndarray, " n"]]] = []
     for heat, kind in zip(peaks, ROAD_USERS, strict=True):
         window = options.vehicle_window if kind == StreetClass.VEHICLE else options.window
@@ -72,7 +72,7 @@ def group(
             mask = np.zeros((height, width), bool)
             mask[at.numpy(), across.numpy()] = True
             if kind == StreetClass.VEHICLE:
-                mask |= outlined(mask, options.closing) & free
+                mask |= outlined(mask, options.closing) & may_be
             at, across = np.nonzero(mask)
             box = int(across.min()), int(at.min()), int(across.max()) + 1, int(at.max()) + 1
             found.append((RoadUser(kind, score, box, len(at)), at * width + across))
@@ -80,6 +80,11 @@ def group(
     for number, (_, pixels) in enumerate(found, start=1):
         numbers.ravel()[pixels] = number
     return numbers, tuple(user for user, _ in found)
+
+
+def free(classes: Int[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    """Pixels that a vehicle's outline may take in: its panes and letters are taken for something else."""
+    return ~np.isin(classes, (*ROAD_USERS, StreetClass.OWN_CAR))
 
 
 def outlined(mask: Bool[np.ndarray, "h w"], closing: float) -> Bool[np.ndarray, "h w"]:

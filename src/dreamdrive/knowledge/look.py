@@ -17,6 +17,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.knowledge.cameras import camera_of, common_camera
 from dreamdrive.knowledge.fitting import Fitting, within_regions
 from dreamdrive.knowledge.grouping import GroupingOptions, group
+from dreamdrive.knowledge.joining import JoiningOptions, joined
 from dreamdrive.knowledge.prediction import Prediction
 from dreamdrive.knowledge.shipped import SHIPPED, load_knowledge
 from dreamdrive.machine import available_cores
@@ -40,6 +41,7 @@ class LookOptions:
     width_px: int = 512
     """Width of the pictures that it takes, a multiple of 32: at 512 those of 16:9 are 288 high."""
     grouping: GroupingOptions = field(default_factory=GroupingOptions)
+    joining: JoiningOptions = field(default_factory=JoiningOptions)
     features: bool = False
     """Whether what the network computes its answers from is kept."""
 
@@ -140,10 +142,13 @@ def _see(
     peaks = torch.sigmoid(fitting.shown(said.centre[0]))
     # Between two road users a mean of their offsets would point to neither.
     offset_px = fitting.on_pixels(said.offset[0], "nearest-exact") / fitting.scale
-    instances, users = group(classes, chance, peaks, offset_px, options.grouping)
-    kinds = torch.tensor([0, *(user.kind for user in users)])[torch.from_numpy(instances.astype(np.int64))]
-    classes = torch.where(torch.from_numpy(instances > 0), kinds, classes)
-    depth, spread = _depth(said, fitting, _regions(classes, instances))
+    parts, users = group(classes, chance, peaks, offset_px, options.grouping)
+    classes = _with_users(classes, parts, users)
+    depth, spread = _depth(said, fitting, _regions(classes, parts))
+    instances, users = joined(
+        parts, users, depth.numpy(), classes.numpy(), options.joining, options.grouping.closing
+    )
+    classes = _with_users(classes, instances, users)
     sky = classes == StreetClass.SKY
     maps = {
         "depth": depth.masked_fill(sky, 0),
@@ -158,6 +163,14 @@ def _see(
         camera=said.camera[0].double().numpy(),
         features=kept,
     )
+
+
+def _with_users(
+    classes: Int[Tensor, "h w"], instances: UInt16[np.ndarray, "h w"], users: tuple[RoadUser, ...]
+) -> Int[Tensor, "h w"]:
+    """Classes of pixels, where road users are those of the users."""
+    kinds = torch.tensor([0, *(user.kind for user in users)])[torch.from_numpy(instances.astype(np.int64))]
+    return torch.where(torch.from_numpy(instances > 0), kinds, classes)
 
 
 def _classes(chances: Float[Tensor, "c h w"]) -> tuple[Float[Tensor, "h w"], Int[Tensor, "h w"]]:

@@ -9,7 +9,8 @@ from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.depth import make_view
 from dreamdrive.geometry.moving import FLAGGED, too_near, whole_users
-from dreamdrive.geometry.moving.users import Sighting, off_place
+from dreamdrive.geometry.moving.following import Sighting
+from dreamdrive.geometry.moving.users import off_place
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import StreetClass
@@ -146,3 +147,20 @@ def off_place_of(scene: Scene) -> float:
     pixels = int(scene.block[0].sum())
     track = [Sighting(frame, 1, pixels, 0) for frame in scene.view.frames]
     return off_place(scene.view, scene.look, 1 / scene.depth_m, track)
+
+
+@pytest.mark.parametrize("repainted", [False, True])
+def test_nothing_goes_on_in_other_colours(repainted: bool) -> None:
+    """Where a car has left the picture at its border, there comes the next."""
+    scene, half = Scene(), FRAMES // 2
+    rgb = scene.view.rgb.copy()
+    rgb[scene.block] = (180, 30, 30)
+    if repainted:
+        rgb[half:][scene.block[half:]] = (30, 60, 170)
+    scene.view = replace(scene.view, rgb=rgb)
+    evidence = np.zeros(scene.block.shape, np.float32)
+    evidence[:half][scene.block[:half]] = 0.8
+    flagged = scene.found(evidence)
+    used = np.array(scene.view.frames)
+    assert flagged[used[used < half]].any(axis=(1, 2)).all()
+    assert flagged[used[used >= half]].any(axis=(1, 2)).all() != repainted
