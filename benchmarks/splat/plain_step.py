@@ -136,13 +136,21 @@ class PlainTrainer:
         gaussians = Gaussians.concatenate(self.static.gaussians(), moved)
         offsets_px = torch.zeros(len(gaussians), 2, requires_grad=True)
         degree = gaussians.sh_degree if done >= options.sh_after else 0
-        rendered = render(gaussians, view.camera, screen_offsets_px=offsets_px, sh_degree=degree)
+        moves = (torch.arange(len(gaussians)) >= len(self.static.anchors)).float()
+        rendered = render(
+            gaussians,
+            view.camera,
+            channels=moves[:, None],
+            screen_offsets_px=offsets_px,
+            sh_degree=degree,
+        )
         image = over_sky(rendered.colour, rendered.alpha, sky, self.exposure(view.index))
         loss = render_loss(image, view.image, view.mask, options.loss)
         weights = options.depth_weight * 0.1**done, options.sky_weight
         loss = loss + geometry_loss(
             rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight, view.sky, *weights
         )
+        loss = loss + options.stray_weight * (rendered.channels[..., 0] * view.still).mean()
         loss.backward()
         moving = 0.1**done if done >= options.warm_up else 0.0
         self.shared.param_groups[0]["lr"] = options.exposure_rate * 0.1**done

@@ -87,7 +87,7 @@ def with_method(options: Options, method: MethodName) -> Options:
         group=replace(g, clusters="density", threshold=_PAPER_TAU, majority=0.5),
         cast=replace(options.cast, tracks=False),
         static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
-        fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0),
+        fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0, stray_weight=0.0),
         network=replace(options.network, depth=8, width=256),
     )
 

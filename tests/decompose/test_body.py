@@ -38,6 +38,15 @@ def test_a_rear_alone_becomes_a_usual_vehicle(size_m: tuple[float, float, float]
     np.testing.assert_allclose(body.foot_m, [0, 1.5, REAR_M + size_m[0] / 2], atol=0.1)
 
 
+@pytest.mark.parametrize(("under_m", "length_m"), [(0.9, 8.0), (2.0, 4.4)])
+def test_a_lorry_is_as_high_as_it_reaches_over_the_road(under_m: float, length_m: float) -> None:
+    """What is seen of it begins at the edge of its box; what hangs much higher is no lorry."""
+    rear = surface(TRUCK_M, "rear")
+    seen = rear[1.5 - rear[:, 1] > under_m]
+    body = body_of(seen, AHEAD, UP, [glimpse()], "vehicle", GROUND)
+    assert body.size_m[0] == pytest.approx(length_m, abs=0.1)
+
+
 def test_a_front_alone_reaches_away_from_the_eye() -> None:
     """It comes towards the camera: its front is the near end."""
     body = body_of(surface(CAR_M, "rear"), -AHEAD, UP, [glimpse()], "vehicle", GROUND)

@@ -137,3 +137,20 @@ def test_what_is_drawn_for_splits_leaves_the_order_of_the_frames(parts) -> None:
         optimise(model, parts[0], [Greedy(draws), Greedy(draws)], OPTIONS, 0, lambda done, total: None)
         ends.append(state(model))
     assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+def test_what_strays_over_what_stands_costs_and_fades(parts) -> None:
+    """Where nothing moves dynamic Gaussians lose opacity by it, and static ones before them win some."""
+    views, _, sky = parts
+    view = replace(views[0], still=torch.ones_like(views[0].mask))
+    pulls = []
+    for weight in (0.0, 10.0):
+        trainer = trainer_of(parts)
+        trainer.options = replace(OPTIONS, stray_weight=weight)
+        loss = trainer.step(0, view, sky.colour(view.camera))
+        model = trainer.model
+        pulls.append((loss, *(part.moments["logit_opacities"].mean for part in model.parts())))
+    (free, static, dynamic), (dear, static_then, dynamic_then) = pulls
+    assert dear > free
+    assert (dynamic_then - dynamic).mean() > 0
+    assert (static_then - static).mean() < 0

@@ -14,6 +14,7 @@ _VEHICLES_M = (1.9, 4.4, 1.85), (2.7, 5.3, 2.05), (np.inf, 8.0, 2.4)  # up to a 
 _SMALL_M = {"two-wheeler": (1.8, 0.6), "person": (0.6, 0.6)}
 _LEAST_M = 0.1  # of a side
 _OVER_ROAD_M = 0.5  # up to which a bottom stands on the road
+_CLEARANCE_M = 1.2  # up to which a vehicle's lowest part is over the road: the box of a lorry, without wheels
 _LIKE = 0.9, 1.15  # shares of a usual size between which a side counts as seen whole
 
 
@@ -60,7 +61,7 @@ def body_of(
     eyes = np.stack(
         [np.linalg.inv(g.world_from_canonical) @ g.camera.world_from_camera[:, 3] for g in glimpses]
     )
-    for axis, usual_m in enumerate(_usual(kind, seen)):
+    for axis, usual_m in enumerate(_usual(kind, _tall_m(axes, seen, ground))):
         least, most = np.array(_LIKE) * usual_m
         if kind in _SMALL_M:
             whole[axis] = seen[axis].mean() + np.array([-0.5, 0.5]) * usual_m
@@ -73,11 +74,21 @@ def body_of(
     return body
 
 
-def _usual(kind: str, seen_m: Float[np.ndarray, "3 2"]) -> Sequence[float]:
+def _tall_m(axes: Float[np.ndarray, "3 3"], seen_m: Float[np.ndarray, "3 2"], ground: Ground | None) -> float:
+    """How high a thing reaches over the road, of whose lowest part little may be seen."""
+    span_m = float(np.ptp(seen_m[2]))
+    if ground is None:
+        return span_m
+    along, across, height = seen_m
+    under_m = float(ground.height_m(np.array([[along.mean(), across.mean(), height[0]]]) @ axes)[0])
+    return span_m + (under_m if 0 < under_m < _CLEARANCE_M else 0)
+
+
+def _usual(kind: str, tall_m: float) -> Sequence[float]:
     """Length and width that a thing of this kind and height usually has; what is unknown may be a vehicle."""
     if kind in _SMALL_M:
         return _SMALL_M[kind]
-    return next(usual for height_m, *usual in _VEHICLES_M if np.ptp(seen_m[2]) < height_m)
+    return next(usual for height_m, *usual in _VEHICLES_M if tall_m < height_m)
 
 
 def _reaching(
