@@ -1,10 +1,14 @@
 """Which paths a thing can have."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.streets import bare_street, street_clip, true_geometry
 
-from dreamdrive.decompose.glances import PlacingOptions
+from dreamdrive.decompose import paths
+from dreamdrive.decompose.glances import Carried, Glances, Placement, PlacingOptions
 from dreamdrive.decompose.paths import Path, find_path
 
 COUNT = 20
@@ -38,3 +42,21 @@ def test_what_leaps_has_none() -> None:
 
 def test_what_is_nowhere_sure_has_none() -> None:
     assert path_of(1.2, PlacingOptions(most_spread_m=1e-3)) is None
+
+
+def test_a_path_that_points_carry_away_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is carried wrongly may send a thing anywhere; then the path is that by depth alone."""
+    by_depth = paths.placed
+
+    def placed(
+        seen: Glances, carried: Sequence[Carried], up: np.ndarray, options: PlacingOptions
+    ) -> Placement:
+        found = by_depth(seen, (), up, options)
+        return replace(found, spread_m=found.spread_m + 1e3) if carried else found
+
+    wanted = path_of(1.2, PlacingOptions(samples=1))  # too few points to carry any
+    monkeypatch.setattr(paths, "placed", placed)
+    found = path_of(1.2)
+    assert wanted is not None
+    assert found is not None
+    np.testing.assert_allclose(found.placement.place_m, wanted.placement.place_m)

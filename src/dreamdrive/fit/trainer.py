@@ -40,9 +40,9 @@ class FitOptions:
             loses 0.1 dB 2 m aside.
         sky_weight: Weight of coverage in sky pixels. Without it floaters cover 2.5 times as much of the sky.
         stray_weight: Weight of what dynamic Gaussians cover where nothing moves, if others are static.
-            Without it they take the road beside a vehicle, and its shadow, with them: standing things of drawn
-            streets 0-7 seem to move 13 mm in place of 7, of 8-15 37 mm in place of 15, and the IoU of what
-            moves is 0.834 in place of 0.847. It costs 0.1 dB in held-out frames: shadows that move are lost.
+            Without it they take the road beside a vehicle, and its shadow, with them: standing things of
+            drawn streets 0-7 seem to move 13 mm in place of 7, of 8-15 37 mm in place of 15, and the IoU of
+            what moves is 0.834 in place of 0.847. It costs 0.1 dB in held-out frames, for shadows.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
         plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times the
