@@ -51,10 +51,12 @@ class View:
 
 def training_views(clip: Clip, geometry: Geometry, device: torch.device = CPU) -> list[View]:
     """All frames that are not held out, on a device."""
-    return [_view(clip, geometry, i).to(device) for i in np.flatnonzero(~clip.held_out).tolist()]
+    seen_to_move = bool((geometry.moving >= 0.5).any())
+    used = np.flatnonzero(~clip.held_out).tolist()
+    return [_view(clip, geometry, index, seen_to_move).to(device) for index in used]
 
 
-def _view(clip: Clip, geometry: Geometry, index: int) -> View:
+def _view(clip: Clip, geometry: Geometry, index: int, seen_to_move: bool) -> View:
     street = geometry.fixed_regions[clip.camera[index]] == 0
     moves = geometry.moving[index] >= 0.5
     trust = geometry.confidence[index] * ~moves * (geometry.depth_m[index] > 0)
@@ -67,7 +69,7 @@ def _view(clip: Clip, geometry: Geometry, index: int) -> View:
         sky=torch.from_numpy(geometry.sky[index].copy()),
         depth_m=torch.from_numpy(geometry.depth_m[index].astype(np.float32)),
         depth_weight=torch.from_numpy(trust.astype(np.float32)),
-        still=torch.from_numpy(~_around(moves) & bool((geometry.moving >= 0.5).any())),
+        still=torch.from_numpy(~_around(moves) & seen_to_move),
     )
 
 

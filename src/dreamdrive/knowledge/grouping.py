@@ -73,13 +73,18 @@ def group(
             mask[at.numpy(), across.numpy()] = True
             if kind == StreetClass.VEHICLE:
                 mask |= outlined(mask, options.closing) & may_be
-            at, across = np.nonzero(mask)
-            box = int(across.min()), int(at.min()), int(across.max()) + 1, int(at.max()) + 1
-            found.append((RoadUser(kind, score, box, len(at)), at * width + across))
+            found.append((measured(kind, score, mask), np.flatnonzero(mask)))
     found.sort(key=lambda each: -each[0].score)
     for number, (_, pixels) in enumerate(found, start=1):
         numbers.ravel()[pixels] = number
     return numbers, tuple(user for user, _ in found)
+
+
+def measured(kind: StreetClass, score: float, mask: Bool[np.ndarray, "h w"]) -> RoadUser:
+    """The road user that fills a mask."""
+    rows, columns = np.nonzero(mask)
+    box = int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
+    return RoadUser(kind, score, box, len(rows))
 
 
 def free(classes: Int[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:

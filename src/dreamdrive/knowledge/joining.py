@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt16
+from jaxtyping import Float, Int, UInt16
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from dreamdrive.knowledge.grouping import free, outlined
+from dreamdrive.knowledge.grouping import free, measured, outlined
 from dreamdrive.scene.look import RoadUser
 from dreamdrive.scene.street_class import StreetClass
 
@@ -65,15 +65,9 @@ def joined(
         if (first_of == index).sum() > 1:
             own = numbers == number
             numbers[outlined(own, closing) & free(classes)] = number
-            user = _measured(user, numbers == number)
+            user = measured(user.kind, user.score, numbers == number)
         found.append(user)
     return numbers, tuple(found)
-
-
-def _measured(user: RoadUser, mask: Bool[np.ndarray, "h w"]) -> RoadUser:
-    rows, columns = np.nonzero(mask)
-    box = int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
-    return RoadUser(user.kind, user.score, box, len(rows))
 
 
 def _pairs(
