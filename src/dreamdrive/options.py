@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName
-from dreamdrive.decompose import ActorOptions, GroupOptions, ScoreOptions
+from dreamdrive.decompose import ActorOptions, DriftOptions, GroupOptions, ScoreOptions
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.knowledge import SHIPPED
@@ -21,6 +21,7 @@ class Options:
         seeds: How pixels become Gaussians.
         group: The vote.
         cast: The actors' tracks.
+        drift: The street, where no path of the camera explains the frames.
         densify: Growing and pruning in the joint fit.
         network: Size of the deformation field; its width is that of every representation.
         representation: ``"hybrid"``, or one of its baselines.
@@ -37,6 +38,7 @@ class Options:
     seeds: SeedOptions = field(default_factory=SeedOptions)
     group: GroupOptions = field(default_factory=GroupOptions)
     cast: ActorOptions = field(default_factory=ActorOptions)
+    drift: DriftOptions = field(default_factory=DriftOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
     representation: RepresentationName = "hybrid"
@@ -86,6 +88,7 @@ def with_method(options: Options, method: MethodName) -> Options:
         score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None),
         group=replace(g, clusters="density", threshold=_PAPER_TAU, majority=0.5),
         cast=replace(options.cast, tracks=False),
+        drift=replace(options.drift, allowed=False),
         static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
         fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0, stray_weight=0.0),
         network=replace(options.network, depth=8, width=256),

@@ -1,14 +1,27 @@
 """The paper's pipeline: prior, geometry, Gaussians, decomposition, joint fit."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 
+import numpy as np
 import torch
+from jaxtyping import Float
 
 from dreamdrive.choices import BACKENDS, QualityName
-from dreamdrive.decompose import Cast, Grouping, cast, error_maps, group, score
+from dreamdrive.decompose import (
+    Cast,
+    Grouping,
+    cast,
+    drifting,
+    error_maps,
+    explained,
+    group,
+    outside,
+    pixels_of,
+    score,
+)
 from dreamdrive.device import computing_on
 from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
 from dreamdrive.geometry import reconstruct
@@ -164,7 +177,7 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     parts = decompose(clip, geometry, seeds, static, o, given=given, run=run)
     return run(
         "fit",
-        [o.representation, o.fit, o.cast, o.motion, o.densify, o.device, given.tracks],
+        [o.representation, o.fit, o.cast, o.drift, o.motion, o.densify, o.device, given.tracks],
         lambda work: fit(
             clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work, device
         ),
@@ -189,6 +202,7 @@ def decompose(
         return Parts(fitted, fitted.select(nothing), None, ())
     if moves == "all":
         return Parts(seeds.select(nothing), fitted, None, ())
+    errors = cache(partial(error_maps, clip, geometry, fitted, static.sky, static.exposure))
     labels = given.labels
     if labels is None:
         scores = run(
@@ -198,7 +212,7 @@ def decompose(
                 clip,
                 geometry,
                 seeds,
-                error_maps(clip, geometry, fitted, static.sky, static.exposure),
+                errors(),
                 o.score,
                 stage_seed(o.seed, "score"),
                 work,
@@ -214,4 +228,23 @@ def decompose(
     else:
         run("group", o.group, lambda _: labels, given=labels)
     moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
-    return Parts(fitted.select(labels.static), moving.gaussians, moving.tracks, moving.actors)
+    street = _drifting(clip, geometry, seeds, errors, labels, o) if o.drift.allowed else None
+    standing = fitted.select(labels.static) if street is None else street
+    return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
+
+
+def _drifting(
+    clip: Clip,
+    geometry: Geometry,
+    seeds: Gaussians,
+    errors: Callable[[], Float[np.ndarray, "f h w"]],
+    labels: Grouping,
+    options: Options,
+) -> Gaussians | None:
+    """A street that drifts, beside what moves; None where one that stands explains the frames."""
+    moving = np.flatnonzero(labels.dynamic.numpy())
+    if explained(clip, geometry, errors(), pixels_of(geometry, seeds, moving, int(options.seeds.reach_px))):
+        return None
+    every = initialise(clip, replace(geometry, moving=np.ones_like(geometry.moving)), options.seeds)
+    taken = pixels_of(geometry, seeds, moving, options.seeds.moving_stride_px // 2)
+    return drifting(clip, geometry, every.select(outside(geometry, every, taken)), options.drift)

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scene.scenes import drifting_scene, make_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.run.held_out import Likeness
-from dreamdrive.run.judge import Facts, facts_of, limits_of, rough_because
+from dreamdrive.run.judge import Facts, facts_of, limits_of, remarks_of, rough_because
 from dreamdrive.scene.geometry import Scale
 
 GOOD = Facts(
@@ -148,6 +149,13 @@ def test_views_aside_are_not_promised_where_distances_are_a_guess() -> None:
     assert limits_of(replace(GOOD, scenes=((0, 10), (12, 46))))[1] == expected
     without = "views beside the recorded path cannot be trusted here, since nothing stands"
     assert limits_of(replace(GOOD, all_moves=True))[1] == without
+    drifts = "views beside the recorded path show what single frames saw, and gaps between"
+    assert limits_of(replace(GOOD, drifts=True))[1] == drifts
+
+
+def test_a_street_that_drifts_is_spoken_of() -> None:
+    assert "made of single frames" in remarks_of(drifting_scene())[0]
+    assert not any("single frames" in remark for remark in remarks_of(make_scene()))
 
 
 def test_facts_are_those_of_the_result() -> None:

@@ -94,3 +94,12 @@ def _moved_by(kind: str, dynamic: Gaussians) -> tuple[Gaussians, Motion]:
     lifespan = torch.stack([torch.linspace(0.2, 0.6, count), torch.full((count,), 0.5)], dim=1)
     swinging = replace(dynamic, velocity=torch.ones(count, 3), lifespan=lifespan)
     return swinging, Vibration(VibrationConfig(interval_s=0.25))
+
+
+def drifting_scene() -> Scene:
+    """One whose street is of single frames; its Gaussian i is in place at i / 10 s, and goes i m/s ahead."""
+    scene = make_scene()
+    number = torch.arange(len(scene.static), dtype=torch.float32)
+    velocity = torch.stack([0 * number, 0 * number, number], dim=1)
+    life = torch.stack([number / 10, torch.full_like(number, 0.2)], dim=1)
+    return replace(scene, static=replace(scene.static, velocity=velocity, lifespan=life))

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
+from tests.scene.scenes import drifting_scene, make_scene
 
 from dreamdrive.scene.actor import Actor, Box, Track
 from dreamdrive.scene.scene import Scene
@@ -114,3 +114,20 @@ def test_a_box_points_where_its_actor_turns() -> None:
 def test_a_box_has_lengths(size_m: list[float], ahead: list[float]) -> None:
     with pytest.raises(ValueError, match="box: "):
         Box(np.array(size_m), np.array(ahead, float))
+
+
+def test_a_street_that_drifts_is_where_its_velocities_take_it() -> None:
+    scene = drifting_scene()
+    assert scene.drifts
+    assert not make_scene().drifts
+    then = scene.static_at(0.3)
+    number = torch.arange(len(then), dtype=torch.float32)
+    assert torch.allclose(
+        then.means[:, 2] - scene.static.means[:, 2], number * (0.3 - number / 10), atol=1e-6
+    )
+    faded = then.logit_opacities.sigmoid() / scene.static.logit_opacities.sigmoid()
+    assert torch.allclose(faded, torch.exp(-0.5 * ((0.3 - number / 10) / 0.2) ** 2), atol=1e-5)
+    assert then.velocity is None
+    assert then.lifespan is None
+    with pytest.raises(ValueError, match="need life spans"):
+        replace(scene.static, lifespan=None).drifted_at(0.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_baseline, make_scene
+from tests.scene.scenes import drifting_scene, make_baseline, make_scene
 
 from dreamdrive.errors import InputError
 from dreamdrive.stored import load_scene, save_scene
@@ -50,12 +50,24 @@ def test_round_trip_of_the_other_motions(tmp_path: Path, kind: str) -> None:
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_only_what_the_first_format_cannot_hold_is_of_the_second(tmp_path: Path) -> None:
+def test_a_scene_is_of_the_first_format_that_can_hold_it(tmp_path: Path) -> None:
     versions = {}
-    for name, scene in (("old", make_scene()), ("new", make_baseline("vibration"))):
+    scenes = {"old": make_scene(), "new": make_baseline("vibration"), "drifts": drifting_scene()}
+    for name, scene in scenes.items():
         save_scene(scene, tmp_path / name)
         versions[name] = json.loads((tmp_path / name / "scene.json").read_text())["version"]
-    assert versions == {"old": 1, "new": 2}
+    assert versions == {"old": 1, "new": 2, "drifts": 3}
+
+
+def test_a_street_that_drifts_comes_back_and_needs_life_spans(tmp_path: Path) -> None:
+    scene = drifting_scene()
+    save_scene(scene, tmp_path / "a")
+    loaded = load_scene(tmp_path / "a")
+    assert loaded.drifts
+    assert torch.equal(loaded.at(0.4).means, scene.at(0.4).means)
+    save_scene(replace(scene, static=replace(scene.static, lifespan=None)), tmp_path / "b")
+    with pytest.raises(InputError, match="no life spans"):
+        load_scene(tmp_path / "b")
 
 
 def test_a_motion_of_another_kind_is_refused(tmp_path: Path) -> None:

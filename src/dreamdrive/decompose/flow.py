@@ -31,6 +31,35 @@ def neighbour_flow(
     return np.asarray(method.calc(grey(clip.frames[frame]), grey(clip.frames[other]), guess))
 
 
+def in_between(clip: Clip, before: int, frame: int, after: int) -> Float[np.ndarray, "h w 3"]:
+    """What two frames make of one between them: both carried along optical flow, blended by distance in time.
+
+    Colours are in [0, 1]. The flows to the time in between are those of Jiang et al. 2018 (Super SloMo),
+    eq. 4.
+    """
+    times = clip.times_s
+    t = float((times[frame] - times[before]) / (times[after] - times[before]))
+    there, back = neighbour_flow(clip, before, after), neighbour_flow(clip, after, before)
+    from_first = _warped(clip.frames[before], -(1 - t) * t * there + t * t * back)
+    from_second = _warped(clip.frames[after], (1 - t) * (1 - t) * there - t * (1 - t) * back)
+    return (1 - t) * from_first + t * from_second
+
+
+def _warped(
+    image: UInt8[np.ndarray, "h w 3"], offset_px: Float[np.ndarray, "h w 2"]
+) -> Float[np.ndarray, "h w 3"]:
+    height, width = image.shape[:2]
+    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    warped = cv2.remap(
+        image.astype(np.float32) / 255,
+        x + offset_px[..., 0].astype(np.float32),
+        y + offset_px[..., 1].astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return np.asarray(warped)
+
+
 _LEAST_SIDE_PX, _LARGEST = 64, 3.0  # of what flow is looked for in, and by how much it is enlarged for that
 _STIFF = 0.02  # how far a warp keeps to one factor: share of the spread of points
 _RETURNS_PX = 1.0  # flow there and back misses by less where it can be trusted

@@ -103,7 +103,7 @@ def places(scene: Scene, t_s: float) -> Float[np.ndarray, "n 3"]:
     moved = scene.dynamic.without_features()
     if scene.deformation is not None:
         moved = scene.deformation.apply_at(moved, t_s)
-    return torch.cat([scene.static.means, moved.means]).numpy().astype(np.float64)
+    return torch.cat([scene.static_at(t_s).means, moved.means]).numpy().astype(np.float64)
 
 
 def true_labels(

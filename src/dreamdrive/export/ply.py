@@ -46,7 +46,7 @@ def left_out_of_ply(scene: Scene, path: Path) -> str:
     parts = {
         "sky": scene.sky is not None,
         "exposure of the recording": scene.exposure is not None,
-        "motion" if alone else "motion in between": len(scene.dynamic) > 0,
+        "motion" if alone else "motion in between": scene.drifts or len(scene.dynamic) > 0,
     }
     missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
     return f"PLY holds {shown}{': ' if missing else ''}{missing}."

@@ -115,6 +115,11 @@ class Parameters:
         return len(self.anchors)
 
     @property
+    def swinging(self) -> bool:
+        """Whether they have velocities."""
+        return "swings" in self._learned
+
+    @property
     def means(self) -> Float[Tensor, "n 3"]:
         """Centres in metres, differentiable."""
         return torch.addcmul(self.anchors, self.unit_m[:, None], self.offsets)
@@ -122,7 +127,7 @@ class Parameters:
     def gaussians(self) -> Gaussians:
         """The Gaussians as they are now, still attached to the leaves."""
         velocity, lifespan = None, self.lifespan
-        if "swings" in self._learned:
+        if self.swinging:
             velocity = self.unit_m[:, None] * self.swings
             lifespan = torch.stack([self.peak_s, self.log_span.exp()], dim=1)
         return Gaussians(

@@ -69,11 +69,11 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class Moved:
-    """The living dynamic Gaussians at a step.
+    """The living Gaussians of a part at a step.
 
     Attributes:
         gaussians: As they are at the time (M, ...).
-        rows: Which rows of ``Model.dynamic`` they are (M,).
+        rows: Which rows of the part they are (M,).
         penalty: What their motion adds to the loss, or None.
     """
 
@@ -87,7 +87,7 @@ class Model:
     """Everything a fit changes.
 
     Attributes:
-        static: Gaussians free of time.
+        static: Gaussians free of time, or those of a street that drifts.
         dynamic: Gaussians that go through ``deformation``, or None.
         deformation: Present exactly when ``dynamic`` is.
         sky: The far background. It is an average over all frames already; learning it would cost a tenth of
@@ -111,6 +111,14 @@ class Model:
         living = whole if len(rows) == len(whole) else whole.select(rows)
         moved = self.deformation.training_at(living, t_s, generator)
         return Moved(moved, rows, self.deformation.penalty(living, moved))
+
+    def drifted(self, t_s: float) -> Moved | None:
+        """The living Gaussians of a street that drifts, differentiable; None of one that stands."""
+        if self.static is None or not self.static.swinging:
+            return None
+        whole = self.static.gaussians().without_features()
+        rows = whole.alive_at(t_s)
+        return Moved(whole.select(rows).drifted_at(t_s), rows, None)
 
     @property
     def device(self) -> torch.device:
@@ -152,15 +160,19 @@ class Trainer:
         """
         model, options = self.model, self.options
         done = step / options.steps
-        moved = model.moved(view.time_s, self.generator)
-        activated = activate(model.static, None if moved is None else moved.gaussians)
+        moved, street = model.moved(view.time_s, self.generator), model.drifted(view.time_s)
+        timed = [part.gaussians for part in (street, moved) if part is not None]
+        activated = activate(
+            model.static if street is None else None, Gaussians.concatenate(*timed) if timed else None
+        )
+        standing = len(activated.means) - (0 if moved is None else len(moved.rows))
         offsets_px = torch.zeros(len(activated.means), 2, device=model.device, requires_grad=True)
         rendered = _splat(
             activated,
             view.camera,
             offsets_px,
             None if done >= options.sh_after else 0,
-            _mark(model, len(activated.means)) if options.stray_weight else None,
+            _mark(activated.means, standing) if options.stray_weight else None,
         )
         loss = _loss(model, rendered, view, sky, options)
         if moved is not None and moved.penalty is not None:
@@ -168,20 +180,22 @@ class Trainer:
         loss.backward()
         _decay(model, self._optimiser, options, done)
         _step(model, self._optimiser)
-        self._observe(None if moved is None else moved.rows, offsets_px, rendered)
+        self._observe(street, moved, standing, offsets_px, rendered)
         for part, densifier in zip(model.parts(), self.densifiers, strict=True):
             densifier.update(part, step, options.steps, self.generator)
         return loss.detach()
 
-    def _observe(self, rows: Int[Tensor, " m"] | None, offsets_px: Tensor, rendered: Render) -> None:
-        """Hand each part its share of the screen gradients."""
+    def _observe(
+        self, street: Moved | None, moved: Moved | None, standing: int, offsets_px: Tensor, rendered: Render
+    ) -> None:
+        """Hand each part its share of the screen gradients; the first ``standing`` are the street's."""
         gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
-        static = 0 if self.model.static is None else len(self.model.static)
         densifiers = iter(self.densifiers)
-        if static:
-            next(densifiers).observe(None, gradient[:static], rendered.visible[:static])
-        if rows is not None:
-            next(densifiers).observe(rows, gradient[static:], rendered.visible[static:])
+        if self.model.static is not None:
+            rows = None if street is None else street.rows
+            next(densifiers).observe(rows, gradient[:standing], rendered.visible[:standing])
+        if moved is not None:
+            next(densifiers).observe(moved.rows, gradient[standing:], rendered.visible[standing:])
 
 
 # SSIM takes differences of squares, for which the ten bits of TF32 are too few.
@@ -226,13 +240,12 @@ def _splat(
     return seen_by(camera, *parameters, screen_offsets_px=offsets_px, sh_degree=sh_degree, channels=channels)
 
 
-def _mark(model: Model, count: int) -> Float[Tensor, "n 1"] | None:
-    """1 for each dynamic Gaussian, 0 for each static one; None where there is one kind alone."""
-    static = 0 if model.static is None else len(model.static)
-    if static in (0, count):
+def _mark(means: Float[Tensor, "n 3"], standing: int) -> Float[Tensor, "n 1"] | None:
+    """0 for the first Gaussians, which stand, 1 for each dynamic one; None where there is one kind alone."""
+    if standing in (0, len(means)):
         return None
-    mark = torch.ones(count, 1, device=model.device)
-    mark[:static] = 0
+    mark = torch.ones(len(means), 1, device=means.device)
+    mark[:standing] = 0
     return mark
 
 

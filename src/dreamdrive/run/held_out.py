@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.decompose import neighbour_flow
+from dreamdrive.decompose import in_between
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
@@ -78,18 +77,9 @@ def average_neighbours(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
 
 
 def interpolate_flow(clip: Clip, frame: int) -> Float[np.ndarray, "h w 3"]:
-    """Both neighbours warped along dense optical flow (DIS) and blended by their distance in time.
-
-    The flows to the time in between are those of Jiang et al. 2018 (Super SloMo), eq. 4.
-    """
+    """Both neighbours carried along dense optical flow, see ``decompose.flow``."""
     before, after = _neighbours(clip, frame)
-    first, second = clip.frames[before], clip.frames[after]
-    times = clip.times_s
-    t = float((times[frame] - times[before]) / (times[after] - times[before]))
-    there, back = neighbour_flow(clip, before, after), neighbour_flow(clip, after, before)
-    from_first = _warped(first, -(1 - t) * t * there + t * t * back)
-    from_second = _warped(second, (1 - t) * (1 - t) * there - t * (1 - t) * back)
-    return (1 - t) * from_first + t * from_second
+    return in_between(clip, before, frame, after)
 
 
 BASELINES: dict[str, Predictor] = {
@@ -103,18 +93,3 @@ BASELINES: dict[str, Predictor] = {
 def _neighbours(clip: Clip, frame: int) -> tuple[int, int]:
     seen = np.array(clip.seen_of(int(clip.camera[frame])))
     return int(seen[seen < frame].max()), int(seen[seen > frame].min())
-
-
-def _warped(
-    image: UInt8[np.ndarray, "h w 3"], offset_px: Float[np.ndarray, "h w 2"]
-) -> Float[np.ndarray, "h w 3"]:
-    height, width = image.shape[:2]
-    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    warped = cv2.remap(
-        image.astype(np.float32) / 255,
-        x + offset_px[..., 0].astype(np.float32),
-        y + offset_px[..., 1].astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    return np.asarray(warped)

@@ -34,7 +34,8 @@ class Facts:
     ``placed`` frames found their place on the path; ``scenes`` are first and last index in the source of each
     piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the held-out frames in
     decibels, and that of blending their neighbours along the motion in the picture. ``basis`` is what metres
-    rest on, ``spread`` how far they may be off, as a fraction. ``all_moves`` where nothing is known to stand.
+    rest on, ``spread`` how far they may be off, as a fraction. ``all_moves`` where nothing is known to stand,
+    ``drifts`` where the street moves as the picture does.
     """
 
     frames: int
@@ -50,6 +51,7 @@ class Facts:
     basis: Basis
     spread: float
     all_moves: bool = False
+    drifts: bool = False
 
 
 def facts_of(
@@ -60,10 +62,12 @@ def facts_of(
     blended: dict[int, Likeness],
     *,
     none_stands: bool = False,
+    drifts: bool = False,
 ) -> Facts:
     """What there is to say of a result, of its first camera; ``blended`` is of blending the neighbours.
 
-    ``none_stands`` says that a scene which tells static from moving has no static Gaussian.
+    ``none_stands`` says that a scene which tells static from moving has no static Gaussian, ``drifts`` that
+    its street is one of single frames.
     """
     lead = clip.of_camera(int(clip.camera[0]))
     source, times_s = clip.source_index[lead], clip.times_s[lead]
@@ -82,6 +86,7 @@ def facts_of(
         basis=geometry.scale.basis,
         spread=geometry.scale.spread,
         all_moves=none_stands or _moving_share(clip, geometry, lead) >= EVERYTHING,
+        drifts=drifts,
     )
 
 
@@ -90,6 +95,11 @@ def _moving_share(clip: Clip, geometry: Geometry, lead: np.ndarray) -> float:
     seen = lead[~clip.held_out[lead]]
     solid = geometry.depth_m[seen] > 0
     return float((geometry.moving[seen][solid] >= 0.5).mean()) if solid.any() else 0.0
+
+
+def remarks_of(scene: Scene) -> tuple[str, ...]:
+    """What else to know of a scene, a sentence each."""
+    return tuple(remark for remark in (drifting(scene), untracked(scene)) if remark is not None)
 
 
 def untracked(scene: Scene) -> str | None:
@@ -102,6 +112,16 @@ def untracked(scene: Scene) -> str | None:
     return (
         f"{count:,} Gaussians of what moves have no track, as too few frames saw it, or none that is likely: "
         "they show beside the frames that saw them alone."
+    )
+
+
+def drifting(scene: Scene) -> str | None:
+    """What to know of a street that drifts; None of one that stands."""
+    if not scene.drifts:
+        return None
+    return (
+        "No path of the camera explains what stands as well as the frames beside each frame do: the street "
+        "is made of single frames, which move as the picture does."
     )
 
 
@@ -239,4 +259,6 @@ def _aside(facts: Facts) -> str:
         return "views beside the recorded path cannot be trusted here, since nothing stands"
     if facts.fallback is not None or len(facts.scenes) > 1:
         return "views beside the recorded path cannot be trusted here, since distances are a guess"
+    if facts.drifts:
+        return "views beside the recorded path show what single frames saw, and gaps between"
     return f"views up to {ASIDE_M} m beside the recorded path hold best; further away gaps show"

@@ -13,8 +13,9 @@ from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
 from dreamdrive.evaluate import compare_paths
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.run.held_out import Likeness
-from dreamdrive.run.judge import facts_of, limits_of, rough_because, untracked
+from dreamdrive.run.judge import facts_of, limits_of, remarks_of, rough_because
 from dreamdrive.run.stages import StageRecord
+from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
@@ -41,8 +42,9 @@ def describe(
     options = request["options"]
     blended = baselines.get("flow_interpolation", {})
     none_stands = REPRESENTATIONS[options["representation"]].moves == "scored" and not len(scene.static)
-    facts = facts_of(clip, geometry, options["quality"], held_out, blended, none_stands=none_stands)
-    remark = untracked(scene)
+    facts = facts_of(
+        clip, geometry, options["quality"], held_out, blended, none_stands=none_stands, drifts=scene.drifts
+    )
     outside = PRIORS.package(options["prior"]) | BACKENDS.package(options["geometry"])
     outside |= DATASETS.package(options["dataset"])
     report = {
@@ -55,21 +57,7 @@ def describe(
         "steps": steps,
         "frames": {"count": len(clip), "size": list(clip.size), "source_index": clip.source_index.tolist()},
         "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
-        "actors": [
-            {
-                "name": actor.name,
-                "kind": actor.kind,
-                "gaussians": actor.count,
-                "first_s": actor.track.first_s,
-                "last_s": actor.track.last_s,
-                "path_m": actor.track.length_m,
-                "size_m": None if actor.box is None else actor.box.size_m.tolist(),
-                "speed_m_s": float(np.median(actor.track.speed_m_s)),
-                "spread_m": None if actor.spread_m is None else float(np.median(actor.spread_m)),
-                "completed": actor.completed,
-            }
-            for actor in scene.actors
-        ],
+        "actors": [_of_actor(actor) for actor in scene.actors],
         "scale": {**asdict(geometry.scale), "disagreement": geometry.scale.disagreement},
         "focal": asdict(geometry.focal),
         "requested": against_request(clip, geometry),
@@ -77,7 +65,7 @@ def describe(
         "fallback": geometry.fallback,
         "rough": list(rough_because(facts)),
         "limits": list(limits_of(facts)),
-        "notes": [*clip.provenance.get("notes", []), *([] if remark is None else [remark])],
+        "notes": [*clip.provenance.get("notes", []), *remarks_of(scene)],
         "features": sorted(clip.features),
         "geometry": geometry.details,
         "held_out": _by_source_index(clip, held_out),
@@ -88,6 +76,21 @@ def describe(
         },
     }
     return cast(dict[str, Any], _finite(report))
+
+
+def _of_actor(actor: Actor) -> dict[str, Any]:
+    return {
+        "name": actor.name,
+        "kind": actor.kind,
+        "gaussians": actor.count,
+        "first_s": actor.track.first_s,
+        "last_s": actor.track.last_s,
+        "path_m": actor.track.length_m,
+        "size_m": None if actor.box is None else actor.box.size_m.tolist(),
+        "speed_m_s": float(np.median(actor.track.speed_m_s)),
+        "spread_m": None if actor.spread_m is None else float(np.median(actor.spread_m)),
+        "completed": actor.completed,
+    }
 
 
 def against_request(clip: Clip, geometry: Geometry) -> dict[str, Any] | None:

@@ -25,7 +25,8 @@ class Gaussians:
         lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None: always visible.
             Opacity is multiplied by exp(-(t - centre)^2 / (2 deviation^2)).
         actor: Index of the actor each belongs to (N,), or None.
-        velocity: Velocity of a ``Vibration`` at the centre of the life span in m/s (N, 3), or None.
+        velocity: Velocity at the centre of the life span in m/s (N, 3), of a ``Vibration`` or of what drifts;
+            or None.
     """
 
     means: Float[Tensor, "n 3"]
@@ -92,6 +93,15 @@ class Gaussians:
         logit = self.logit_opacities.clamp(max=80.0)
         logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
         return replace(self, logit_opacities=logit, lifespan=None)
+
+    def drifted_at(self, t_s: float) -> "Gaussians":
+        """The same carried on by the velocities, if any, and faded; the result has neither."""
+        if self.velocity is None:
+            return self.faded_at(t_s)
+        if self.lifespan is None:
+            raise ValueError("velocity: Gaussians that drift need life spans, to tell when they are in place")
+        away_s = t_s - self.lifespan[:, :1]
+        return replace(self, means=self.means + away_s * self.velocity, velocity=None).faded_at(t_s)
 
     @staticmethod
     def concatenate(*parts: "Gaussians") -> "Gaussians":

@@ -69,7 +69,8 @@ class Scene:
     World = the camera of the first frame (x right, y down, z forward), in metres.
 
     Attributes:
-        static: What never moves.
+        static: What never moves; or, of a street that drifts, surfaces of single frames with life spans and
+            velocities, see ``decompose.drifting``.
         dynamic: What moves, in its canonical place; may be empty.
         deformation: Where the dynamic Gaussians are over time; None leaves them in place.
         actors: The dynamic groups.
@@ -102,6 +103,11 @@ class Scene:
             raise ValueError(
                 f"scene: numbers of cameras, times, held-out marks (and rig indices) differ: {counts}"
             )
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the street moves as the picture does, as no path of the camera explains the frames."""
+        return self.static.velocity is not None
 
     @property
     def trajectory(self) -> Trajectory:
@@ -157,8 +163,8 @@ class Scene:
 
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:
-        """The static Gaussians without features; the time matters only to those with a life span."""
-        return self.static.without_features().faded_at(t_s)
+        """The static Gaussians without features; the time matters only to a street that drifts."""
+        return self.static.without_features().drifted_at(t_s)
 
     @torch.no_grad()
     def dynamic_at(self, t_s: float) -> Gaussians:

@@ -31,7 +31,7 @@ from dreamdrive.scene.scene import Provenance, Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
 
 FORMAT = "dreamdrive scene"
-VERSION = 2
+VERSION = 3
 CONVENTIONS = (
     "World: the camera of the first frame, x right, y down, z forward, metres. Times in seconds. "
     "Cameras: pinholes, the centre of the top-left pixel at (0.5, 0.5). Quaternions wxyz, scales as natural "
@@ -150,7 +150,7 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     index = {
         "format": FORMAT,
         # Version 1 knows deformation fields alone, and does not name them.
-        "version": 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else VERSION,
+        "version": _version(scene),
         "conventions": CONVENTIONS,
         "provenance": asdict(scene.provenance),
         "blocks": [{"name": _BLOCK, "parts": sorted(parts)}],
@@ -223,6 +223,13 @@ def _values(scene: Scene) -> dict[str, Any]:
         if scene.sky is None
         else {n: getattr(scene.sky, n) for n in ("azimuth_rad", "elevation_rad")},
     }
+
+
+def _version(scene: Scene) -> int:
+    """The first format version that can hold a scene: 2 knows other motions, 3 a street that drifts."""
+    if scene.drifts:
+        return VERSION
+    return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else 2
 
 
 def _described(motion: SceneMotion) -> dict[str, Any]:
@@ -321,6 +328,8 @@ def _check(scene: Scene) -> None:
             raise ValueError(f"Gaussians come from frames beyond the {count} of the scene")
         if float(part.means.abs().max()) > FARTHEST_M:
             raise ValueError(f"Gaussians lie more than {FARTHEST_M:g} m away")
+    if scene.drifts and scene.static.lifespan is None:
+        raise ValueError("Gaussians that drift have no life spans")
     if scene.deformation is not None and len(scene.dynamic):
         scene.deformation.check(scene.dynamic)
     source, up = scene.provenance.source_index, scene.provenance.up

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
-from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive, levelled
+from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive, levelled, steadied
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.geometry import Ground
 
@@ -70,3 +70,16 @@ def test_a_levelled_path_keeps_its_height_and_tilt_and_turns_as_it_did() -> None
     np.testing.assert_allclose(found[-1, :3, 2], path[-1, :3, 2], atol=0.1)
     again = levelled(found, up)
     np.testing.assert_allclose(again, found, atol=1e-9)
+
+
+def test_a_steady_path_keeps_its_course_and_loses_its_shivers() -> None:
+    path, times_s = np.tile(np.eye(4), (24, 1, 1)), 0.1 * np.arange(24)
+    path[:, 2, 3] = 5 * times_s
+    path[:, :3, :3] = Rotation.from_rotvec(np.outer(0.1 * times_s, [0, 1, 0])).as_matrix()
+    np.testing.assert_allclose(steadied(path, times_s), path, atol=1e-9)
+    shaken, random = path.copy(), np.random.default_rng(0)
+    shaken[:, :3, 3] += random.normal(0, 0.1, (24, 3))
+    shaken[:, :3, :3] = shaken[:, :3, :3] @ Rotation.from_rotvec(random.normal(0, 0.01, (24, 3))).as_matrix()
+    found = steadied(shaken, times_s)
+    assert np.square(found - path).mean() < 0.5 * np.square(shaken - path).mean()
+    assert steadied(path[:1], times_s[:1]) == pytest.approx(path[:1])

@@ -1,0 +1,148 @@
+"""A street that drifts: surfaces of single frames that move as the picture does.
+
+Where no path of the camera explains what is seen, as in a queue that drives, a street fitted to all frames at
+once is a blur. The frames beside one still tell what it shows.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from dreamdrive.decompose.flow import carried, in_between, neighbour_flow
+from dreamdrive.decompose.group import source_pixels
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Geometry
+
+_LEAST_PIXELS = 500
+_LIKE = 0.3  # in the logarithm of depth, what one surface may change by from frame to frame
+_DOUBT = 1e-3  # what flow that does not lead back weighs beside flow that does
+
+
+@dataclass(frozen=True)
+class DriftOptions:
+    """Constants of a street that drifts.
+
+    Attributes:
+        allowed: Whether a street may drift. Where it does and must not, held-out frames lose 4 to 9 dB in
+            drawn queues whose path is refused, and 1 dB on a motorway (Udacity).
+        lifespan_frames: Standard deviation of the life spans at the start, in intervals between training
+            frames; the fit goes on from there. With 0.5 what lies between two frames fades.
+        opacity: Opacity to start from.
+    """
+
+    allowed: bool = True
+    lifespan_frames: float = 1.4
+    opacity: float = 0.8
+
+
+def explained(
+    clip: Clip, geometry: Geometry, errors: Float[np.ndarray, "f h w"], moves: Bool[np.ndarray, "f h w"]
+) -> bool:
+    """Whether a street that stands shows what stands at least as well as the frames beside each frame do.
+
+    The errors are those of a street fitted to all training frames, see ``error_maps``. Every frame is also
+    made from its neighbours, which have not seen it, carried along optical flow. The mean over the frames of
+    the ratio of both mean squares decides. Sky, what ``moves`` and what is fixed to the camera do not count.
+    A camera that stays at one place explains all that stands.
+    """
+    if not _travels(geometry):
+        return True
+    gains: list[float] = []
+    for camera in np.unique(clip.camera).tolist():
+        seen = clip.seen_of(camera)
+        for before, frame, after in zip(seen, seen[1:], seen[2:], strict=False):
+            free = clip.valid[frame] & (geometry.fixed_regions[camera] == 0)
+            judged = free & ~geometry.sky[frame] & ~moves[frame]
+            if judged.sum() < _LEAST_PIXELS:
+                continue
+            beside = in_between(clip, before, frame, after) - clip.frames[frame] / np.float32(255)
+            maps = errors[frame], np.abs(beside).mean(axis=2)
+            standing, carried_on = (float(np.square(each[judged]).mean()) for each in maps)
+            gains.append(float(np.log(max(carried_on, 1e-8) / max(standing, 1e-8))))
+    return not gains or float(np.mean(gains)) >= 0
+
+
+def _travels(geometry: Geometry) -> bool:
+    places = np.stack([camera.world_from_camera[:3, 3] for camera in geometry.cameras])
+    return bool(np.ptp(places, axis=0).any())
+
+
+def drifting(clip: Clip, geometry: Geometry, seeds: Gaussians, options: DriftOptions) -> Gaussians:
+    """Seeds of all pixels of every training frame, each alive around its frame and on its way to the others.
+
+    The velocity is the mean of those to the frames beside it, along optical flow and from depth to depth:
+    what stands stays where path and depth are right. Held-out frames are not read.
+    """
+    times_s = torch.from_numpy(clip.times_s)[seeds.source_frame].to(torch.float32)
+    interval_s = float(np.median(np.diff(np.unique(clip.times_s[~clip.held_out]))))
+    span_s = torch.full_like(times_s, options.lifespan_frames * interval_s)
+    logit = float(np.log(options.opacity / (1 - options.opacity)))
+    return replace(
+        seeds,
+        logit_opacities=torch.full_like(seeds.logit_opacities, logit),
+        lifespan=torch.stack([times_s, span_s], dim=1),
+        velocity=torch.from_numpy(_velocity(clip, geometry, seeds)).to(torch.float32),
+        actor=None,
+    )
+
+
+def _velocity(clip: Clip, geometry: Geometry, seeds: Gaussians) -> Float[np.ndarray, "n 3"]:
+    frames, places_m = seeds.source_frame.numpy(), seeds.means.numpy().astype(np.float64)
+    sums, weights = np.zeros_like(places_m), np.zeros((len(seeds), 1))
+    for camera in np.unique(clip.camera).tolist():
+        seen = clip.seen_of(camera)
+        for first, second in pairwise(seen):
+            there, back = neighbour_flow(clip, first, second), neighbour_flow(clip, second, first)
+            for frame, other, ahead, home in ((first, second, there, back), (second, first, back, there)):
+                rows = np.flatnonzero(frames == frame)
+                start = geometry.cameras[frame].project(places_m[rows])
+                end = carried(start[:, :2], ahead)
+                trust = np.exp(-np.linalg.norm(carried(end, home) - start[:, :2], axis=1)) + _DOUBT
+                end_m = np.column_stack([end, _depth_m(geometry, other, end, start[:, 2])])
+                way_m = geometry.cameras[other].lift(end_m) - places_m[rows]
+                sums[rows] += trust[:, None] * way_m / (clip.times_s[other] - clip.times_s[frame])
+                weights[rows, 0] += trust
+    return sums / np.maximum(weights, 1e-9)
+
+
+def _depth_m(
+    geometry: Geometry, frame: int, pixels: Float[np.ndarray, "m 2"], expected_m: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, " m"]:
+    """Depth at pixels of a frame where it is about what is expected; else that is taken.
+
+    What drives along keeps its distance and what stands comes nearer; only depth tells them apart.
+    """
+    there_m = geometry.depth_m[frame][_cells(pixels, geometry.depth_m.shape)].astype(np.float64)
+    like = np.abs(np.log(np.maximum(there_m, 1e-6) / expected_m)) < _LIKE
+    return np.where(like, there_m, expected_m)
+
+
+def pixels_of(
+    geometry: Geometry, gaussians: Gaussians, index: Int[np.ndarray, " m"], reach_px: int
+) -> Bool[np.ndarray, "f h w"]:
+    """Pixels (F, H, W) that some Gaussians were seeded from, with those around."""
+    mask = np.zeros(geometry.depth_m.shape, dtype=np.uint8)
+    row, column = _cells(source_pixels(geometry, gaussians, index), mask.shape)
+    mask[gaussians.source_frame.numpy()[index], row, column] = 1
+    box = np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
+    return np.stack([cv2.dilate(each, box) for each in mask]) > 0
+
+
+def outside(geometry: Geometry, seeds: Gaussians, mask: Bool[np.ndarray, "f h w"]) -> Bool[Tensor, " n"]:
+    """Which seeds do not lie in the mask of their frame."""
+    row, column = _cells(source_pixels(geometry, seeds, np.arange(len(seeds))), mask.shape)
+    return torch.from_numpy(~mask[seeds.source_frame.numpy(), row, column])
+
+
+def _cells(
+    pixels: Float[np.ndarray, "m c"], shape: tuple[int, ...]
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Row and column of points (column, row, ...) of pictures of a shape (F, H, W), at its border outside."""
+    column, row = np.floor(pixels[:, :2]).astype(np.intp).T
+    return row.clip(0, shape[1] - 1), column.clip(0, shape[2] - 1)

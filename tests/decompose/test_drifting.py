@@ -1,0 +1,122 @@
+"""A street that drifts, on a wall that slides through a picture whose camera is said to drive ahead."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from dreamdrive import Given, build_scene, options
+from dreamdrive.decompose import DriftOptions, drifting, explained, outside, pixels_of
+from dreamdrive.fit import FitOptions, SeedOptions, initialise
+from dreamdrive.run.held_out import score_baselines, score_scene
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.geometry import Focal, Geometry, Scale
+
+FRAMES, WIDTH, HEIGHT = 8, 96, 64
+DEPTH_M, FOCAL_PX, SLIDE_PX, INTERVAL_S = 10.0, 80.0, 3, 0.1
+
+
+def wall(step_m: float = 0.5, held_out: int | None = 4) -> tuple[Clip, Geometry]:
+    """Frames in which a wall slides to the left, and a camera that is said to come nearer to it."""
+    noise = np.random.default_rng(0).uniform(0, 255, (HEIGHT, WIDTH + SLIDE_PX * FRAMES, 3))
+    texture = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 1.5), np.empty(0), 0, 255, cv2.NORM_MINMAX)
+    frames = [texture[:, SLIDE_PX * k : SLIDE_PX * k + WIDTH].astype(np.uint8) for k in range(FRAMES)]
+    camera = Camera(FOCAL_PX, FOCAL_PX, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT)
+    poses = np.tile(np.eye(4), (FRAMES, 1, 1))
+    poses[:, 2, 3] = step_m * np.arange(FRAMES)
+    shape = (FRAMES, HEIGHT, WIDTH)
+    clip = Clip(
+        frames=np.stack(frames),
+        times_s=INTERVAL_S * np.arange(FRAMES),
+        camera=np.zeros(FRAMES, dtype=np.int64),
+        rig=(camera,),
+        valid=np.ones(shape, dtype=bool),
+        held_out=np.arange(FRAMES) == held_out,
+        source_index=np.arange(FRAMES),
+        features={"appearance": np.stack(frames).astype(np.float32) / 255 - 0.5},
+        known=Known(intrinsics=True),
+    )
+    geometry = Geometry(
+        cameras=tuple(camera.at(pose) for pose in poses),
+        depth_m=np.full(shape, DEPTH_M, np.float32),
+        confidence=np.ones(shape, np.float32),
+        sky=np.zeros(shape, dtype=bool),
+        moving=np.zeros(shape, np.float32),
+        fixed_regions=np.zeros((1, HEIGHT, WIDTH), dtype=np.int64),
+        region_names=(),
+        ground=None,
+        scale=Scale("poses", 0.0),
+        focal=Focal(FOCAL_PX, True),
+    )
+    return clip, geometry
+
+
+def test_a_street_is_explained_where_its_fit_is_better_than_the_frames_beside() -> None:
+    clip, geometry = wall(held_out=None)
+    nothing = np.zeros(geometry.depth_m.shape, dtype=bool)
+    perfect, blurred = np.zeros(nothing.shape, np.float32), np.full(nothing.shape, 0.3, np.float32)
+    assert explained(clip, geometry, perfect, nothing)
+    assert not explained(clip, geometry, blurred, nothing)
+    # What moves, the sky and what is invalid do not count, and with nothing left nothing speaks against it.
+    assert explained(clip, geometry, blurred, ~nothing)
+    assert explained(clip, replace(geometry, sky=~nothing), blurred, nothing)
+    assert explained(replace(clip, valid=nothing), geometry, blurred, nothing)
+    standing = replace(geometry, cameras=(geometry.cameras[0],) * FRAMES)
+    assert explained(clip, standing, blurred, nothing)
+
+
+def test_seeds_drift_as_the_picture_does() -> None:
+    """Of a wall that keeps its distance, at 3 px a frame; the camera comes along at 5 m/s."""
+    clip, geometry = wall()
+    seeds = initialise(clip, replace(geometry, moving=np.ones_like(geometry.moving)), SeedOptions())
+    street = drifting(clip, geometry, seeds, DriftOptions(lifespan_frames=2.0))
+    assert street.velocity is not None
+    assert street.lifespan is not None
+    inner = torch.from_numpy(np.abs(pixels_x(geometry, seeds) - WIDTH / 2) < WIDTH / 3)
+    wanted = torch.tensor([-SLIDE_PX / FOCAL_PX * DEPTH_M / INTERVAL_S, 0.0, 0.5 / INTERVAL_S])
+    found = street.velocity[inner].median(dim=0).values
+    assert found.tolist() == pytest.approx(wanted.tolist(), abs=0.2)
+    assert street.lifespan[:, 0].tolist() == pytest.approx(
+        clip.times_s[seeds.source_frame.numpy()].tolist(), abs=1e-6
+    )
+    assert street.lifespan[:, 1].unique().tolist() == pytest.approx([2 * INTERVAL_S])
+    assert 4 not in street.source_frame
+
+
+def pixels_x(geometry: Geometry, seeds) -> np.ndarray:
+    columns = np.zeros(len(seeds))
+    for frame, camera in enumerate(geometry.cameras):
+        rows = seeds.source_frame.numpy() == frame
+        columns[rows] = camera.project(seeds.means.numpy()[rows].astype(np.float64))[:, 0]
+    return columns
+
+
+def test_pixels_of_seeds_are_where_they_came_from() -> None:
+    clip, geometry = wall()
+    seeds = initialise(clip, replace(geometry, moving=np.ones_like(geometry.moving)), SeedOptions())
+    every = np.arange(len(seeds))
+    mask = pixels_of(geometry, seeds, every[seeds.source_frame.numpy() == 2], 1)
+    assert mask[2, 2:-2, 2:-2].all()
+    assert not np.delete(mask, 2, axis=0).any()
+    assert torch.equal(outside(geometry, seeds, mask), seeds.source_frame != 2)
+
+
+def test_a_path_that_explains_nothing_leaves_a_street_that_drifts() -> None:
+    """It predicts the withheld frame about as well as blending does; standing it cannot."""
+    clip, geometry = wall()
+    draft = replace(options.QUALITIES["draft"], fit=FitOptions(steps=100))
+    scenes = {
+        allowed: build_scene(
+            clip, replace(draft, drift=DriftOptions(allowed=allowed)), given=Given(geometry=geometry)
+        )
+        for allowed in (True, False)
+    }
+    assert scenes[True].drifts
+    assert not scenes[False].drifts
+    psnr = {allowed: score_scene(clip, geometry, scene)[4].psnr for allowed, scene in scenes.items()}
+    blended = score_baselines(clip, geometry)["flow_interpolation"][4].psnr
+    assert psnr[True] > psnr[False] + 3
+    assert psnr[True] > blended - 3
