@@ -1,6 +1,6 @@
 """Structure from motion of a queue: a drawn street whose picture is three quarters traffic that moves.
 
-    python benchmarks/queues.py [--worlds development|test] [--seeds S ...] [--calibrated]
+    python benchmarks/queues.py [--worlds development|test] [--seeds S ...] [--calibrated] [--scenes]
                                 [--knowledge none outlines FILE ...] [--json FILE] [--markdown FILE]
 
 The path of the recording car is found from the frames alone (``none``), from the frames and the true
@@ -8,13 +8,16 @@ outlines of all road users (``outlines``), or with the street network of a file 
 ships. Outlines tell nothing of the lens. The lens is a guess, or with ``--calibrated`` the true one. Path
 errors are after the best similarity, in per cent of the length; where structure from motion was refused they
 are those of frame-to-frame odometry. Traffic is the share of all pixels in which a road user moves.
+
+With ``--scenes`` a draft is made of each as well, with every eighth frame held out: how well these are shown
+by a street that may drift and by one that may not, and by blending their neighbours along the flow.
 """
 
 import argparse
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -27,12 +30,17 @@ from common.true_look import true_look
 from common.twin import TWIN, name_of
 from common.worlds import SETS
 from dreamdrive.evaluate.paths import compare_paths
+from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.cameras import pose_clip
-from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, with_looks
+from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look_at, with_looks
+from dreamdrive.options import QUALITIES
+from dreamdrive.pipeline import Given, build_scene
+from dreamdrive.run import stage_seed
+from dreamdrive.run.held_out import score_baselines, score_scene
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.world import Drive, StreetOptions, draw_street, drive
 
-FRAMES, RATE_HZ, SIZE, EDITION = 24, 10.0, (480, 270), 2
+FRAMES, RATE_HZ, SIZE, EDITION, HOLD_OUT = 24, 10.0, (480, 270), 2, 8
 SEEDS = 8
 """Of each set, from its first on."""
 OUTLINES = "outlines"
@@ -53,6 +61,7 @@ class Row:
         rotation_deg_per_m: Mean difference in heading over stretches of the path.
         focal_percent: By how much the focal length is too long.
         seconds: Seconds of finding the path, without those of the network.
+        scene: PSNR of held-out frames in dB, of each way to show them; None where no scene was made.
     """
 
     seed: int
@@ -64,6 +73,7 @@ class Row:
     rotation_deg_per_m: float
     focal_percent: float
     seconds: float
+    scene: dict[str, float] | None = None
 
     @property
     def good(self) -> bool:
@@ -77,7 +87,7 @@ def main() -> int:
     rows: list[Row] = []
     for seed in args.seeds or SETS[args.worlds][:SEEDS]:
         for knowledge in args.knowledge:
-            rows.append(measure(seed, knowledge, args.calibrated))
+            rows.append(measure(seed, knowledge, args.calibrated, args.scenes))
             print(rows[-1], file=sys.stderr, flush=True)
     report = {"machine": describe_machine(), "calibrated": args.calibrated, "rows": [asdict(r) for r in rows]}
     return publish(args, report, table(rows), [])
@@ -89,6 +99,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--worlds", choices=SETS, default="development", help="the first eight of a set")
     parser.add_argument("--seeds", type=int, nargs="+", metavar="S", help="others than those")
     parser.add_argument("--knowledge", nargs="+", default=[NO_KNOWLEDGE, TWIN, OUTLINES], metavar="WHAT")
+    parser.add_argument("--scenes", action="store_true", help="make a scene of each, too")
     parser.add_argument("--calibrated", action="store_true", help="the lens is known")
     return parser.parse_args()
 
@@ -108,8 +119,27 @@ def told(made: Drive, knowledge: str, calibrated: bool) -> Clip:
     return with_looks(clip, look_at(clip, knowledge))
 
 
-def measure(seed: int, knowledge: str, calibrated: bool) -> Row:
-    """Find the path of a street."""
+def shown(clip: Clip, knowledge: str) -> dict[str, float]:
+    """How well held-out frames of a clip are shown, in decibels."""
+    held_out = np.arange(len(clip)) % HOLD_OUT == HOLD_OUT // 2
+    clip = replace(clip, held_out=held_out)
+    looks = None if clip.look is None else (clip.look,)
+    options = replace(QUALITIES["draft"], knowledge=SHIPPED if knowledge == OUTLINES else knowledge)
+    geometry = reconstruct(clip, options.geometry, seed=stage_seed(options.seed, "geometry"))
+    given, found = Given(geometry=geometry, looks=looks), dict[str, float]()
+    for allowed in (True, False):
+        drift = replace(options.drift, allowed=allowed)
+        scene = build_scene(clip, replace(options, drift=drift), given=given)
+        if allowed:
+            found["drifts"] = float(scene.drifts)
+        name = "may drift" if allowed else "may not"
+        found[name] = float(np.mean([one.psnr for one in score_scene(clip, geometry, scene).values()]))
+    blended = score_baselines(clip, geometry)["flow_interpolation"]
+    return {**found, "blended": float(np.mean([one.psnr for one in blended.values()]))}
+
+
+def measure(seed: int, knowledge: str, calibrated: bool, scenes: bool) -> Row:
+    """Find the path of a street, and make a scene of it where that is asked for."""
     made = queue_of(seed)
     clip = told(made, knowledge, calibrated)
     began = time.perf_counter()
@@ -128,6 +158,7 @@ def measure(seed: int, knowledge: str, calibrated: bool) -> Row:
         rotation_deg_per_m=error.rotation_deg_per_m,
         focal_percent=100 * posed.cameras[0].fx_px / made.cameras[0].fx_px - 100,
         seconds=seconds,
+        scene=shown(clip, knowledge) if scenes else None,
     )
 
 
@@ -150,7 +181,24 @@ def table(rows: Iterable[Row]) -> str:
             f"{GOAL_PERCENT} % {sum(r.good for r in of)}, median error "
             f"{np.median([r.path_percent for r in of]):.2f} %"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *scene_table([r for r in rows if r.scene is not None])])
+
+
+def scene_table(rows: list[Row]) -> list[str]:
+    """Lines that tell how well held-out frames are shown; none without scenes."""
+    if not rows:
+        return []
+    found = [(f"{r.seed} | {r.knowledge}", r.scene or {}) for r in rows]
+    names = [name for name in found[0][1] if name != "drifts"]
+    mean = {name: float(np.mean([scene[name] for _, scene in found])) for name in ("drifts", *names)}
+    return [
+        f"\n| seed | knowledge | drifts | {' | '.join(names)} |",
+        "| --- " * (3 + len(names)) + "|",
+        *(
+            f"| {which} | {scene['drifts']:.2g} | {' | '.join(f'{scene[name]:.2f}' for name in names)} |"
+            for which, scene in [*found, ("mean | ", mean)]
+        ),
+    ]
 
 
 if __name__ == "__main__":

@@ -27,3 +27,11 @@ def test_the_table_counts_what_was_refused_and_what_is_near() -> None:
     text = table(rows)
     assert "none: refused 1 of 3, found within 0.5 % 1, median error 0.20 %" in text
     assert "| 2 | none | 0.75 | 10.0 | 0.10 | 0.010 | -3.0 | 5 | the path jumps |" in text
+
+
+def test_scenes_have_a_table_of_their_own() -> None:
+    scenes = [{"drifts": 1.0, "may drift": 25.0}, {"drifts": 0.0, "may drift": 26.0}]
+    rows = [Row(k, "twin", 0.75, 10.0, None, 0.2, 0.01, -3.0, 5.0, scenes[k]) for k in (0, 1)]
+    assert "| seed | knowledge | drifts | may drift |" in table(rows)
+    assert "| 1 | twin | 0 | 26.00 |" in table(rows)
+    assert "| mean |  | 0.5 | 25.50 |" in table(rows)

@@ -51,7 +51,7 @@ def explained(
     the ratio of both mean squares decides. Sky, what ``moves`` and what is fixed to the camera do not count.
     A camera that stays at one place explains all that stands.
     """
-    if not _travels(geometry):
+    if geometry.at_one_place:
         return True
     gains: list[float] = []
     for camera in np.unique(clip.camera).tolist():
@@ -66,11 +66,6 @@ def explained(
             standing, carried_on = (float(np.square(each[judged]).mean()) for each in maps)
             gains.append(float(np.log(max(carried_on, 1e-8) / max(standing, 1e-8))))
     return not gains or float(np.mean(gains)) >= 0
-
-
-def _travels(geometry: Geometry) -> bool:
-    places = np.stack([camera.world_from_camera[:3, 3] for camera in geometry.cameras])
-    return bool(np.ptp(places, axis=0).any())
 
 
 def drifting(clip: Clip, geometry: Geometry, seeds: Gaussians, options: DriftOptions) -> Gaussians:

@@ -75,7 +75,7 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
         InputError: No pixel of any frame has depth.
     """
     options = options or SeedOptions()
-    if _at_one_place(geometry):
+    if geometry.at_one_place:
         options = replace(options, stride_px=1)
     kept: list[_Seeds] = []
     for frame in np.flatnonzero(~clip.held_out)[::-1].tolist():
@@ -94,12 +94,6 @@ def initialise(clip: Clip, geometry: Geometry, options: SeedOptions | None = Non
             "choose other --frames"
         )
     return _gaussians(kept, options)
-
-
-def _at_one_place(geometry: Geometry) -> bool:
-    """Whether cameras that look different ways, if at all, are all where the first is."""
-    places = np.stack([camera.world_from_camera[:3, 3] for camera in geometry.cameras])
-    return len(places) > 1 and not np.ptp(places, axis=0).any()
 
 
 @dataclass(frozen=True)

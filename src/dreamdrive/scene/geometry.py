@@ -17,6 +17,10 @@ Fallback = Literal["few", "blank", "standing", "refused"]
 or a path that nobody could believe."""
 
 
+CREEP_M = 0.3
+"""As far a car that waits may roll, and still show everything from one place."""
+
+
 @dataclass(frozen=True)
 class Scale:
     """What fixed the metric scale.
@@ -121,6 +125,12 @@ class Geometry:
     metres_per_unit: float | None = 1.0
     spread: Float[np.ndarray, "f h w"] | None = None
     users: UInt16[np.ndarray, "f h w"] | None = None
+
+    @property
+    def at_one_place(self) -> bool:
+        """Whether cameras that look different ways, if at all, stay where the first is, but for a creep."""
+        places_m = np.stack([camera.world_from_camera[:3, 3] for camera in self.cameras])
+        return len(places_m) > 1 and bool((np.ptp(places_m, axis=0) <= CREEP_M).all())
 
     def points_world(self, frame: int) -> Float[np.ndarray, "h w 3"]:
         """Points (H, W, 3) of one frame in the world; the camera centre where there is no depth."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from dreamdrive.geometry.cameras import STEPS, pose_clip
+from dreamdrive.geometry.cameras import STEPS, pose_clip, with_creep
 from dreamdrive.geometry.dense import LOOK_PASSES, PASSES, densify
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.geometry.protocol import GeometryBackend
@@ -25,6 +25,8 @@ def reconstruct(clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Wo
     posed = work.keep("posed", lambda: pose_clip(clip, options, seed=seed, tell=tell))
     known = in_metres(clip, posed.metres_per_unit)
     found = densify(known, posed, options, tell=_counted(work, posing, 1, total), keep=work.keep)
+    if posed.fallback_kind == "standing" and clip.known.world_from_camera is None:
+        found = with_creep(clip, found)
     work(total, total)
     return found
 
