@@ -18,12 +18,14 @@ def creeping(step_m: float, turn_rad: float = 0.0) -> tuple[Clip, Geometry]:
     clip, geometry = wall(step_m=0.0, held_out=0)
     noise = np.random.default_rng(1).uniform(0, 255, (HEIGHT, WIDTH, 3))
     texture = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 1.5), np.empty(0), 0, 255, cv2.NORM_MINMAX)
+    # The first pixel's middle is at 0.5; OpenCV counts from there.
+    lens = np.array([[FOCAL_PX, 0, WIDTH / 2 - 0.5], [0, FOCAL_PX, HEIGHT / 2 - 0.5], [0, 0, 1]])
     frames = []
     for k in range(len(clip)):
-        grown, shift_px = DEPTH_M / (DEPTH_M - step_m * k), -FOCAL_PX * np.tan(turn_rad * k)
-        middle = np.array([WIDTH, HEIGHT]) / 2 - 0.5
-        way = np.column_stack([grown * np.eye(2), middle * (1 - grown) + [shift_px, 0]])
-        frames.append(cv2.warpAffine(texture, way, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REFLECT))
+        nearer = np.diag([1, 1, (DEPTH_M - step_m * k) / DEPTH_M])
+        back = Rotation.from_rotvec([0, -turn_rad * k, 0]).as_matrix()
+        way = lens @ back @ nearer @ np.linalg.inv(lens)
+        frames.append(cv2.warpPerspective(texture, way, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REFLECT))
     return replace(clip, frames=np.stack(frames).round().astype(np.uint8)), geometry
 
 
