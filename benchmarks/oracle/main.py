@@ -15,7 +15,7 @@ from common.options import parser_of
 from common.report import publish
 from common.worlds import DEVELOPMENT, set_of
 from dreamdrive.knowledge import NO_KNOWLEDGE
-from dreamdrive.options import Options
+from dreamdrive.options import QUALITIES, Options
 from dreamdrive.run import digest, program_digest
 from oracle.arms import ARMS, ceiling, judged
 from oracle.views import Seen, seen
@@ -25,7 +25,10 @@ from street.views import views_digest
 
 Row = dict[str, Any]
 AS_IT_IS, WITHOUT, CEILING = "as it is", "none", "ceiling"
+STANDARD, LONGER, LONGER_BY = "standard", "longer", 5
 NAMES = {WITHOUT: None, **{"+".join(arm) or AS_IT_IS: arm for arm in ARMS}, CEILING: None}
+STEPS = {STANDARD: 1, LONGER: LONGER_BY}
+"""Arms that take the steps of ``standard`` in place of those of ``draft``, or a multiple of them."""
 GROUPS = ("all", "standing", "moving", "unseen")
 
 
@@ -36,7 +39,7 @@ def main(doc: str | None) -> int:
     parser.add_argument("--references", nargs="+", choices=get_args(References), default=["clean"])
     parser.add_argument("--poses", nargs="+", choices=("true", "estimated"), default=["true"])
     parser.add_argument("--views", nargs="+", choices=VIEWS, default=["held_out", "shift_2"])
-    parser.add_argument("--arms", nargs="+", choices=NAMES, default=list(NAMES))
+    parser.add_argument("--arms", nargs="+", choices=[*NAMES, *STEPS], default=list(NAMES))
     args = parser.parse_args()
     rows: list[Row] = []
     for case in [Case(s, p, r) for r in args.references for p in args.poses for s in args.seeds]:
@@ -69,6 +72,14 @@ def main(doc: str | None) -> int:
 
 
 def _options(name: str) -> Options:
+    if name in STEPS:
+        longer, times = QUALITIES["standard"], STEPS[name]
+        return replace(
+            longer,
+            knowledge=QUALITY.knowledge,
+            static=replace(longer.static, steps=times * longer.static.steps),
+            fit=replace(longer.fit, steps=times * longer.fit.steps),
+        )
     return replace(QUALITY, knowledge=NO_KNOWLEDGE) if name == WITHOUT else QUALITY
 
 
@@ -79,7 +90,7 @@ def _views(case: Case, names: tuple[str, ...]) -> dict[str, Seen]:
 def _measured(case: Case, name: str, views: Callable[[], dict[str, Seen]]) -> Row:
     if name == CEILING:
         return ceiling(views())
-    return judged(case, _options(name), NAMES[name] or (), views())
+    return judged(case, _options(name), NAMES.get(name) or (), views())
 
 
 def _line(row: Row) -> str:
