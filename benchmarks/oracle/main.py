@@ -25,9 +25,8 @@ from street.views import views_digest
 
 Row = dict[str, Any]
 AS_IT_IS, WITHOUT, CEILING = "as it is", "none", "ceiling"
-STANDARD, LONGER, LONGER_BY = "standard", "longer", 5
 NAMES = {WITHOUT: None, **{"+".join(arm) or AS_IT_IS: arm for arm in ARMS}, CEILING: None}
-STEPS = {STANDARD: 1, LONGER: LONGER_BY}
+STEPS = {"standard": 1, "longer": 5}
 """Arms that take the steps of ``standard`` in place of those of ``draft``, or a multiple of them."""
 GROUPS = ("all", "standing", "moving", "unseen")
 

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from dreamdrive.decompose.body import Body, body_of
 from dreamdrive.decompose.completing import completed
+from dreamdrive.decompose.flow import cells
 from dreamdrive.decompose.glances import PlacingOptions
 from dreamdrive.decompose.group import Grouping, source_pixels
 from dreamdrive.decompose.lives import Glimpse, lives, misplaced
@@ -136,7 +137,7 @@ def _merge(
     options: ActorOptions,
     reach_px: float,
 ) -> Cast:
-    times, interval_s = np.unique(clip.times_s[~clip.held_out]), _interval_s(clip)
+    times, interval_s = np.unique(clip.times_s[~clip.held_out]), clip.seen_interval_s
     logit = math.log(options.opacity / (1 - options.opacity))
     chosen = replace(chosen, logit_opacities=torch.full_like(chosen.logit_opacities, logit))
     frames = chosen.source_frame.numpy()
@@ -201,16 +202,10 @@ def _kind(clip: Clip, frames: Int[np.ndarray, " m"], pixels: Float[np.ndarray, "
     for frame in np.unique(frames).tolist():
         camera = int(clip.camera[frame])
         shown = clip.looks[camera].classes[int((clip.camera[:frame] == camera).sum())]
-        column, row = np.floor(pixels[frames == frame, :2]).astype(int).T
-        seen = shown[row.clip(0, shown.shape[0] - 1), column.clip(0, shown.shape[1] - 1)]
+        seen = shown[cells(pixels[frames == frame], shown.shape)]
         votes += np.bincount(seen, minlength=len(votes))
     most = max(ROAD_USERS, key=lambda each: votes[each])
     return most.name.lower().replace("_", "-") if votes[most] else UNKNOWN
-
-
-def _interval_s(clip: Clip) -> float:
-    """Between training frames."""
-    return float(np.median(np.diff(np.unique(clip.times_s[~clip.held_out]))))
 
 
 def _cast(copies: Gaussians, actor: int, spans: Float[Tensor, "n 2"]) -> Gaussians:
@@ -264,7 +259,7 @@ def _spans(
     options: ActorOptions,
     reach_px: float,
 ) -> Float[Tensor, "n 2"]:
-    deviation_s = options.lifespan_frames * _interval_s(clip)
+    deviation_s = options.lifespan_frames * clip.seen_interval_s
     if not options.lasting:
         times_s = _times(clip, copies)
         return torch.stack([times_s, torch.full_like(times_s, deviation_s)], dim=1)

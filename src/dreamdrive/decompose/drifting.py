@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from dreamdrive.decompose.flow import carried, in_between, neighbour_flow
+from dreamdrive.decompose.flow import carried, cells, in_between, neighbour_flow
 from dreamdrive.decompose.group import source_pixels
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -76,8 +76,7 @@ def drifting(clip: Clip, geometry: Geometry, seeds: Gaussians, options: DriftOpt
     what stands stays where path and depth are right. Held-out frames are not read.
     """
     times_s = torch.from_numpy(clip.times_s)[seeds.source_frame].to(torch.float32)
-    interval_s = float(np.median(np.diff(np.unique(clip.times_s[~clip.held_out]))))
-    span_s = torch.full_like(times_s, options.lifespan_frames * interval_s)
+    span_s = torch.full_like(times_s, options.lifespan_frames * clip.seen_interval_s)
     logit = float(np.log(options.opacity / (1 - options.opacity)))
     return replace(
         seeds,
@@ -114,7 +113,7 @@ def _depth_m(
 
     What drives along keeps its distance and what stands comes nearer; only depth tells them apart.
     """
-    there_m = geometry.depth_m[frame][_cells(pixels, geometry.depth_m.shape)].astype(np.float64)
+    there_m = geometry.depth_m[frame][cells(pixels, geometry.depth_m.shape[1:])].astype(np.float64)
     like = np.abs(np.log(np.maximum(there_m, 1e-6) / expected_m)) < _LIKE
     return np.where(like, there_m, expected_m)
 
@@ -124,21 +123,13 @@ def pixels_of(
 ) -> Bool[np.ndarray, "f h w"]:
     """Pixels (F, H, W) that some Gaussians were seeded from, with those around."""
     mask = np.zeros(geometry.depth_m.shape, dtype=np.uint8)
-    row, column = _cells(source_pixels(geometry, gaussians, index), mask.shape)
-    mask[gaussians.source_frame.numpy()[index], row, column] = 1
+    places = cells(source_pixels(geometry, gaussians, index), mask.shape[1:])
+    mask[gaussians.source_frame.numpy()[index], *places] = 1
     box = np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
     return np.stack([cv2.dilate(each, box) for each in mask]) > 0
 
 
 def outside(geometry: Geometry, seeds: Gaussians, mask: Bool[np.ndarray, "f h w"]) -> Bool[Tensor, " n"]:
     """Which seeds do not lie in the mask of their frame."""
-    row, column = _cells(source_pixels(geometry, seeds, np.arange(len(seeds))), mask.shape)
-    return torch.from_numpy(~mask[seeds.source_frame.numpy(), row, column])
-
-
-def _cells(
-    pixels: Float[np.ndarray, "m c"], shape: tuple[int, ...]
-) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-    """Row and column of points (column, row, ...) of pictures of a shape (F, H, W), at its border outside."""
-    column, row = np.floor(pixels[:, :2]).astype(np.intp).T
-    return row.clip(0, shape[1] - 1), column.clip(0, shape[2] - 1)
+    places = cells(source_pixels(geometry, seeds, np.arange(len(seeds))), mask.shape[1:])
+    return torch.from_numpy(~mask[seeds.source_frame.numpy(), *places])

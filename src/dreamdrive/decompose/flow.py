@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.clip import Clip
 
@@ -12,11 +12,17 @@ def grey(frame: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w"]:
     return cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
 
 
+def cells(
+    points: Float[np.ndarray, "m c"], shape: tuple[int, ...]
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Row and column of points (column, row, ...) in a picture (H, W); of those outside, at its border."""
+    column, row = np.floor(points[:, :2]).astype(np.intp).T
+    return row.clip(0, shape[0] - 1), column.clip(0, shape[1] - 1)
+
+
 def carried(points: Float[np.ndarray, "m 2"], flow: Float[np.ndarray, "h w 2"]) -> Float[np.ndarray, "m 2"]:
     """Where flow takes points (column, row); points outside move like the nearest pixel of the border."""
-    column = points[:, 0].astype(int).clip(0, flow.shape[1] - 1)
-    row = points[:, 1].astype(int).clip(0, flow.shape[0] - 1)
-    return points + flow[row, column]
+    return points + flow[cells(points, flow.shape[:2])]
 
 
 def neighbour_flow(

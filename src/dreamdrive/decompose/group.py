@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from dreamdrive.decompose.density import density_labels, voted
-from dreamdrive.decompose.flow import carried, neighbour_flow
+from dreamdrive.decompose.flow import carried, cells, neighbour_flow
 from dreamdrive.decompose.on_road import on_road
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
@@ -129,9 +129,7 @@ def _labels(
     """One label a thing: road users that were followed are one each; flow joins the rest."""
     if geometry.users is None or not options.users:
         return _space_time_labels(clip, points, frames, options, reach_px)
-    height, width = geometry.users.shape[1:]
-    column, row = np.floor(points[:, :2]).astype(np.intp).T
-    user = geometry.users[frames, row.clip(0, height - 1), column.clip(0, width - 1)].astype(np.int64)
+    user = geometry.users[frames, *cells(points, geometry.users.shape[1:])].astype(np.int64)
     labels, rest = user - 1, user == 0
     others = _space_time_labels(clip, points[rest], frames[rest], options, reach_px)
     labels[rest] = others + int(user.max(initial=0))

@@ -134,7 +134,12 @@ class Clip:
     @property
     def interval_s(self) -> float:
         """Seconds between two frames, the median where they are not even."""
-        return float(np.median(np.diff(np.unique(self.times_s))))
+        return _interval_s(self.times_s)
+
+    @property
+    def seen_interval_s(self) -> float:
+        """The same between two frames that may be seen."""
+        return _interval_s(self.times_s[~self.held_out])
 
     @property
     def step(self) -> Int[np.ndarray, " f"]:
@@ -196,3 +201,7 @@ def pixel_features(clip: Clip, geometry: Geometry, frame: int) -> Float[np.ndarr
         resized = cv2.resize(feature, size, interpolation=cv2.INTER_LINEAR)
         maps.append(resized.reshape(size[1], size[0], -1))
     return np.concatenate(maps, axis=2).astype(np.float32)
+
+
+def _interval_s(times_s: Float[np.ndarray, " f"]) -> float:
+    return float(np.median(np.diff(np.unique(times_s))))

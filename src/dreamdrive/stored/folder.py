@@ -149,7 +149,6 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     parts = {f"{_BLOCK}-{name}.safetensors": _encode(tensors) for name, tensors in _tensors(scene).items()}
     index = {
         "format": FORMAT,
-        # Version 1 knows deformation fields alone, and does not name them.
         "version": _version(scene),
         "conventions": CONVENTIONS,
         "provenance": asdict(scene.provenance),
@@ -226,7 +225,10 @@ def _values(scene: Scene) -> dict[str, Any]:
 
 
 def _version(scene: Scene) -> int:
-    """The first format version that can hold a scene: 2 knows other motions, 3 a street that drifts."""
+    """The first format version that can hold a scene.
+
+    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a street that drifts.
+    """
     if scene.drifts:
         return VERSION
     return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else 2
