@@ -243,7 +243,8 @@ def _drifting(
 ) -> Gaussians | None:
     """A street that drifts, beside what moves; None where one that stands explains the frames."""
     moving = np.flatnonzero(labels.dynamic.numpy())
-    if explained(clip, geometry, errors(), pixels_of(geometry, seeds, moving, int(options.seeds.reach_px))):
+    moves = pixels_of(geometry, seeds, moving, int(options.seeds.reach_px))
+    if explained(clip, geometry, errors(), moves, options.drift):
         return None
     every = initialise(clip, replace(geometry, moving=np.ones_like(geometry.moving)), options.seeds)
     taken = pixels_of(geometry, seeds, moving, options.seeds.moving_stride_px // 2)

@@ -58,14 +58,22 @@ def test_a_street_is_explained_where_its_fit_is_better_than_the_frames_beside() 
     clip, geometry = wall(held_out=None)
     nothing = np.zeros(geometry.depth_m.shape, dtype=bool)
     perfect, blurred = np.zeros(nothing.shape, np.float32), np.full(nothing.shape, 0.3, np.float32)
-    assert explained(clip, geometry, perfect, nothing)
-    assert not explained(clip, geometry, blurred, nothing)
+    assert explained(clip, geometry, perfect, nothing, DriftOptions())
+    assert not explained(clip, geometry, blurred, nothing, DriftOptions())
     # What moves, the sky and what is invalid do not count, and with nothing left nothing speaks against it.
-    assert explained(clip, geometry, blurred, ~nothing)
-    assert explained(clip, replace(geometry, sky=~nothing), blurred, nothing)
-    assert explained(replace(clip, valid=nothing), geometry, blurred, nothing)
+    assert explained(clip, geometry, blurred, ~nothing, DriftOptions())
+    assert explained(clip, replace(geometry, sky=~nothing), blurred, nothing, DriftOptions())
+    assert explained(replace(clip, valid=nothing), geometry, blurred, nothing, DriftOptions())
     standing = replace(geometry, cameras=(geometry.cameras[0],) * FRAMES)
-    assert explained(clip, standing, blurred, nothing)
+    assert explained(clip, standing, blurred, nothing, DriftOptions())
+    # A street that is only a little behind the frames beside each frame stands.
+    reached = next(
+        error
+        for error in np.geomspace(1e-5, 0.3, 800)
+        if not explained(clip, geometry, perfect + error, nothing, DriftOptions(margin_db=0))
+    )
+    assert explained(clip, geometry, perfect + reached * 10 ** (0.4 / 20), nothing, DriftOptions())
+    assert not explained(clip, geometry, perfect + reached * 10 ** (0.6 / 20), nothing, DriftOptions())
 
 
 def test_seeds_drift_as_the_picture_does() -> None:

@@ -35,22 +35,30 @@ class DriftOptions:
             frames; the fit goes on from there. On the motorway 1.0 and 2.0 lose 0.3 dB; 0.7 lost more, as
             what lies between two frames fades.
         opacity: Opacity to start from.
+        margin_db: How far, in dB of PSNR, a street that stands may fall behind the frames beside each frame.
+            Frames that wobble, as those of a video model, are a little like their neighbours and unlike any
+            street; from aside one street still shows them best.
     """
 
     allowed: bool = True
     lifespan_frames: float = 1.4
     opacity: float = 0.8
+    margin_db: float = 0.5
 
 
 def explained(
-    clip: Clip, geometry: Geometry, errors: Float[np.ndarray, "f h w"], moves: Bool[np.ndarray, "f h w"]
+    clip: Clip,
+    geometry: Geometry,
+    errors: Float[np.ndarray, "f h w"],
+    moves: Bool[np.ndarray, "f h w"],
+    options: DriftOptions,
 ) -> bool:
-    """Whether a street that stands shows what stands at least as well as the frames beside each frame do.
+    """Whether a street that stands shows what stands about as well as the frames beside each frame do.
 
     The errors are those of a street fitted to all training frames, see ``error_maps``. Every frame is also
     made from its neighbours, which have not seen it, carried along optical flow. The mean over the frames of
-    the ratio of both mean squares decides. Sky, what ``moves`` and what is fixed to the camera do not count.
-    A camera that stays at one place explains all that stands.
+    the ratio of both mean squares decides, in dB against the margin. Sky, what ``moves`` and what is fixed to
+    the camera do not count. A camera that stays at one place explains all that stands.
     """
     if geometry.at_one_place:
         return True
@@ -65,8 +73,8 @@ def explained(
             beside = in_between(clip, before, frame, after) - clip.frames[frame] / np.float32(255)
             maps = errors[frame], np.abs(beside).mean(axis=2)
             standing, carried_on = (float(np.square(each[judged]).mean()) for each in maps)
-            gains.append(float(np.log(max(carried_on, 1e-8) / max(standing, 1e-8))))
-    return not gains or float(np.mean(gains)) >= 0
+            gains.append(float(10 * np.log10(max(carried_on, 1e-8) / max(standing, 1e-8))))
+    return not gains or float(np.mean(gains)) >= -options.margin_db
 
 
 def drifting(clip: Clip, geometry: Geometry, seeds: Gaussians, options: DriftOptions) -> Gaussians:
