@@ -143,6 +143,7 @@ PRIORS: "Table[Prior]" = Table(
     {
         "replay": "dreamdrive.prior.replay:REPLAY",
         "street-world": "dreamdrive.prior.street_world:STREET_WORLD",
+        "photo": "dreamdrive.prior.photo:PHOTO",
         "svd": "dreamdrive.prior.vista:SVD",
         "vista": "dreamdrive.prior.vista:VISTA",
         "magicdrive": "dreamdrive.prior.magicdrive:MAGICDRIVE",

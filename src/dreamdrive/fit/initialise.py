@@ -6,19 +6,13 @@ import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
-from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, pixel_features
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.geometry import Geometry
-
-# Relative depth step above which neighbouring pixels are taken to lie on different surfaces.
-DEPTH_EDGE = 0.08
-# A disc seen at a grazing angle is stretched along its surface at most this much, and is this thin.
-MAX_STRETCH = 3.0
-THICKNESS = 0.3
+from dreamdrive.scene.surfels import surfels, tangents
 
 
 @dataclass(frozen=True)
@@ -158,11 +152,10 @@ def _seeds(
     stride = np.where(moving, options.moving_stride_px, options.stride_px)
     rotation = camera.world_from_camera[:3, :3]
     points = camera.rays() * depth[..., None]
-    steps = [_tangent(points, depth, focal, axis) for axis, focal in ((1, camera.fx_px), (0, camera.fy_px))]
-    tangents = np.stack(steps, axis=2)[chosen] * stride[:, None, None]
+    steps = tangents(camera, depth)[chosen] * stride[:, None, None]
     return _Seeds(
         points=points[chosen] @ rotation.T + camera.world_from_camera[:3, 3],
-        tangents=tangents @ rotation.T,
+        tangents=steps @ rotation.T,
         spacing_m=depth[chosen] / camera.fx_px * stride,
         colour=clip.frames[frame][chosen].astype(np.float64) / 255,
         confidence=geometry.confidence[frame][chosen],
@@ -172,25 +165,10 @@ def _seeds(
     )
 
 
-def _tangent(
-    points: Float[np.ndarray, "h w 3"], depth: Float[np.ndarray, "h w"], focal_px: float, axis: int
-) -> Float[np.ndarray, "h w 3"]:
-    """Step (H, W, 3) on the surface for one pixel along ``axis``; fronto-parallel across depth edges."""
-    ahead = np.roll(points, -1, axis) - points
-    ratio = np.abs(np.roll(depth, -1, axis) / np.maximum(depth, 1e-6) - 1)
-    if axis == 1:
-        ratio[:, -1] = np.inf
-    else:
-        ratio[-1] = np.inf
-    flat = np.zeros_like(points)
-    flat[..., 1 - axis] = depth / focal_px
-    return np.where((ratio < DEPTH_EDGE)[..., None], ahead, flat)
-
-
 def _gaussians(kept: list[_Seeds], options: SeedOptions) -> Gaussians:
-    tangents = np.concatenate([s.tangents for s in kept])
+    steps = np.concatenate([s.tangents for s in kept])
     spacing = np.concatenate([s.spacing_m for s in kept])
-    rotations, extents = _surfels(tangents, spacing)
+    rotations, extents = surfels(steps, spacing)
     scales = extents * options.footprint
     colour = np.concatenate([s.colour for s in kept])
     confidence = np.concatenate([s.confidence for s in kept])
@@ -211,21 +189,3 @@ def _gaussians(kept: list[_Seeds], options: SeedOptions) -> Gaussians:
 
 def _tensor(values: np.ndarray) -> Float[torch.Tensor, "..."]:
     return torch.tensor(values, dtype=torch.float32)
-
-
-def _surfels(
-    tangents: Float[np.ndarray, "n 2 3"], spacing: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, "n 4"], Float[np.ndarray, "n 3"]]:
-    """Rotations (N, 4) wxyz and extents (N, 3) of discs that lie on the surface, touching each other."""
-    first, second = tangents[:, 0], tangents[:, 1]
-    normal = _unit(np.cross(first, second))
-    x_axis = _unit(first - (first * normal).sum(1, keepdims=True) * normal)
-    y_axis = np.cross(normal, x_axis)
-    quaternions = Rotation.from_matrix(np.stack([x_axis, y_axis, normal], axis=2)).as_quat()[:, [3, 0, 1, 2]]
-    along = np.stack([np.abs((first * x_axis).sum(1)), np.abs((second * y_axis).sum(1))], axis=1)
-    along = np.clip(along, spacing[:, None], MAX_STRETCH * spacing[:, None])
-    return quaternions, np.concatenate([along, THICKNESS * spacing[:, None]], axis=1)
-
-
-def _unit(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)

@@ -12,7 +12,7 @@ choose_prior = PRIORS.choose
 
 
 def prior_of(path: Path | None, with_weights: bool = False) -> str:
-    """The prior for an input where none is named: a layout is drawn, anything else is a recording.
+    """The prior for an input where none is named: a layout is drawn, a photo driven into, all else replayed.
 
     Args:
         path: The input.
@@ -21,8 +21,11 @@ def prior_of(path: Path | None, with_weights: bool = False) -> str:
     Raises:
         InputError: The input is a photo and a network is given: which model it is has to be named.
     """
-    if with_weights and path is not None and path.is_file() and path.suffix.lower() in SUFFIXES:
-        raise InputError(
-            f"{path} is a photo: name the video model of --weights with --prior NAME, such as --prior vista"
-        )
+    if path is not None and path.is_file() and path.suffix.lower() in SUFFIXES:
+        if with_weights:
+            raise InputError(
+                f"{path} is a photo: name the video model of --weights with --prior NAME, such as "
+                "--prior vista"
+            )
+        return "photo"
     return "street-world" if path is not None and path.suffix.lower() == ".json" else "replay"

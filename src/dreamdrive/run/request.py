@@ -37,7 +37,8 @@ class Request:
     @property
     def reading(self) -> list[object]:
         """All that the frames depend on."""
-        files = {name: value for name, value in self.digests.items() if name not in ("weights", "knowledge")}
+        others = {"weights"} if self.control.knowledge is not None else {"weights", "knowledge"}
+        files = {name: value for name, value in self.digests.items() if name not in others}
         packages = PRIORS.package(self.prior) | DATASETS.package(self.control.dataset)
         return [self.prior, packages, self.control.settings, files, self.control.seed]
 
@@ -60,8 +61,8 @@ class Request:
             "prior": self.prior,
             "geometry": geometry.pop("method"),
             "quality": self.quality,
-            **geometry,
             **self.control.settings,
+            **geometry,
             **options,
         }
         return {"digests": self.digests, "options": chosen, "seed": self.control.seed}
@@ -80,6 +81,7 @@ def request_of(
     prior = prior or ("replay" if control.dataset else prior_of(control.path, weights is not None))
     whole = QUALITIES[options] if isinstance(options, str) else options
     control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)
+    control = _with_look(control, prior, whole)
     choose_prior(prior).check(control)
     geometry = replace(whole.geometry, weights=network)
     backend_of(geometry.method, network)
@@ -114,6 +116,13 @@ def _with_networks(
         weights, geometry_weights = None, geometry_weights or weights
     made = control if weights is None else replace(control, weights=find_weights(weights))
     return made, None if geometry_weights is None else find_weights(geometry_weights)
+
+
+def _with_look(control: Control, prior: str, options: Options) -> Control:
+    """The control with what the geometry is told of the camera and asks of it, for priors that look, too."""
+    told = {"knowledge": options.knowledge, "camera_height_m": options.geometry.camera_height_m}
+    taken = choose_prior(prior).takes
+    return replace(control, **{name: value for name, value in told.items() if name in taken})
 
 
 def _with_lens(control: Control, geometry_files: Path | None) -> Control:

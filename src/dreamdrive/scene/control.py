@@ -7,7 +7,7 @@ from typing import Any
 from dreamdrive.errors import InputError
 from dreamdrive.scene.action import Action
 
-FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features")
+FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features", "knowledge")
 """Fields of ``Control`` that name files; they count by their content."""
 
 
@@ -30,6 +30,8 @@ class Control:
         steps: Steps of a diffusion sampler.
         weights: The prior's network, a file or folder.
         features: File with features of the input's frames.
+        camera_height_m: Height of the camera above the road, for priors that make metres of it.
+        knowledge: Weights of the street network, for priors that look at their input: a name or a file.
         hold_out: Withhold the selected frames i with i mod N = N // 2.
         seed: Seed of everything the prior draws.
     """
@@ -48,6 +50,8 @@ class Control:
     steps: int | None = None
     weights: Path | None = None
     features: Path | None = None
+    camera_height_m: float | None = None
+    knowledge: str | None = None
     hold_out: int | None = None
     seed: int = 0
 

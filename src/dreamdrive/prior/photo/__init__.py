@@ -1,0 +1,27 @@
+"""A photo becomes a drive, with nothing downloaded: its street in layers, drawn along the path."""
+
+from dreamdrive.prior.photo.make import make_clip
+from dreamdrive.prior.protocol import Prior
+
+PHOTO = Prior(
+    name="photo",
+    make=make_clip,
+    takes=frozenset(
+        {
+            "path",
+            "frames",
+            "size",
+            "hfov_deg",
+            "intrinsics",
+            "hold_out",
+            "action",
+            "trajectory",
+            "camera_height_m",
+            "knowledge",
+        }
+    ),
+    gives="25 frames at 10 Hz with the poses, depth and sky that they were drawn from",
+    about="a photo becomes a street in layers, by the street network, and is driven into",
+    licence="Apache-2.0, as all of dreamdrive",
+    memory="0.6 GB for 25 frames at 480x270",
+)

@@ -1,0 +1,179 @@
+"""A photo as Gaussians in layers: what it shows, what that hides, and what goes on beyond its borders."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.prior.photo.fill import continued, inpainted
+from dreamdrive.prior.photo.street import FAR_M, FLAT, Street
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import SH_C0, Gaussians
+from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
+from dreamdrive.scene.surfels import surfels, tangents
+
+_THIN = (*ROAD_USERS, StreetClass.POLE)
+"""What something goes on behind: all of it is hidden street."""
+
+
+@dataclass(frozen=True)
+class LayerOptions:
+    """How far a photo goes on.
+
+    Attributes:
+        reach_px: How far behind the edge of what is near the street goes on, at a picture 480 wide.
+        beyond: How far it goes on beyond the left, right and lower border, as a share of its width.
+        edge: Relative step in depth from which something hides what is behind it.
+        opacity: Of every Gaussian.
+        footprint: Standard deviation over the distance between pixels.
+        stretch: How long a disc may be along a surface that is seen at a grazing angle, as the road is.
+    """
+
+    reach_px: int = 20
+    beyond: float = 0.25
+    edge: float = 0.12
+    opacity: float = 0.95
+    footprint: float = 0.5
+    stretch: float = 20.0
+
+
+@dataclass(frozen=True)
+class Layers:
+    """A photo in space.
+
+    Attributes:
+        gaussians: Of all layers; ``source_frame`` is 0 for what the photo shows, 1 for what is made up.
+        users: 1 + the index of the road user that each belongs to (N,); 0 for what stands.
+        sky: Behind them.
+    """
+
+    gaussians: Gaussians
+    users: Float[np.ndarray, " n"]
+    sky: Sky
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """Pixels with depth; 0 where there is nothing."""
+
+    rgb: UInt8[np.ndarray, "h w 3"]
+    depth_m: Float[np.ndarray, "h w"]
+
+
+def layers_of(street: Street, options: LayerOptions = LayerOptions()) -> Layers:
+    """All that a drive into the photo may uncover."""
+    margin = round(options.beyond * street.camera.width_px)
+    wide = _widened(street, margin)
+    inside = np.zeros(wide.classes.shape, bool)
+    inside[: street.camera.height_px, margin : margin + street.camera.width_px] = True
+    behind = _behind(wide, options)
+    front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, options)
+    back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), options)
+    users = np.concatenate([wide.users[wide.depth_m > 0], np.zeros(len(back))])
+    return Layers(Gaussians.concatenate(front, back), users.astype(np.float64), sky_of(street))
+
+
+def _widened(street: Street, margin: int) -> Street:
+    """The street beyond the photo: the road goes on, all else is mirrored and no nearer than the border."""
+
+    def wider(values: np.ndarray, border: int) -> np.ndarray:
+        return np.asarray(cv2.copyMakeBorder(values, 0, margin, margin, margin, border))
+
+    camera = replace(
+        street.camera,
+        cx_px=street.camera.cx_px + margin,
+        width_px=street.camera.width_px + 2 * margin,
+        height_px=street.camera.height_px + margin,
+    )
+    own = (street.classes == StreetClass.OWN_CAR).astype(np.uint8)
+    rgb = inpainted(street.rgb, cv2.dilate(own, np.ones((5, 5))) > 0) if own.any() else street.rgb
+    classes = street.classes.copy()
+    classes[own > 0] = StreetClass.ROAD
+    depth = street.depth_m.copy()
+    users = cv2.copyMakeBorder(street.users, 0, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
+    hidden = np.isin(classes, _THIN)
+    empty = inpainted(rgb, cv2.dilate(hidden.astype(np.uint8), np.ones((5, 5))) > 0)
+    rgb_out = wider(empty, cv2.BORDER_REFLECT_101)
+    height, width = classes.shape
+    rgb_out[:height, margin : margin + width] = rgb
+    classes = wider(np.where(hidden, StreetClass.STRUCTURE, classes).astype(np.uint8), cv2.BORDER_REPLICATE)
+    classes[:height, margin : margin + width] = np.where(own > 0, StreetClass.ROAD, street.classes)
+    depth = wider(depth, cv2.BORDER_REPLICATE)
+    plane = street.ground.depth_m(camera)
+    outside = np.ones(classes.shape, bool)
+    outside[:height, margin : margin + width] = own > 0
+    flat = outside & (np.isin(classes, FLAT) | (plane < depth))
+    depth = np.where(flat, np.minimum(plane, FAR_M), depth)
+    depth[outside & (classes == StreetClass.SKY)] = 0
+    return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
+
+
+def _behind(street: Street, options: LayerOptions) -> _Sheet:
+    """What is hidden: the street without road users and poles, and what goes on behind edges."""
+    solid, plane = street.depth_m > 0, street.ground.depth_m(street.camera)
+    thin = np.isin(street.classes, _THIN)
+    reach = 2 * round(options.reach_px * street.camera.width_px / 480) + 1
+    inverse = np.where(solid, 1 / np.maximum(street.depth_m, 1e-3), 1 / FAR_M).astype(np.float32)
+    farther = cv2.erode(inverse, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
+    smooth = cv2.blur(farther, (reach // 2, reach // 2))
+    # A road user's whole shape hides something: there depth runs from what is beside it to the other side.
+    around = ~cv2.dilate(thin.astype(np.uint8), np.ones((3, 3))).astype(bool) & solid
+    across = continued(inverse[..., None], around.astype(np.float32))[..., 0]
+    inverse_behind = np.maximum(np.where(thin, across, smooth), 1 / FAR_M)
+    depth = np.minimum(1 / inverse_behind, plane)
+    hidden = solid & (thin | (depth > (1 + options.edge) * street.depth_m)) & (depth > 1.02 * street.depth_m)
+    source = inpainted(street.rgb, cv2.dilate(hidden.astype(np.uint8), np.ones((3, 3))) > 0)
+    sky = cv2.dilate((street.classes == StreetClass.SKY).astype(np.uint8), np.ones((reach, reach))) > 0
+    open_ = sky & (1 / inverse_behind >= 0.8 * FAR_M) & (plane > FAR_M)
+    return _Sheet(source, np.where(hidden & ~open_, depth, 0).astype(np.float32))
+
+
+def _gaussians(
+    sheet: _Sheet, camera: Camera, shown: Bool[np.ndarray, "h w"], options: LayerOptions
+) -> Gaussians:
+    """A disc for each pixel that has depth."""
+    chosen, depth = sheet.depth_m > 0, sheet.depth_m.astype(np.float64)
+    spacing = depth[chosen] / camera.fx_px
+    rotations, extents = surfels(tangents(camera, depth)[chosen], spacing, options.stretch)
+    colour = sheet.rgb[chosen].astype(np.float64) / 255
+    count = len(spacing)
+    return Gaussians(
+        means=_tensor((camera.rays() * depth[..., None])[chosen]),
+        quaternions=_tensor(rotations),
+        log_scales=_tensor(np.log(extents * options.footprint)),
+        logit_opacities=torch.full((count,), float(np.log(options.opacity / (1 - options.opacity)))),
+        sh=_tensor((colour - 0.5) / SH_C0)[:, None],
+        source_frame=torch.from_numpy(np.where(shown[chosen], 0, 1)),
+    )
+
+
+def _tensor(values: np.ndarray) -> Float[torch.Tensor, "..."]:
+    return torch.tensor(values, dtype=torch.float32)
+
+
+def sky_of(street: Street) -> Sky:
+    """The photo's sky, continued in all directions ahead; below it a blur of what stands there."""
+    reach = np.pi / 2
+    texel_rad = 2 / street.camera.fx_px
+    rows, columns = round(2 * reach / texel_rad), round(2 * reach / texel_rad)
+    azimuth = np.linspace(-reach, reach, columns, dtype=np.float32)[None, :]
+    elevation = np.linspace(reach, -reach, rows, dtype=np.float32)[:, None]
+    ahead = np.cos(elevation) * np.cos(azimuth)
+    x, y = np.cos(elevation) * np.sin(azimuth), -np.sin(elevation) * np.ones_like(azimuth)
+    camera, safe = street.camera, np.maximum(ahead, 1e-3)
+    u = (camera.fx_px * x / safe + camera.cx_px - 0.5).astype(np.float32)
+    v = (camera.fy_px * y / safe + camera.cy_px - 0.5).astype(np.float32)
+    own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((3, 3)))
+    clear = cv2.erode(street.sky.astype(np.uint8), np.ones((5, 5))).astype(np.float32)
+    colours = street.rgb.astype(np.float32) / 255
+    backdrop = continued(colours, (own == 0).astype(np.float32))
+    sky = continued(colours, clear) if clear.any() else backdrop
+    low = cv2.GaussianBlur(backdrop, (0, 0), street.camera.width_px / 40)
+    is_sky = cv2.dilate(street.sky.astype(np.uint8), np.ones((9, 9)))[..., None] > 0
+    level = (street.ground.depth_m(camera) > FAR_M)[..., None]
+    shown = np.where(is_sky | level, sky, low).astype(np.float32)
+    texture = cv2.remap(shown, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return Sky(_tensor(texture), (-reach, reach), (-reach, reach))

@@ -1,0 +1,160 @@
+"""A drive into a photo."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from dreamdrive.data.photo import Photo, read_photo
+from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.size import check_largest
+from dreamdrive.errors import InputError
+from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
+from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.photo.fill import inpainted
+from dreamdrive.prior.photo.layers import Layers, layers_of
+from dreamdrive.prior.photo.street import Street, street_of
+from dreamdrive.prior.photo.way import path_for
+from dreamdrive.progress import Progress
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.look import Look
+from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.splat import render
+
+FRAMES = 25
+RATE_HZ = 10.0
+SIZE = (480, 270)
+HEIGHT_M = 1.5
+_MOST_FRAMES = 1000
+_HALF = 0.5
+_EDGE = 0.1
+_LEAST_SOLID = 0.05
+
+
+def make_clip(control: Control, progress: Progress) -> Clip:
+    """The frames of a drive, with the poses, depth, sky and road that they were drawn from."""
+    if control.path is None:
+        raise InputError("the prior photo needs an input: a photo of a street")
+    if control.knowledge == NO_KNOWLEDGE:
+        raise InputError("the prior photo sees depth by the street network; leave --knowledge none out")
+    size = control.size or SIZE
+    if size[0] % 2 or size[1] % 2:
+        raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
+    check_largest(size, f"--size {size[0]}x{size[1]}")
+    wanted = _wanted(control.frames)
+    photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg)
+    street, seen = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m or HEIGHT_M)
+    layers = layers_of(street)
+    path = path_for(control, street, wanted / RATE_HZ)
+    frames, depth_m, sky = _driven(street, layers, path.world_from_camera, progress)
+    first = np.linalg.inv(path.world_from_camera[0])
+    valid = np.ones(frames.shape[:3], bool)
+    return Clip(
+        frames=frames,
+        times_s=(wanted - wanted[0]) / RATE_HZ,
+        camera=np.zeros(len(wanted), np.int64),
+        rig=(street.camera,),
+        valid=valid,
+        held_out=held_out_mask(len(wanted), control.hold_out),
+        source_index=wanted,
+        features={"appearance": appearance(frames, valid)},
+        known=Known(
+            world_from_camera=first @ path.world_from_camera,
+            intrinsics=True,
+            depth_m=depth_m,
+            sky=sky,
+            generated=True,
+        ),
+        requested=path if control.trajectory is not None else None,
+        provenance={"prior": "photo", "notes": [*photo.notes, *_notes(control, photo, seen)]},
+    )
+
+
+def seen_in(photo: Photo, knowledge: str, height_m: float) -> tuple[Street, Look]:
+    """The street of a photo, and what the network saw in it.
+
+    Raises:
+        InputError: Nothing solid is seen.
+    """
+    told = photo.calibrated or photo.hfov
+    seen = look(photo.rgb[None], knowledge, focal_px=photo.camera.fx_px if told else None)
+    camera = photo.camera
+    if not told:
+        stretch = camera.fy_px / camera.fx_px
+        camera = replace(camera, fx_px=seen.camera.focal_px, fy_px=seen.camera.focal_px * stretch)
+    street = street_of(photo.rgb, camera, seen, height_m)
+    if float((street.depth_m > 0).mean()) < _LEAST_SOLID:
+        raise InputError(
+            "the photo shows nothing solid: nearly all of it is taken for sky or for the own car; "
+            "expected a street, seen from a car"
+        )
+    return street, seen
+
+
+def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
+    """Indices of the frames to make, counted from the photo."""
+    selection = Selection.parse(frames)
+    if selection.needs_count:
+        raise InputError(f"--frames {frames}: count from the photo; there is no last frame")
+    if selection.stop is None:
+        selection = replace(selection, stop=max(FRAMES, selection.start + FRAMES))
+    wanted = selection.resolve(None, "the drive")
+    if len(wanted) < 2 or wanted[-1] >= _MOST_FRAMES:
+        raise InputError(
+            f"--frames {frames} asks for {len(wanted)} frames up to number {wanted[-1]}; expected two or "
+            f"more below {_MOST_FRAMES}"
+        )
+    return np.array(wanted, np.int64)
+
+
+def _driven(
+    street: Street, layers: Layers, poses: Float[np.ndarray, "f 4 4"], progress: Progress
+) -> tuple[UInt8[np.ndarray, "f h w 3"], Float[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
+    """Frames, depth and sky along a path; the photo itself where the path begins."""
+    drawn: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for number, pose in enumerate(poses):
+        frame, depth, sky = view(layers, street.camera.at(pose), street)
+        if np.allclose(pose, np.eye(4)):
+            own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5)))
+            frame = np.where(own[..., None] > 0, frame, street.rgb)
+        drawn.append((frame, depth, sky))
+        progress(number + 1, len(poses))
+    frames, depth_m, sky = (np.stack(each) for each in zip(*drawn, strict=True))
+    return frames, depth_m, sky
+
+
+def view(
+    layers: Layers, camera: Camera, street: Street
+) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """What a camera sees of the layers: picture, depth along z (0 where unknown), and sky."""
+    drawn = render(layers.gaussians, camera)
+    alpha = drawn.alpha.numpy()
+    colour = drawn.colour + (1 - drawn.alpha)[..., None] * layers.sky.colour(camera)
+    picture = np.rint(np.clip(colour.numpy(), 0, 1) * 255).astype(np.uint8)
+    below = np.isfinite(street.ground.depth_m(camera))
+    empty = alpha < _HALF
+    depth = drawn.expected_depth_m().numpy()
+    near, far = cv2.erode(depth, np.ones((3, 3))), cv2.dilate(depth, np.ones((3, 3)))
+    mixed = (depth > (1 + _EDGE) * near) & (depth < far / (1 + _EDGE))
+    return inpainted(picture, empty & below), np.where(empty | mixed, 0, depth), empty & ~below
+
+
+def _notes(control: Control, photo: Photo, seen: Look) -> list[str]:
+    notes = ["The frames are drawn from one photo: what it does not show is made up."]
+    if not (photo.calibrated or photo.hfov):
+        spread = 100 * seen.camera.focal_spread
+        notes.append(
+            f"The field of view, {np.rad2deg(seen.camera.hfov_rad):.0f} degrees, is what the street network "
+            f"takes the photo for (focal length within {spread:.0f} %); --hfov tells it."
+        )
+    if seen.camera.distorted > _HALF:
+        notes.append(
+            "The lens seems to bend straight lines: what is near the borders will be off; --intrinsics takes "
+            "the bend out."
+        )
+    if control.camera_height_m is None:
+        notes.append(f"Metres rest on a camera {HEIGHT_M:g} m above the road; --camera-height tells it.")
+    return notes
