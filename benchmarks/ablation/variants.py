@@ -7,6 +7,7 @@ from typing import Any
 from ablation.errors import by_frame, dssim_errors, feature_errors, own_errors, scored_on
 from ablation.features import with_appearance, with_efficientnet, with_evidence, without_features
 from ablation.groups import by_density, by_density_and_features, by_voxels
+from dreamdrive.decompose import DriftOptions
 from dreamdrive.options import Options
 from street.fit import Around, with_steps
 from street.methods import QUALITY, options_of
@@ -139,6 +140,11 @@ VARIANTS = {
     "no-residual": Variant("tracks alone, F_deform stays 0", fitted_with(deformation_rate=0.0)),
     "short-lives": Variant("what no other frame sees lives no longer", played(lasting=False)),
     "brief-lives": Variant("copies that others replace live a third as long", played(lifespan_frames=_SHORT)),
+    "no-completing": Variant("what no frame saw of a vehicle stays empty", played(complete=False)),
+    "no-stray": Variant("what moves may cover what stands for nothing", fitted_with(stray_weight=0.0)),
+    "no-drift": Variant(
+        "no street drifts", lambda options: replace(options, drift=DriftOptions(allowed=False))
+    ),
     "paper-loss": Variant("joint fit with L1 + SSIM unweighted (eq. 14)", fitted_with(loss="paper")),
     "no-depth": Variant("joint fit without the term on depth", fitted_with(depth_weight=0.0)),
     "no-densify": Variant("nothing grows or is pruned", grown(start=1.0, stop=0.0)),

@@ -1,6 +1,8 @@
 """A photo becomes a drive, with nothing downloaded: its street in layers, drawn along the path."""
 
-from dreamdrive.prior.photo.make import make_clip
+from dreamdrive.prior.photo.layers import Layers, layers_of
+from dreamdrive.prior.photo.make import make_clip, seen_in, view
+from dreamdrive.prior.photo.street import Street
 from dreamdrive.prior.protocol import Prior
 
 PHOTO = Prior(

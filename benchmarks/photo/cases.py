@@ -1,0 +1,79 @@
+"""Pictures to begin from, and what was truly seen later and from aside."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from common.pandaset_truth import camera_path, pinhole
+from common.places import DATA
+from dreamdrive.data.images import read_image
+from dreamdrive.data.size import cover
+from dreamdrive.scene.camera import Camera
+from dreamdrive.world import Drive, make_street
+from photo.ways import Start
+
+SIZE = (480, 270)
+RATE_HZ = 10.0
+AHEAD_S = (0.5, 1.0, 2.0)
+FRAMES = round(AHEAD_S[-1] * RATE_HZ) + 1
+ASIDE_M = 1.0
+PANDASET_STARTS = range(20, 60, 4)
+"""Frames of the moving part from which two seconds are left."""
+PANDASET_HEIGHT_M = 2.2
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a camera truly saw: its pose in the frame of the first picture's camera."""
+
+    name: str
+    pose: Float[np.ndarray, "4 4"]
+    rgb: UInt8[np.ndarray, "h w 3"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One picture and what is to be told from it; ``made`` is the truth of a drawn street."""
+
+    name: str
+    start: Start
+    sights: list[Sight]
+    made: Drive | None = None
+
+
+def drawn(seed: int) -> Case:
+    """A street of edition 2; its lens is told to nobody."""
+    made = make_street(seed, FRAMES, RATE_HZ, SIZE, edition=2)
+    camera = made.cameras[0]
+    height_m = abs(float(made.ground.height_m(camera.world_from_camera[:3, 3])))
+    sights = [
+        Sight(f"{s:g} s", made.cameras[k].world_from_camera, made.frames[k])
+        for s, k in ((s, round(s * RATE_HZ)) for s in AHEAD_S)
+    ]
+    for side in (-1, 1):
+        pose = np.eye(4)
+        pose[0, 3] = side * ASIDE_M
+        sights.append(Sight("1 m aside", pose, made.views([camera.at(pose)], [0.0])[0].frame))
+    return Case(f"street {seed}", Start(made.frames[0], camera, height_m, calibrated=False), sights, made)
+
+
+def pandaset() -> Iterator[Case]:
+    """Frames of the clip's moving part, with its calibration and poses."""
+    folder = DATA / "clips/pandaset_002"
+    matrix = pinhole(folder, SIZE)
+    camera = Camera(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *SIZE)
+    for first in PANDASET_STARTS:
+        frames = [first, *(first + round(s * RATE_HZ) for s in AHEAD_S)]
+        poses = camera_path(folder, frames)
+        pictures = [_picture(folder / "front_camera", frame) for frame in frames]
+        ahead = zip(AHEAD_S, np.linalg.inv(poses[0]) @ poses[1:], pictures[1:], strict=True)
+        sights = [Sight(f"{s:g} s", pose, rgb) for s, pose, rgb in ahead]
+        start = Start(pictures[0], camera, PANDASET_HEIGHT_M, calibrated=True)
+        yield Case(f"pandaset {first}", start, sights)
+
+
+def _picture(folder, frame: int) -> UInt8[np.ndarray, "h w 3"]:
+    raw = read_image(sorted(folder.glob("*.jpg"))[frame])
+    return cover(raw.size, SIZE).apply(raw.rgb)
