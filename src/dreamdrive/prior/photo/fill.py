@@ -23,7 +23,9 @@ def continued(
     weights = np.clip(weights, 0, 1).astype(np.float32)
     summed = values.astype(np.float32) * weights[..., None]
     if min(weights.shape) <= _LEAST_PX:
-        return _mean(summed.reshape(-1, values.shape[2]).sum(0), weights.sum()) * np.ones_like(summed)
+        return _mean(summed.reshape(-1, values.shape[2]).sum(0), np.array(weights.sum())) * np.ones_like(
+            summed
+        )
     half = cv2.pyrDown(weights), cv2.pyrDown(summed).reshape(*cv2.pyrDown(weights).shape, -1)
     coarse = continued(_mean(half[1], half[0]), np.minimum(4 * half[0], 1))
     back = cv2.resize(coarse, weights.shape[::-1], interpolation=cv2.INTER_LINEAR).reshape(summed.shape)

@@ -14,6 +14,7 @@ from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.layers import Layers, layers_of
+from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
 from dreamdrive.prior.photo.way import path_for
 from dreamdrive.progress import Progress
@@ -22,7 +23,6 @@ from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import StreetClass
-from dreamdrive.splat import render
 
 FRAMES = 25
 RATE_HZ = 10.0
@@ -30,7 +30,6 @@ SIZE = (480, 270)
 HEIGHT_M = 1.5
 _MOST_FRAMES = 1000
 _HALF = 0.5
-_EDGE = 0.1
 _LEAST_SOLID = 0.05
 
 
@@ -116,30 +115,20 @@ def _driven(
     """Frames, depth and sky along a path; the photo itself where the path begins."""
     drawn: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for number, pose in enumerate(poses):
-        frame, depth, sky = view(layers, street.camera.at(pose), street)
+        frame, sight = view(layers, street.camera.at(pose), street)
         if np.allclose(pose, np.eye(4)):
             own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5)))
             frame = np.where(own[..., None] > 0, frame, street.rgb)
-        drawn.append((frame, depth, sky))
+        drawn.append((frame, sight.depth_m, sight.sky))
         progress(number + 1, len(poses))
     frames, depth_m, sky = (np.stack(each) for each in zip(*drawn, strict=True))
     return frames, depth_m, sky
 
 
-def view(
-    layers: Layers, camera: Camera, street: Street
-) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """What a camera sees of the layers: picture, depth along z (0 where unknown), and sky."""
-    drawn = render(layers.gaussians, camera)
-    alpha = drawn.alpha.numpy()
-    colour = drawn.colour + (1 - drawn.alpha)[..., None] * layers.sky.colour(camera)
-    picture = np.rint(np.clip(colour.numpy(), 0, 1) * 255).astype(np.uint8)
-    below = np.isfinite(street.ground.depth_m(camera))
-    empty = alpha < _HALF
-    depth = drawn.expected_depth_m().numpy()
-    near, far = cv2.erode(depth, np.ones((3, 3))), cv2.dilate(depth, np.ones((3, 3)))
-    mixed = (depth > (1 + _EDGE) * near) & (depth < far / (1 + _EDGE))
-    return inpainted(picture, empty & below), np.where(empty | mixed, 0, depth), empty & ~below
+def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:
+    """What a camera sees, with its holes filled from around them."""
+    sight = sight_of(layers, camera, street.ground)
+    return inpainted(sight.rgb, sight.holes), sight
 
 
 def _notes(control: Control, photo: Photo, seen: Look) -> list[str]:

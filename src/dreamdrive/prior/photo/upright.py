@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.street_class import StreetClass
 
@@ -57,7 +57,7 @@ def _averaged(
 
 
 def poles_stand(
-    depth: Float[np.ndarray, "h w"], classes: Int[np.ndarray, "h w"], plane: Float[np.ndarray, "h w"]
+    depth: Float[np.ndarray, "h w"], classes: UInt8[np.ndarray, "h w"], plane: Float[np.ndarray, "h w"]
 ) -> None:
     """Each pole at one depth: of its foot on the road, else of most of it."""
     pole = (classes == StreetClass.POLE).astype(np.uint8)

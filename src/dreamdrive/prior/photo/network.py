@@ -1,0 +1,117 @@
+"""The small network that mends a drawn view: it fills holes, sharpens what is stretched, keeps the look."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor, nn
+
+from dreamdrive.prior.photo.sight import Sight
+from dreamdrive.scene.camera import Camera
+
+CHANNELS = 11
+"""RGB of the view, alpha, made up, nearer, inverse depth; RGB of the frame before, and where it is known."""
+WIDTHS = (40, 80, 144, 208)
+_NEAR_M = 2.0
+
+
+class _Block(nn.Module):
+    """Two convolutions and what came in."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(width, width, 3, padding=1, padding_mode="replicate")
+        self.second = nn.Conv2d(width, width, 3, padding=1, padding_mode="replicate")
+        self.norm = nn.GroupNorm(8, width)
+
+    def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h w"]:
+        return x + self.second(nn.functional.silu(self.first(nn.functional.silu(self.norm(x)))))
+
+
+class PhotoNetwork(nn.Module):
+    """A U-Net on half of the pixels, whose answer is what to add to the view's colours.
+
+    Its last features, before the answer, are Z_ref.
+    """
+
+    def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
+        super().__init__()
+        self.stem = nn.Conv2d(4 * CHANNELS, widths[0], 3, padding=1, padding_mode="replicate")
+        self.down = nn.ModuleList(nn.Conv2d(a, b, 2, stride=2) for a, b in pairwise(widths))
+        self.enter = nn.ModuleList(nn.Sequential(_Block(width), _Block(width)) for width in widths)
+        self.up = nn.ModuleList(nn.Conv2d(b, a, 1) for a, b in pairwise(widths))
+        self.leave = nn.ModuleList(nn.Sequential(_Block(width), _Block(width)) for width in widths[:-1])
+        self.answer = nn.Conv2d(widths[0], 12, 3, padding=1, padding_mode="replicate")
+        nn.init.zeros_(self.answer.weight)
+        assert self.answer.bias is not None
+        nn.init.zeros_(self.answer.bias)
+
+    def forward(
+        self, seen: Float[Tensor, "n 11 h w"]
+    ) -> tuple[Float[Tensor, "n 3 h w"], Float[Tensor, "n c h2 w2"]]:
+        """The mended view, RGB about [0, 1], and its features; sides are multiples of 2."""
+        x = self.stem(nn.functional.pixel_unshuffle(seen, 2))
+        kept: list[Tensor] = []
+        for level, block in enumerate(self.enter):
+            x = block(x if level == 0 else self.down[level - 1](_even(x)))
+            kept.append(x)
+        for level in reversed(range(len(self.leave))):
+            size = kept[level].shape[2:]
+            wider = nn.functional.interpolate(self.up[level](x), scale_factor=2, mode="nearest")
+            x = self.leave[level](kept[level] + wider[..., : size[0], : size[1]])
+        return seen[:, :3] + nn.functional.pixel_shuffle(self.answer(x), 2), x
+
+
+def _even(x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
+    return nn.functional.pad(x, (0, x.shape[3] % 2, 0, x.shape[2] % 2), mode="replicate")
+
+
+@dataclass(frozen=True)
+class Before:
+    """The frame before, as it was mended, and its camera."""
+
+    rgb: UInt8[np.ndarray, "h w 3"]
+    camera: Camera
+
+
+def told(sight: Sight, camera: Camera, before: Before | None) -> Float[np.ndarray, "11 h w"]:
+    """What the network is told of a view and of the frame before it, float32."""
+    shape = sight.alpha.shape
+    carried = np.zeros((*shape, 4), np.float32) if before is None else _carried(sight, camera, before)
+    inverse = np.where(sight.depth_m > 0, _NEAR_M / np.maximum(sight.depth_m, _NEAR_M), 0)
+    maps = [sight.alpha, sight.made_up, np.clip(sight.nearer, -1, 3), inverse]
+    rgb = sight.rgb.astype(np.float32) / 255
+    return np.concatenate([rgb.transpose(2, 0, 1), np.stack(maps), carried.transpose(2, 0, 1)]).astype(
+        np.float32
+    )
+
+
+def _carried(sight: Sight, camera: Camera, before: Before) -> Float[np.ndarray, "h w 4"]:
+    """The frame before where it shows the same surface, and 1 there; 0 elsewhere."""
+    import cv2
+
+    depth = np.where(sight.depth_m > 0, sight.depth_m, 0)
+    points = camera.rays() * depth[..., None] @ camera.world_from_camera[:3, :3].T
+    points += camera.world_from_camera[:3, 3]
+    at = before.camera.project(points.reshape(-1, 3)).reshape(*depth.shape, 3).astype(np.float32)
+    inside = (depth > 0) & (at[..., 2] > 0.2)
+    inside &= (
+        (at[..., 0] > 0) & (at[..., 0] < camera.width_px) & (at[..., 1] > 0) & (at[..., 1] < camera.height_px)
+    )
+    rgb = cv2.remap(
+        before.rgb, at[..., 0] - 0.5, at[..., 1] - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    known = inside.astype(np.float32)[..., None]
+    return np.concatenate([known * rgb / 255, known], axis=2).astype(np.float32)
+
+
+@torch.inference_mode()
+def mended(
+    network: PhotoNetwork, sight: Sight, camera: Camera, before: Before | None
+) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h2 w2 c"]]:
+    """The view as the network mends it, and its features."""
+    rgb, features = network(torch.from_numpy(told(sight, camera, before))[None])
+    picture = np.rint(np.clip(rgb[0].permute(1, 2, 0).numpy(), 0, 1) * 255).astype(np.uint8)
+    return picture, features[0].permute(1, 2, 0).numpy()

@@ -1,0 +1,186 @@
+"""The training itself, resumable: what is random follows from the seed and the step."""
+
+import json
+import time
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from dreamdrive.errors import InputError
+from dreamdrive.files.atomic import new_file
+from dreamdrive.knowledge import StreetNetwork, load_knowledge
+from dreamdrive.prior.photo.network import CHANNELS, PhotoNetwork
+from dreamdrive.prior.photo.training.pairs import HIGH, LOW
+
+WEIGHTS = "photo.safetensors"
+_CHECKPOINT = "checkpoint.safetensors"
+_LOG = "losses.jsonl"
+
+
+@dataclass(frozen=True)
+class PhotoTraining:
+    """How the network is trained.
+
+    Attributes:
+        steps: Of the whole training.
+        batch: Pairs a step.
+        crop_px: Side of the square that is cut from each.
+        rate: Largest step of Adam; it rises for ``warm`` steps and falls as a cosine.
+        warm: Steps until then.
+        perceptual: Weight of the distance in features of the street network's encoder beside L1.
+        spoilt: How much more what is made up, empty or stretched counts.
+        average: Share of the averaged weights that a step keeps.
+        seed: Of everything random.
+    """
+
+    steps: int = 30_000
+    batch: int = 4
+    crop_px: int = 192
+    rate: float = 4e-4
+    warm: int = 200
+    perceptual: float = 0.5
+    spoilt: float = 3.0
+    average: float = 0.999
+    seed: int = 0
+
+
+def train_photo(
+    pairs: list[Path],
+    out: Path,
+    knowledge: str,
+    options: PhotoTraining = PhotoTraining(),
+    *,
+    licence: str = "Apache-2.0",
+    checkpoint_s: float = 120.0,
+    progress: Callable[[int, int, float], None] = lambda step, steps, loss: None,
+) -> Path:
+    """Train on pairs and write ``photo.safetensors``; the same call goes on where it stopped."""
+    if not pairs:
+        raise InputError("there are no pairs to train on: no street was seen in any of the pictures")
+    out.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(options.seed)
+    network = PhotoNetwork()
+    averaged = deepcopy(network).requires_grad_(False)
+    optimiser = torch.optim.Adam(network.parameters(), lr=options.rate, betas=(0.9, 0.99))
+    judge = load_knowledge(knowledge)
+    done = _resume(out, network, averaged, optimiser, options)
+    saved, losses = time.monotonic(), list[float]()
+    for step in range(done, options.steps):
+        for group in optimiser.param_groups:
+            group["lr"] = options.rate * _share(step, options)
+        loss = _step(network, optimiser, judge, batch_of(pairs, step, options), options)
+        with torch.no_grad():
+            keep = min(options.average, (step + 1) / (step + 10))
+            for mean, value in zip(averaged.parameters(), network.parameters(), strict=True):
+                mean.lerp_(value, 1 - keep)
+        losses.append(loss)
+        progress(step + 1, options.steps, loss)
+        if time.monotonic() - saved > checkpoint_s or step + 1 == options.steps:
+            _save(out, step + 1, network, averaged, optimiser, options)
+            with (out / _LOG).open("a") as file:
+                file.write(json.dumps({"step": step + 1, "loss": round(float(np.mean(losses)), 5)}) + "\n")
+            saved, losses = time.monotonic(), []
+    state = {name: value.half().contiguous() for name, value in averaged.state_dict().items()}
+    with new_file(out / WEIGHTS) as partial:
+        save_file(state, partial, {"licence": licence, "options": json.dumps(asdict(options))})
+    return out / WEIGHTS
+
+
+def _share(step: int, options: PhotoTraining) -> float:
+    left = 0.5 * (1 + np.cos(np.pi * step / options.steps))
+    return float(min(1.0, (step + 1) / options.warm) * (0.02 + 0.98 * left))
+
+
+def batch_of(
+    pairs: list[Path], step: int, options: PhotoTraining
+) -> tuple[Float[Tensor, "n 11 y x"], Float[Tensor, "n 3 y x"], Float[Tensor, "n 1 y x"]]:
+    """What the network is told, the truth and what of it counts, of squares of some pairs."""
+    generator, side = np.random.default_rng([options.seed, step]), options.crop_px
+    cuts: list[np.ndarray] = []
+    for index in generator.integers(len(pairs), size=options.batch):
+        planes = np.load(pairs[index], mmap_mode="r", allow_pickle=False)
+        rows, columns = planes.shape[1] - side, planes.shape[2] - side
+        top, left = (int(generator.integers(most // 2 + 1)) * 2 for most in (rows, columns))
+        cut = planes[:, top : top + side, left : left + side]
+        cuts.append(cut[:, :, ::-1] if generator.integers(2) else cut)
+    values = torch.from_numpy(np.stack(cuts).astype(np.float32) / 255)
+    low, high = (torch.from_numpy(each)[:, None, None] for each in (LOW, HIGH))
+    return low + values[:, :CHANNELS] * (high - low), values[:, CHANNELS:-1], values[:, -1:]
+
+
+def _step(
+    network: PhotoNetwork,
+    optimiser: torch.optim.Optimizer,
+    judge: StreetNetwork,
+    batch: tuple[Tensor, Tensor, Tensor],
+    options: PhotoTraining,
+) -> float:
+    seen, truth, counts = batch
+    said, _ = network(seen)
+    spoilt = torch.maximum(torch.maximum(1 - seen[:, 3:4], seen[:, 4:5]), 0.5 * seen[:, 5:6].clamp(0, 1))
+    weight = counts * (1 + options.spoilt * spoilt)
+    loss = (weight * (said - truth).abs()).sum() / (3 * weight.sum() + 1)
+    true_there = torch.where(counts > 0.5, truth, said.detach())
+    there, wanted = judge.encoder(said), judge.encoder(true_there)
+    for a, b in zip(there[:3], wanted[:3], strict=True):
+        scale = b.square().mean().sqrt() + 1e-3
+        loss = loss + options.perceptual / 3 * ((a - b.detach()).abs().mean() / scale) * 0.1
+    optimiser.zero_grad(set_to_none=True)
+    loss.backward()
+    torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+    optimiser.step()
+    return float(loss.detach())
+
+
+def _save(
+    out: Path,
+    step: int,
+    network: PhotoNetwork,
+    averaged: PhotoNetwork,
+    optimiser: torch.optim.Optimizer,
+    options: PhotoTraining,
+) -> None:
+    state = {f"network.{name}": value for name, value in network.state_dict().items()}
+    state |= {f"averaged.{name}": value for name, value in averaged.state_dict().items()}
+    for index, moments in optimiser.state_dict()["state"].items():
+        state |= {f"optimiser.{index}.{name}": value for name, value in moments.items()}
+    table = {"step": str(step), "options": json.dumps(asdict(options))}
+    with new_file(out / _CHECKPOINT) as partial:
+        save_file({name: value.detach().contiguous() for name, value in state.items()}, partial, table)
+
+
+def _resume(
+    out: Path,
+    network: PhotoNetwork,
+    averaged: PhotoNetwork,
+    optimiser: torch.optim.Optimizer,
+    options: PhotoTraining,
+) -> int:
+    """Go back to the checkpoint, if there is one; the steps done."""
+    path = out / _CHECKPOINT
+    if not path.is_file():
+        return 0
+    with safe_open(path, "pt") as file:
+        table = file.metadata() or {}
+    if table.get("options") != json.dumps(asdict(options)):
+        raise InputError(f"{out} holds a training of other options; give the same ones, or another --out")
+    state = load_file(path)
+    for name, into in (("network", network), ("averaged", averaged)):
+        into.load_state_dict(
+            {key.removeprefix(f"{name}."): v for key, v in state.items() if key.startswith(f"{name}.")}
+        )
+    moments: dict[int, dict[str, Tensor]] = {}
+    for key, value in state.items():
+        if key.startswith("optimiser."):
+            _, index, name = key.split(".", 2)
+            moments.setdefault(int(index), {})[name] = value
+    optimiser.load_state_dict(optimiser.state_dict() | {"state": moments})
+    return int(table["step"])

@@ -1,0 +1,90 @@
+"""The network of the prior ``photo`` and its training."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+from tests.prior.photo.streets import GROUND, street
+
+from dreamdrive.errors import InputError
+from dreamdrive.knowledge import SHIPPED
+from dreamdrive.prior.photo import layers_of
+from dreamdrive.prior.photo.network import CHANNELS, Before, PhotoNetwork, mended, told
+from dreamdrive.prior.photo.sight import sight_of
+from dreamdrive.prior.photo.training import PairOptions, PhotoTraining, make_pairs, train_photo
+from dreamdrive.prior.photo.training.loop import batch_of
+from dreamdrive.prior.photo.training.pairs import PLANES
+from dreamdrive.world import make_street
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("pictures")
+    frame = make_street(5, 1, 10.0, (480, 270)).frames[0]
+    cv2.imwrite(str(folder / "street.png"), frame[..., ::-1])
+    return make_pairs([folder / "street.png"], folder / "pairs", SHIPPED, PairOptions(each=2), processes=1)
+
+
+def test_an_untrained_network_changes_nothing() -> None:
+    photo = street()
+    sight = sight_of(layers_of(photo), photo.camera, GROUND)
+    picture, features = mended(PhotoNetwork(), sight, photo.camera, None)
+    np.testing.assert_array_equal(picture, sight.rgb)
+    assert features.shape[:2] == (27, 48)
+
+
+def test_the_frame_before_is_carried_along_the_surface() -> None:
+    photo = street()
+    layers = layers_of(photo)
+    there = photo.camera.at(np.eye(4))
+    pose = np.eye(4)
+    pose[2, 3] = 2.0
+    here = photo.camera.at(pose)
+    sight = sight_of(layers, here, GROUND)
+    planes = told(sight, here, Before(photo.rgb, there))
+    assert planes.shape == (CHANNELS, *photo.depth_m.shape)
+    known = planes[10] > 0
+    assert known.mean() > 0.4
+    off = np.abs(planes[7:10] - sight.rgb.transpose(2, 0, 1) / 255).mean(0)[known]
+    assert np.median(off) < 0.02
+
+
+def test_a_pair_is_the_picture_and_what_a_drive_makes_of_it(pairs: list[Path]) -> None:
+    assert len(pairs) == 2
+    planes = np.load(pairs[0], allow_pickle=False)
+    assert planes.shape == (PLANES, 270, 480)
+    off = np.abs(planes[:3].astype(int) - planes[CHANNELS : CHANNELS + 3])[:, planes[-1] > 0]
+    assert 0.5 < off.mean() < 25
+
+
+def off(network: PhotoNetwork, pairs: list[Path]) -> float:
+    """Mean error on squares that the training has not drawn."""
+    seen, truth, counts = batch_of(pairs, 10**6, PhotoTraining(batch=8, crop_px=64))
+    with torch.inference_mode():
+        return float((counts * (network(seen)[0] - truth).abs()).mean())
+
+
+def test_the_error_falls_and_a_stopped_training_goes_on(pairs: list[Path], tmp_path: Path) -> None:
+    steps: list[int] = []
+    options = PhotoTraining(steps=40, batch=2, crop_px=64, warm=5, rate=3e-4, average=0.9)
+
+    def tell(step: int, _: int, __: float) -> None:
+        steps.append(step)
+        if len(steps) == 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_photo(pairs, tmp_path, SHIPPED, options, checkpoint_s=0.0, progress=tell)
+    path = train_photo(pairs, tmp_path, SHIPPED, options, progress=tell)
+    # The step in which it was stopped is made again.
+    assert steps == [*range(1, 9), *range(8, 41)]
+    network = PhotoNetwork()
+    before = off(network, pairs)
+    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
+    assert off(network, pairs) < before
+    assert path.stat().st_size < 9e6
+    with pytest.raises(InputError, match="other options"):
+        train_photo(pairs, tmp_path, SHIPPED, PhotoTraining(steps=13))
