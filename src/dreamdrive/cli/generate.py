@@ -59,11 +59,12 @@ def generate(
 
     Args:
         input: A video, a folder of images or of several cameras (docs/guides/surround.md), a layout as JSON,
-            or a photo for a video model; --prior street-world needs none.
+            or a photo; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
         dataset: How the recording lies on disk; without it that of dreamdrive's own that recognises INPUT.
-        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; the
-            others are video models, see docs/guides/priors.md. Without it the input decides.
+        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; photo
+            drives into a photo; the others are video models, see docs/guides/priors.md. Without it the input
+            decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a

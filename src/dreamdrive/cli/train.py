@@ -85,7 +85,67 @@ def _weights(words: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
-_Train = commands_of({"street": street})
+def photo(
+    *,
+    pictures: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")],
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    steps: Annotated[int, arg(metavar="N")] = 30_000,
+    each: Annotated[int, arg(metavar="N")] = 4,
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    batch: Annotated[int, arg(metavar="N")] = 4,
+    rate: Annotated[float, arg(metavar="R")] = 4e-4,
+    knowledge: Annotated[str, arg(metavar="street|FILE")] = "street",
+    licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
+) -> None:
+    """Train the network of the prior photo on folders of pictures.
+
+    Args:
+        pictures: Folder of pictures of streets; those in folders below it count.
+        out: Folder for the pairs, weights, losses and checkpoint; the same command goes on from there.
+        steps: Steps of the whole training.
+        each: Pairs made of each picture.
+        seed: Seed of everything random.
+        batch: Pairs a step.
+        rate: Largest step of the optimiser.
+        knowledge: Weights of the street network that sees the pictures.
+        licence: Under which the weights may be used; it is written into them.
+    """
+    use_all_cores()
+    from dreamdrive.data.images import SUFFIXES
+    from dreamdrive.machine import available_cores
+    from dreamdrive.prior.photo.training import PairOptions, PhotoTraining, make_pairs, train_photo
+
+    if min(steps, batch, each) < 1 or seed < 0 or not 0 < rate < 1:
+        raise InputError(
+            f"--steps {steps} --batch {batch} --each {each} --seed {seed} --rate {rate:g}: expected at least "
+            "one step, pair and picture, a seed of 0 or more and a rate between 0 and 1"
+        )
+    found = sorted(p for folder in pictures for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES)
+    if not found:
+        raise InputError(f"--pictures {' '.join(map(str, pictures))}: no pictures are there")
+    options = PhotoTraining(steps=steps, seed=seed, rate=rate, batch=batch)
+    console = Console(highlight=False)
+    with Bars(console) as bars:
+        pairs = make_pairs(
+            found,
+            out / "pairs",
+            knowledge,
+            PairOptions(each=each),
+            processes=available_cores(),
+            progress=lambda done, total: bars("pairs", done, total),
+        )
+        weights = train_photo(
+            pairs,
+            out,
+            knowledge,
+            options,
+            licence=licence,
+            progress=lambda done, total, _: bars("photo", done, total),
+        )
+    console.print(f"{weights}: {steps} steps on {len(pairs)} pairs", soft_wrap=True, markup=False)
+
+
+_Train = commands_of({"street": street, "photo": photo})
 
 
 def train(what: Annotated[_Train, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]
