@@ -86,7 +86,7 @@ def test_inputs_that_are_no_clip(run: Run, tmp_path: Path) -> None:
 def test_a_picture_that_shows_nothing_or_has_weights_is_refused(run: Run, tmp_path: Path) -> None:
     photo = tmp_path / "photo.png"
     cv2.imwrite(str(photo), np.zeros((40, 64, 3), np.uint8))
-    expect(run, tmp_path / "out", photo, message="nothing solid")
+    expect(run, tmp_path / "out", photo, message="of one colour")
     (tmp_path / "weights").mkdir()
     expect(
         run,

@@ -67,5 +67,9 @@ def test_what_cannot_be_done_is_said(photo: Path, control: Control, message: str
 def test_a_picture_of_nothing_is_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "sky.png"
     cv2.imwrite(str(path), np.full((270, 480, 3), (235, 180, 120), np.uint8))
+    with pytest.raises(InputError, match="of one colour"):
+        PHOTO(Control(path=path, frames="0:2"))
+    clear = np.linspace(150, 235, 270)[:, None, None] * np.array([1.0, 0.8, 0.55])
+    cv2.imwrite(str(path), np.broadcast_to(clear, (270, 480, 3)).astype(np.uint8))
     with pytest.raises(InputError, match="nothing solid"):
         PHOTO(Control(path=path, frames="0:2"))

@@ -31,6 +31,7 @@ HEIGHT_M = 1.5
 _MOST_FRAMES = 1000
 _HALF = 0.5
 _LEAST_SOLID = 0.05
+_LEAST_CONTRAST = 3.0  # grey levels: a street at night has more
 
 
 def make_clip(control: Control, progress: Progress) -> Clip:
@@ -78,6 +79,8 @@ def seen_in(photo: Photo, knowledge: str, height_m: float) -> tuple[Street, Look
     Raises:
         InputError: Nothing solid is seen.
     """
+    if float(photo.rgb.std(axis=(0, 1)).max()) < _LEAST_CONTRAST:
+        raise InputError("the photo is of one colour; expected a street, seen from a car")
     told = photo.calibrated or photo.hfov
     seen = look(photo.rgb[None], knowledge, focal_px=photo.camera.fx_px if told else None)
     camera = photo.camera
