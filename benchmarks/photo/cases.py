@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -17,7 +18,10 @@ from photo.ways import Start
 SIZE = (480, 270)
 RATE_HZ = 10.0
 AHEAD_S = (0.5, 1.0, 2.0)
-FRAMES = round(AHEAD_S[-1] * RATE_HZ) + 1
+STREET_HZ = 2.0
+FRAMES = round(AHEAD_S[-1] * STREET_HZ) + 1
+HEIGHTS_M = (1.2, 2.1)
+"""From which the camera's height in a drawn street is drawn."""
 ASIDE_M = 1.0
 PANDASET_STARTS = range(20, 60, 4)
 """Frames of the moving part from which two seconds are left."""
@@ -45,12 +49,13 @@ class Case:
 
 def drawn(seed: int) -> Case:
     """A street of edition 2; its lens is told to nobody."""
-    made = make_street(seed, FRAMES, RATE_HZ, SIZE, edition=2)
+    tall_m = float(np.random.default_rng([seed, 24]).uniform(*HEIGHTS_M))
+    made = make_street(seed, FRAMES, STREET_HZ, SIZE, camera_height_m=tall_m, edition=2)
     camera = made.cameras[0]
     height_m = abs(float(made.ground.height_m(camera.world_from_camera[:3, 3])))
     sights = [
         Sight(f"{s:g} s", made.cameras[k].world_from_camera, made.frames[k])
-        for s, k in ((s, round(s * RATE_HZ)) for s in AHEAD_S)
+        for s, k in ((s, round(s * STREET_HZ)) for s in AHEAD_S)
     ]
     for side in (-1, 1):
         pose = np.eye(4)
@@ -74,6 +79,6 @@ def pandaset() -> Iterator[Case]:
         yield Case(f"pandaset {first}", start, sights)
 
 
-def _picture(folder, frame: int) -> UInt8[np.ndarray, "h w 3"]:
+def _picture(folder: Path, frame: int) -> UInt8[np.ndarray, "h w 3"]:
     raw = read_image(sorted(folder.glob("*.jpg"))[frame])
     return cover(raw.size, SIZE).apply(raw.rgb)

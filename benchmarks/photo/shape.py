@@ -11,10 +11,10 @@ NEAR_M = 20.0
 
 
 def shape_of(start: Start, made: Drive) -> dict[str, float]:
-    """The road's error along its normal within 20 m, given the camera's height."""
+    """The road's error along its normal within 20 m, given the camera's height; and metres without it."""
     camera, depth = made.cameras[0], made.depth_m[0]
     road = np.isin(CLASS_OF[made.semantic[0]], (StreetClass.ROAD, StreetClass.MARKING))
     near = road & (depth > 0) & (depth < NEAR_M)
     points = (camera.rays() * depth[..., None])[near]
     off = start.street.ground.height_m(points)
-    return {"road_rms_m": float(np.sqrt(np.mean(np.square(off)))), "scale": 1.0}
+    return {"road_rms_m": float(np.sqrt(np.mean(np.square(off)))), "scale": start.told_m / start.height_m}

@@ -33,7 +33,13 @@ class Start:
     def street(self) -> Street:
         """As the prior sees it."""
         photo = Photo(self.rgb, self.camera.at(np.eye(4)), self.calibrated, ())
-        return seen_in(photo, str(TWIN), self.height_m)[0]
+        return seen_in(photo, TWIN, self.height_m)[0]
+
+    @cached_property
+    def told_m(self) -> float:
+        """The camera's height as the photo alone tells it."""
+        photo = Photo(self.rgb, self.camera.at(np.eye(4)), self.calibrated, ())
+        return seen_in(photo, TWIN, None)[2].metres
 
     @cached_property
     def layers(self) -> Layers:

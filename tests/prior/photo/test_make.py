@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from dreamdrive.data.photo import read_photo
 from dreamdrive.errors import InputError
 from dreamdrive.prior import prior_of
 from dreamdrive.prior.photo import PHOTO
@@ -35,8 +36,8 @@ def test_a_photo_is_driven_into(photo: Path) -> None:
     assert known.sky is not None
     np.testing.assert_allclose(known.world_from_camera[0], np.eye(4), atol=1e-12)
     assert known.world_from_camera[-1, 2, 3] > 0.1
-    shown = cv2.resize(cv2.imread(str(photo))[..., ::-1], (160, 90), interpolation=cv2.INTER_AREA)
-    assert np.abs(clip.frames[0].astype(int) - shown).mean() < 6
+    read = read_photo(photo, (160, 90)).rgb
+    assert np.abs(clip.frames[0].astype(int) - read).mean() < 6
     assert (known.depth_m > 0).mean() > 0.5
     assert any("made up" in note for note in clip.provenance["notes"])
 

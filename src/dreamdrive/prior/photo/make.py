@@ -13,6 +13,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.photo.fill import inpainted
+from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
@@ -27,7 +28,6 @@ from dreamdrive.scene.street_class import StreetClass
 FRAMES = 25
 RATE_HZ = 10.0
 SIZE = (480, 270)
-HEIGHT_M = 1.5
 _MOST_FRAMES = 1000
 _HALF = 0.5
 _LEAST_SOLID = 0.05
@@ -46,7 +46,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     check_largest(size, f"--size {size[0]}x{size[1]}")
     wanted = _wanted(control.frames)
     photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg)
-    street, seen = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m or HEIGHT_M)
+    street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
     layers = layers_of(street)
     path = path_for(control, street, wanted / RATE_HZ)
     frames, depth_m, sky = _driven(street, layers, path.world_from_camera, progress)
@@ -69,12 +69,12 @@ def make_clip(control: Control, progress: Progress) -> Clip:
             generated=True,
         ),
         requested=path if control.trajectory is not None else None,
-        provenance={"prior": "photo", "notes": [*photo.notes, *_notes(control, photo, seen)]},
+        provenance={"prior": "photo", "notes": [*photo.notes, *_notes(control, photo, seen, height)]},
     )
 
 
-def seen_in(photo: Photo, knowledge: str, height_m: float) -> tuple[Street, Look]:
-    """The street of a photo, and what the network saw in it.
+def seen_in(photo: Photo, knowledge: str, height_m: float | None) -> tuple[Street, Look, Height]:
+    """The street of a photo, what the network saw in it, and how high the camera is, unless that is told.
 
     Raises:
         InputError: Nothing solid is seen.
@@ -87,13 +87,14 @@ def seen_in(photo: Photo, knowledge: str, height_m: float) -> tuple[Street, Look
     if not told:
         stretch = camera.fy_px / camera.fx_px
         camera = replace(camera, fx_px=seen.camera.focal_px, fy_px=seen.camera.focal_px * stretch)
-    street = street_of(photo.rgb, camera, seen, height_m)
+    height = height_of(seen, camera) if height_m is None else Height(height_m, 0.0, 0)
+    street = street_of(photo.rgb, camera, seen, height.metres)
     if float((street.depth_m > 0).mean()) < _LEAST_SOLID:
         raise InputError(
             "the photo shows nothing solid: nearly all of it is taken for sky or for the own car; "
             "expected a street, seen from a car"
         )
-    return street, seen
+    return street, seen, height
 
 
 def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
@@ -134,7 +135,7 @@ def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarr
     return inpainted(sight.rgb, sight.holes), sight
 
 
-def _notes(control: Control, photo: Photo, seen: Look) -> list[str]:
+def _notes(control: Control, photo: Photo, seen: Look, height: Height) -> list[str]:
     notes = ["The frames are drawn from one photo: what it does not show is made up."]
     if not (photo.calibrated or photo.hfov):
         spread = 100 * seen.camera.focal_spread
@@ -148,5 +149,9 @@ def _notes(control: Control, photo: Photo, seen: Look) -> list[str]:
             "the bend out."
         )
     if control.camera_height_m is None:
-        notes.append(f"Metres rest on a camera {HEIGHT_M:g} m above the road; --camera-height tells it.")
+        by = f"the sizes of {height.users} road users" if height.users else "what is usual"
+        notes.append(
+            f"Metres rest on a camera {height.metres:.2f} m above the road, by {by} (within "
+            f"{100 * height.spread:.0f} %); --camera-height tells it."
+        )
     return notes

@@ -18,6 +18,7 @@ from jaxtyping import Float, UInt8
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
+from dreamdrive.prior.photo.height import USUAL_M
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.make import seen_in
 from dreamdrive.prior.photo.network import CHANNELS, Before, told
@@ -99,7 +100,7 @@ def pairs_of(
     photo: Photo, knowledge: str, options: PairOptions, generator: np.random.Generator
 ) -> Iterator[UInt8[np.ndarray, "15 h w"]]:
     """Pairs of one picture, as planes of bytes."""
-    street, _ = seen_in(photo, knowledge, height_m=1.5)
+    street, _, _ = seen_in(photo, knowledge, height_m=USUAL_M)
     layers = layers_of(street)
     own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((7, 7))) > 0
     truth = np.concatenate([street.rgb.transpose(2, 0, 1), np.where(own, 0, 255).astype(np.uint8)[None]])
