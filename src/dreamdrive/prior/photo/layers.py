@@ -68,7 +68,8 @@ def layers_of(street: Street, options: LayerOptions = LayerOptions()) -> Layers:
     margin = round(options.beyond * street.camera.width_px)
     wide = _widened(street, margin)
     inside = np.zeros(wide.classes.shape, bool)
-    inside[: street.camera.height_px, margin : margin + street.camera.width_px] = True
+    photo = slice(0, street.camera.height_px), slice(margin, margin + street.camera.width_px)
+    inside[photo] = street.classes != StreetClass.OWN_CAR
     behind = _behind(wide, options)
     front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, options)
     back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), options)
