@@ -4,9 +4,12 @@ import cv2
 import numpy as np
 import pytest
 from tests.geometry import toy
+from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.dense import densify
 from dreamdrive.geometry.depth import view as viewing
+from dreamdrive.geometry.moving import FLAGGED
+from dreamdrive.scene.street_class import StreetClass
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +96,26 @@ def test_a_single_frame_and_a_missing_ground_are_no_error():
     pair = toy.drive([], count=2)
     dense = densify(pair.clip, toy.replace(pair.posed, ground=None))
     assert (dense.depth_m > 0).mean() > 0.3
+
+
+def test_with_given_depth_a_road_user_moves_as_a_whole():
+    street = toy.drive([toy.Box(12, -0.9, 0.4)])
+    known = toy.replace(street.clip.known, depth_m=street.depth_m)
+    clip, zeros = toy.replace(street.clip, known=known), np.zeros(street.box.shape, np.float32)
+    small = small_look(len(clip))
+    look = toy.replace(
+        small,
+        depth=zeros,
+        spread=zeros.astype(np.float16),
+        classes=np.where(street.box, StreetClass.VEHICLE, StreetClass.ROAD).astype(np.uint8),
+        confidence=np.ones(street.box.shape, np.float16),
+        instances=street.box.astype(np.uint16),
+    )
+    parts = densify(clip, street.posed)
+    whole = densify(toy.replace(clip, looks=(look,)), street.posed)
+    assert parts.users is None
+    assert (parts.moving[street.box] >= FLAGGED).mean() < 0.9
+    assert whole.users is not None
+    assert (whole.moving[street.box] >= FLAGGED).all()
+    assert not (whole.moving[~street.box] >= FLAGGED).any()
+    np.testing.assert_array_equal(whole.depth_m, parts.depth_m)

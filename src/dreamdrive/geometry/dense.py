@@ -67,7 +67,7 @@ def densify(
     as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
     which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
     m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
-    the place of the backdrop. What moves is found against the parallax of a moving camera or against the
+    the place of the backdrop. With a look road users move as wholes. What moves is found against the parallax of a moving camera or against the
     temporal median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for
     each frame of at most ``PASSES``, and with a look of ``LOOK_PASSES`` more.
     """
@@ -110,6 +110,8 @@ def densify(
             found = with_stereo(view, found, still & (users > 0), inverse, confidence)
             inverse, confidence = settled_in_time(view, found.inverse, found.spread, still), found.confidence
             inverse = with_outlines(view, inverse, still & ~np.isin(look.classes, PAVED))
+        elif look is not None:
+            moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     return _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)
