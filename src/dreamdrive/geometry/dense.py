@@ -67,9 +67,10 @@ def densify(
     as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
     which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
     m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
-    the place of the backdrop. With a look road users move as wholes. What moves is found against the parallax of a moving camera or against the
-    temporal median of a standing one; from fallback poses no such evidence is drawn. ``tell`` is called for
-    each frame of at most ``PASSES``, and with a look of ``LOOK_PASSES`` more.
+    the place of the backdrop. What moves is found against the parallax of a moving camera or against the
+    temporal median of a standing one, and with a look road users move as wholes; from fallback poses no such
+    evidence is drawn. ``tell`` is called for each frame of at most ``PASSES``, and with a look of
+    ``LOOK_PASSES`` more, where depth was not given.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
