@@ -53,8 +53,10 @@ def height_of(look: Look, camera: Camera) -> Height:
         if user.kind not in _SIZES or user.score < _LEAST_SCORE or not inside or below - top < _LEAST_PX:
             continue
         foot = float(plane[below - 1, column])
+        if foot * USUAL_M > _MOST_M:
+            continue
         over = float(ground.height_m(rays[top, column] * foot))
-        if not over > 0 or foot * USUAL_M > _MOST_M:
+        if over <= 0:
             continue
         spread = np.hypot(_READING, _READING_PX / (below - top))
         chance = chance * _likely(over * _GRID_M, user.kind, spread)
