@@ -10,7 +10,7 @@ from dreamdrive.prior.photo.upright import poles_stand, upright
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
+from dreamdrive.scene.street_class import StreetClass
 
 FLAT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND)
 FAR_M = 250.0
@@ -109,9 +109,3 @@ def _sharp(depth: Float[np.ndarray, "h w"], rgb: UInt8[np.ndarray, "h w 3"]) -> 
         sums.append(cv2.blur(colours * side[..., None], (9, 9)) / np.maximum(weight, 1e-6)[..., None])
     off = [np.linalg.norm(colours - each, axis=2) for each in sums]
     return np.where(between, np.where(off[0] < off[1], near, far), depth)
-
-
-def road_users(street: Street) -> list[Bool[np.ndarray, "h w"]]:
-    """The pixels of each road user."""
-    solid = np.isin(street.classes, ROAD_USERS)
-    return [solid & (street.users == user) for user in range(1, int(street.users.max()) + 1)]
