@@ -9,8 +9,7 @@ from jaxtyping import Float, UInt8
 
 from common.pandaset_truth import camera_path, pinhole
 from common.places import DATA
-from dreamdrive.data.images import read_image
-from dreamdrive.data.size import cover
+from dreamdrive.data.photo import read_photo
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world import Drive, make_street
 from photo.ways import Start
@@ -80,5 +79,4 @@ def pandaset() -> Iterator[Case]:
 
 
 def _picture(folder: Path, frame: int) -> UInt8[np.ndarray, "h w 3"]:
-    raw = read_image(sorted(folder.glob("*.jpg"))[frame])
-    return cover(raw.size, SIZE).apply(raw.rgb)
+    return read_photo(sorted(folder.glob("*.jpg"))[frame], SIZE).rgb

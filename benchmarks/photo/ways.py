@@ -11,8 +11,10 @@ from jaxtyping import Float, UInt8
 from common.twin import TWIN
 from dreamdrive.data.photo import Photo
 from dreamdrive.prior.photo import Layers, Street, layers_of, seen_in, view
+from dreamdrive.prior.photo.height import height_of
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.look import Look
+from dreamdrive.scene.street_class import FLAT
 
 BACKDROP_M = 40.0
 """Where what stands is put by the plane and backdrop."""
@@ -30,16 +32,19 @@ class Start:
     calibrated: bool
 
     @cached_property
+    def _seen(self) -> tuple[Street, Look]:
+        photo = Photo(self.rgb, self.camera.at(np.eye(4)), self.calibrated, ())
+        return seen_in(photo, TWIN, self.height_m)[:2]
+
+    @property
     def street(self) -> Street:
         """As the prior sees it."""
-        photo = Photo(self.rgb, self.camera.at(np.eye(4)), self.calibrated, ())
-        return seen_in(photo, TWIN, self.height_m)[0]
+        return self._seen[0]
 
-    @cached_property
+    @property
     def told_m(self) -> float:
         """The camera's height as the photo alone tells it."""
-        photo = Photo(self.rgb, self.camera.at(np.eye(4)), self.calibrated, ())
-        return seen_in(photo, TWIN, None)[2].metres
+        return height_of(self._seen[1], self.street.camera).metres
 
     @cached_property
     def layers(self) -> Layers:
@@ -58,7 +63,7 @@ class Start:
         """Pop-up: what stands has the depth of its foot on the road (Hoiem et al. 2005)."""
         street = self.street
         plane = street.ground.depth_m(street.camera)
-        flat = np.isin(street.classes, (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND))
+        flat = np.isin(street.classes, FLAT)
         depth = np.where(flat, plane, np.inf)
         for row in range(len(depth) - 2, -1, -1):
             depth[row] = np.where(flat[row], plane[row], depth[row + 1])

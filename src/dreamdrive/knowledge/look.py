@@ -23,15 +23,13 @@ from dreamdrive.knowledge.shipped import SHIPPED, load_knowledge
 from dreamdrive.machine import available_cores
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.look import Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street_class import FLAT, StreetClass
 from dreamdrive.splat import one_torch_thread
 
 Network = Callable[[Float[Tensor, "n 3 h w"]], Prediction]
 """From RGB pictures in [0, 1], whose sides are multiples of 32 pixels."""
 _WITHIN_68 = -log(1 - 0.6827)
 """Half width of the interval that holds 68 % of a Laplace distribution of scale 1."""
-_FLAT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND)
-"""One surface, as far as depth goes."""
 
 
 @dataclass(frozen=True)
@@ -208,5 +206,5 @@ def _depth(
 def _regions(classes: Int[Tensor, "h w"], instances: UInt16[np.ndarray, "h w"]) -> Int[Tensor, "h w"]:
     """A number for each surface within which depth is smooth."""
     surface = torch.arange(len(StreetClass))
-    surface[list(_FLAT)] = int(_FLAT[0])
+    surface[list(FLAT)] = int(FLAT[0])
     return surface[classes] + len(StreetClass) * torch.from_numpy(instances.astype(np.int64))

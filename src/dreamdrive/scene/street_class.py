@@ -24,3 +24,6 @@ class StreetClass(IntEnum):
 
 ROAD_USERS = (StreetClass.VEHICLE, StreetClass.TWO_WHEELER, StreetClass.PERSON)
 """What can move on its own."""
+
+FLAT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND)
+"""What lies on the ground: one surface, as far as depth goes."""

@@ -12,10 +12,9 @@ from dreamdrive.geometry.depth.view import View, by_frame
 from dreamdrive.geometry.options import FusionOptions
 from dreamdrive.geometry.road import scale
 from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
+from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
 
 PAVED = (StreetClass.ROAD, StreetClass.MARKING)
-_GROUND = (*PAVED, StreetClass.GROUND)
 _NEAREST_M, _FARTHEST_M = 0.5, 500.0
 _FAR_INVERSE = 1 / 150  # 1/m; farther away stereo anchors nothing
 _ROAD_INVERSE = 1 / 150
@@ -182,7 +181,7 @@ def fuse(
     spread = np.where(stereo, options.stereo_spread, spread)
     flat = road & ~stereo & (level_spread < spread)
     log_depth[flat], spread[flat] = level[flat], level_spread[flat]
-    ground = np.isin(seen.classes, _GROUND)
+    ground = np.isin(seen.classes, FLAT)
     contact = on_the_road(seen.instances, ground, plane.inverse, plane.height_m, seen.is_vehicle(), options)
     contact_spread = np.hypot(contact.spread, plane.spread_per_m / np.maximum(contact.inverse, 1e-4))
     standing = (contact.inverse > 0) & shown & ((plane.spread_per_m == 0) | (contact_spread < spread))
@@ -222,7 +221,7 @@ def _align(
     coarse = _carried(ratio, weight, np.full_like(ratio, middle), _COARSE * width)
     shift, spread = coarse.copy(), own.copy()
     reach = options.reach * width
-    ground = np.isin(seen.classes, _GROUND)
+    ground = np.isin(seen.classes, FLAT)
     for region in (ground, ~ground & ~users):
         inside = weight * region
         fine = _carried(ratio, inside, coarse, reach)

@@ -6,19 +6,20 @@ What is random follows from the seed and the step, so that no state of generator
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import torch
 from safetensors.torch import save_file
-from torch import Tensor
+from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
 from dreamdrive.files.paths import read_text
-from dreamdrive.knowledge.network import StreetNetwork
-from dreamdrive.knowledge.training.options import TrainingOptions
 from dreamdrive.models import read_state
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _STATE = "checkpoint-{step}.safetensors"
 _TABLE = "checkpoint.json"
@@ -36,9 +37,9 @@ def save_checkpoint(
     folder: Path,
     step: int,
     seconds: float,
-    networks: tuple[StreetNetwork, StreetNetwork],
+    networks: tuple[nn.Module, nn.Module],
     optimiser: torch.optim.Optimizer,
-    options: TrainingOptions,
+    options: "DataclassInstance",
     data: Mapping[str, str],
 ) -> None:
     """Write the network, the averaged one and the optimiser after so many steps; the table comes last."""
@@ -59,9 +60,9 @@ def save_checkpoint(
 
 def load_checkpoint(
     folder: Path,
-    networks: tuple[StreetNetwork, StreetNetwork],
+    networks: tuple[nn.Module, nn.Module],
     optimiser: torch.optim.Optimizer,
-    options: TrainingOptions,
+    options: "DataclassInstance",
     data: Mapping[str, str],
 ) -> tuple[int, float]:
     """Go back to the checkpoint of a folder, if there is one; steps done and seconds they took."""
@@ -95,7 +96,7 @@ def _below(state: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
     return {key.removeprefix(f"{name}."): each for key, each in state.items() if key.startswith(f"{name}.")}
 
 
-def _plain(options: TrainingOptions) -> dict[str, Any]:
+def _plain(options: "DataclassInstance") -> dict[str, Any]:
     """Options as a table reads them back; how often is logged or judged changes nothing that is learned."""
     kept = {
         name: value

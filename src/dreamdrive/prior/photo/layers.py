@@ -8,11 +8,11 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.prior.photo.fill import continued, inpainted
-from dreamdrive.prior.photo.street import FAR_M, FLAT, Street
+from dreamdrive.prior.photo.street import FAR_M, Street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
+from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
 from dreamdrive.scene.surfels import surfels, tangents
 
 _THIN = (*ROAD_USERS, StreetClass.POLE)
@@ -46,12 +46,10 @@ class Layers:
 
     Attributes:
         gaussians: Of all layers; ``source_frame`` is 0 for what the photo shows, 1 for what is made up.
-        users: 1 + the index of the road user that each belongs to (N,); 0 for what stands.
         sky: Behind them.
     """
 
     gaussians: Gaussians
-    users: Float[np.ndarray, " n"]
     sky: Sky
 
 
@@ -73,8 +71,7 @@ def layers_of(street: Street, options: LayerOptions = LayerOptions()) -> Layers:
     behind = _behind(wide, options)
     front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, options)
     back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), options)
-    users = np.concatenate([wide.users[wide.depth_m > 0], np.zeros(len(back))])
-    return Layers(Gaussians.concatenate(front, back), users.astype(np.float64), sky_of(street))
+    return Layers(Gaussians.concatenate(front, back), sky_of(street))
 
 
 def _widened(street: Street, margin: int) -> Street:
@@ -93,7 +90,6 @@ def _widened(street: Street, margin: int) -> Street:
     rgb = inpainted(street.rgb, cv2.dilate(own, np.ones((5, 5))) > 0) if own.any() else street.rgb
     classes = street.classes.copy()
     classes[own > 0] = StreetClass.ROAD
-    depth = street.depth_m.copy()
     users = cv2.copyMakeBorder(street.users, 0, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
     hidden = np.isin(classes, _THIN)
     empty = inpainted(rgb, cv2.dilate(hidden.astype(np.uint8), np.ones((5, 5))) > 0)
@@ -102,7 +98,7 @@ def _widened(street: Street, margin: int) -> Street:
     rgb_out[:height, margin : margin + width] = rgb
     classes = wider(np.where(hidden, StreetClass.STRUCTURE, classes).astype(np.uint8), cv2.BORDER_REPLICATE)
     classes[:height, margin : margin + width] = np.where(own > 0, StreetClass.ROAD, street.classes)
-    depth = wider(depth, cv2.BORDER_REPLICATE)
+    depth = wider(street.depth_m, cv2.BORDER_REPLICATE)
     plane = street.ground.depth_m(camera)
     outside = np.ones(classes.shape, bool)
     outside[:height, margin : margin + width] = own > 0

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
-from dreamdrive.prior.photo.sight import Sight
+from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
 
 CHANNELS = 11
@@ -90,20 +91,12 @@ def told(sight: Sight, camera: Camera, before: Before | None) -> Float[np.ndarra
 
 def _carried(sight: Sight, camera: Camera, before: Before) -> Float[np.ndarray, "h w 4"]:
     """The frame before where it shows the same surface, and 1 there; 0 elsewhere."""
-    import cv2
-
-    depth = np.where(sight.depth_m > 0, sight.depth_m, 0)
-    points = camera.rays() * depth[..., None] @ camera.world_from_camera[:3, :3].T
-    points += camera.world_from_camera[:3, 3]
-    at = before.camera.project(points.reshape(-1, 3)).reshape(*depth.shape, 3).astype(np.float32)
-    inside = (depth > 0) & (at[..., 2] > 0.2)
-    inside &= (
-        (at[..., 0] > 0) & (at[..., 0] < camera.width_px) & (at[..., 1] > 0) & (at[..., 1] < camera.height_px)
-    )
+    at = places_in(before.camera, camera, sight.depth_m)
+    shown = before.camera.shows(at.reshape(-1, 3)).reshape(sight.depth_m.shape)
     rgb = cv2.remap(
         before.rgb, at[..., 0] - 0.5, at[..., 1] - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    known = inside.astype(np.float32)[..., None]
+    known = (shown & (sight.depth_m > 0)).astype(np.float32)[..., None]
     return np.concatenate([known * rgb / 255, known], axis=2).astype(np.float32)
 
 

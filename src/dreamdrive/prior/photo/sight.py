@@ -42,6 +42,13 @@ class Sight:
         return (self.alpha < _HALF) & ~self.sky
 
 
+def places_in(other: Camera, camera: Camera, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
+    """Column, row and depth in the picture of another camera of what a camera sees at a depth, float32."""
+    points = camera.rays() * depth_m[..., None] @ camera.world_from_camera[:3, :3].T
+    points += camera.world_from_camera[:3, 3]
+    return other.project(points.reshape(-1, 3)).reshape(points.shape).astype(np.float32)
+
+
 @one_torch_thread()
 @torch.no_grad()
 def sight_of(layers: Layers, camera: Camera, ground: Ground) -> Sight:

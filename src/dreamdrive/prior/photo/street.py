@@ -10,9 +10,8 @@ from dreamdrive.prior.photo.upright import poles_stand, upright
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street_class import FLAT, StreetClass
 
-FLAT = (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND)
 FAR_M = 250.0
 _LEVEL_M, _HILLY_M = 20.0, 40.0
 """Up to the first distance the ground is the level road; from the second on it is as deep as it looks."""

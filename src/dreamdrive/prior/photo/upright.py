@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street_class import FLAT, StreetClass
 
 _ALONG_PX, _ACROSS_PX = 60.0, 8.0
 """How far depth is averaged down a surface and across it, in a picture 480 wide."""
@@ -70,7 +70,7 @@ def poles_stand(
         middle = float(np.median(depth[here]))
         below = min(rows[-1] + 1, len(depth) - 1)
         foot = here[rows[-1]]
-        on_ground = np.isin(classes[below, foot], (StreetClass.ROAD, StreetClass.GROUND, StreetClass.MARKING))
+        on_ground = np.isin(classes[below, foot], FLAT)
         at = float(np.median(plane[rows[-1], foot]))
         stands = on_ground.mean() > 0.5 and 0.5 < at / middle < 2.0
         depth[here] = at if stands else middle

@@ -10,7 +10,7 @@ from dreamdrive.prior.photo.street import Street
 from dreamdrive.scene.action import AT_S, Action, Command, Four, Goal, Steering, Waypoints
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street_class import FLAT
 from dreamdrive.scene.trajectory import Trajectory
 
 SPEED_M_S = 6.0
@@ -45,7 +45,7 @@ def free_m(street: Street) -> float:
     points = street.camera.rays() * street.depth_m[..., None]
     up = street.ground.height_m(points)
     solid = (street.depth_m > 0) & (up > _LOW_M) & (up < _HIGH_M) & (np.abs(points[..., 0]) < _HALF_WIDTH_M)
-    solid &= ~np.isin(street.classes, (StreetClass.ROAD, StreetClass.MARKING, StreetClass.GROUND))
+    solid &= ~np.isin(street.classes, FLAT)
     return float(np.sort(street.depth_m[solid])[_LEAST_PX]) if solid.sum() > _LEAST_PX else float("inf")
 
 

@@ -10,18 +10,17 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Float
-from safetensors import safe_open
-from safetensors.torch import load_file, save_file
+from safetensors.torch import save_file
 from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
 from dreamdrive.knowledge import StreetNetwork, load_knowledge
+from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.prior.photo.network import CHANNELS, PhotoNetwork
 from dreamdrive.prior.photo.training.pairs import HIGH, LOW
 
 WEIGHTS = "photo.safetensors"
-_CHECKPOINT = "checkpoint.safetensors"
 _LOG = "losses.jsonl"
 
 
@@ -71,8 +70,10 @@ def train_photo(
     averaged = deepcopy(network).requires_grad_(False)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate, betas=(0.9, 0.99))
     judge = load_knowledge(knowledge)
-    done = _resume(out, network, averaged, optimiser, options)
-    saved, losses = time.monotonic(), list[float]()
+    both, data = (network, averaged), dict[str, str]()
+    done, before_s = load_checkpoint(out, both, optimiser, options, data)
+    began = saved = time.monotonic()
+    losses = list[float]()
     for step in range(done, options.steps):
         for group in optimiser.param_groups:
             group["lr"] = options.rate * _share(step, options)
@@ -84,7 +85,8 @@ def train_photo(
         losses.append(loss)
         progress(step + 1, options.steps, loss)
         if time.monotonic() - saved > checkpoint_s or step + 1 == options.steps:
-            _save(out, step + 1, network, averaged, optimiser, options)
+            spent_s = before_s + time.monotonic() - began
+            save_checkpoint(out, step + 1, spent_s, both, optimiser, options, data)
             with (out / _LOG).open("a") as file:
                 file.write(json.dumps({"step": step + 1, "loss": round(float(np.mean(losses)), 5)}) + "\n")
             saved, losses = time.monotonic(), []
@@ -138,49 +140,3 @@ def _step(
     torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
     optimiser.step()
     return float(loss.detach())
-
-
-def _save(
-    out: Path,
-    step: int,
-    network: PhotoNetwork,
-    averaged: PhotoNetwork,
-    optimiser: torch.optim.Optimizer,
-    options: PhotoTraining,
-) -> None:
-    state = {f"network.{name}": value for name, value in network.state_dict().items()}
-    state |= {f"averaged.{name}": value for name, value in averaged.state_dict().items()}
-    for index, moments in optimiser.state_dict()["state"].items():
-        state |= {f"optimiser.{index}.{name}": value for name, value in moments.items()}
-    table = {"step": str(step), "options": json.dumps(asdict(options))}
-    with new_file(out / _CHECKPOINT) as partial:
-        save_file({name: value.detach().contiguous() for name, value in state.items()}, partial, table)
-
-
-def _resume(
-    out: Path,
-    network: PhotoNetwork,
-    averaged: PhotoNetwork,
-    optimiser: torch.optim.Optimizer,
-    options: PhotoTraining,
-) -> int:
-    """Go back to the checkpoint, if there is one; the steps done."""
-    path = out / _CHECKPOINT
-    if not path.is_file():
-        return 0
-    with safe_open(path, "pt") as file:
-        table = file.metadata() or {}
-    if table.get("options") != json.dumps(asdict(options)):
-        raise InputError(f"{out} holds a training of other options; give the same ones, or another --out")
-    state = load_file(path)
-    for name, into in (("network", network), ("averaged", averaged)):
-        into.load_state_dict(
-            {key.removeprefix(f"{name}."): v for key, v in state.items() if key.startswith(f"{name}.")}
-        )
-    moments: dict[int, dict[str, Tensor]] = {}
-    for key, value in state.items():
-        if key.startswith("optimiser."):
-            _, index, name = key.split(".", 2)
-            moments.setdefault(int(index), {})[name] = value
-    optimiser.load_state_dict(optimiser.state_dict() | {"state": moments})
-    return int(table["step"])

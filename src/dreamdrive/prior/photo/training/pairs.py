@@ -22,7 +22,7 @@ from dreamdrive.prior.photo.height import USUAL_M
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.make import seen_in
 from dreamdrive.prior.photo.network import CHANNELS, Before, told
-from dreamdrive.prior.photo.sight import sight_of
+from dreamdrive.prior.photo.sight import places_in, sight_of
 from dreamdrive.prior.photo.street import Street
 from dreamdrive.prior.photo.way import level_axes
 from dreamdrive.scene.camera import Camera
@@ -131,9 +131,7 @@ def _drawn_pose(
 def _seen_from(street: Street, layers: Layers, camera: Camera) -> Street:
     """What is seen from elsewhere, as a picture with depth of its own."""
     sight = sight_of(layers, camera, street.ground)
-    points = camera.rays() * sight.depth_m[..., None] @ camera.world_from_camera[:3, :3].T
-    points += camera.world_from_camera[:3, 3]
-    at = street.camera.project(points.reshape(-1, 3)).reshape(points.shape).astype(np.float32)
+    at = places_in(street.camera, camera, sight.depth_m)
     u, v = at[..., 0] - 0.5, at[..., 1] - 0.5
     ground = street.ground.seen_from(camera.world_from_camera)
     known, plane = sight.depth_m > 0, ground.depth_m(street.camera)
