@@ -60,7 +60,7 @@ def measured(case: Case, distance: Any) -> dict[str, Any]:
     for name, way in WAYS.items():
         found: dict[str, list[dict[str, float]]] = defaultdict(list)
         for sight in case.sights:
-            said, true = (torch.from_numpy(x).float() / 255 for x in (way(case.start, sight.pose), sight.rgb))
+            said, true = (torch.from_numpy(x).float() / 255 for x in (way(case.start, sight), sight.rgb))
             planes = [(x * 2 - 1).permute(2, 0, 1)[None] for x in (said, true)]
             found[sight.name].append(
                 {

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int, UInt8
 
-from dreamdrive.knowledge.training.drawn import CLASS_OF
+from dreamdrive.knowledge.training import CLASS_OF
 from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Drive

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.knowledge.training.drawn import CLASS_OF
+from dreamdrive.knowledge.training import CLASS_OF
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Drive, make_street
 from knowledge.cameras import See, errors_deg

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 
 from common.pandaset_truth import camera_path, pinhole
 from common.places import DATA
 from dreamdrive.data.photo import read_photo
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world import Drive, make_street
-from photo.ways import Start
+from photo.ways import Sight, Start
 
 SIZE = (480, 270)
 RATE_HZ = 10.0
@@ -25,15 +25,6 @@ ASIDE_M = 1.0
 PANDASET_STARTS = range(20, 60, 4)
 """Frames of the moving part from which two seconds are left."""
 PANDASET_HEIGHT_M = 2.2
-
-
-@dataclass(frozen=True)
-class Sight:
-    """What a camera truly saw: its pose in the frame of the first picture's camera."""
-
-    name: str
-    pose: Float[np.ndarray, "4 4"]
-    rgb: UInt8[np.ndarray, "h w 3"]
 
 
 @dataclass(frozen=True)
@@ -53,13 +44,13 @@ def drawn(seed: int) -> Case:
     camera = made.cameras[0]
     height_m = abs(float(made.ground.height_m(camera.world_from_camera[:3, 3])))
     sights = [
-        Sight(f"{s:g} s", made.cameras[k].world_from_camera, made.frames[k])
+        Sight(f"{s:g} s", s, made.cameras[k].world_from_camera, made.frames[k])
         for s, k in ((s, round(s * STREET_HZ)) for s in AHEAD_S)
     ]
     for side in (-1, 1):
         pose = np.eye(4)
         pose[0, 3] = side * ASIDE_M
-        sights.append(Sight("1 m aside", pose, made.views([camera.at(pose)], [0.0])[0].frame))
+        sights.append(Sight("1 m aside", 0.0, pose, made.views([camera.at(pose)], [0.0])[0].frame))
     return Case(f"street {seed}", Start(made.frames[0], camera, height_m, calibrated=False), sights, made)
 
 
@@ -73,7 +64,7 @@ def pandaset() -> Iterator[Case]:
         poses = camera_path(folder, frames)
         pictures = [_picture(folder / "front_camera", frame) for frame in frames]
         ahead = zip(AHEAD_S, np.linalg.inv(poses[0]) @ poses[1:], pictures[1:], strict=True)
-        sights = [Sight(f"{s:g} s", pose, rgb) for s, pose, rgb in ahead]
+        sights = [Sight(f"{s:g} s", s, pose, rgb) for s, pose, rgb in ahead]
         start = Start(pictures[0], camera, PANDASET_HEIGHT_M, calibrated=True)
         yield Case(f"pandaset {first}", start, sights)
 

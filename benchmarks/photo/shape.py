@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dreamdrive.knowledge.training.drawn import CLASS_OF
+from dreamdrive.knowledge.training import CLASS_OF
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Drive
 from photo.ways import Start

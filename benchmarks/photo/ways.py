@@ -12,12 +12,24 @@ from common.twin import TWIN
 from dreamdrive.data.photo import Photo
 from dreamdrive.prior.photo import Layers, Street, layers_of, seen_in, view
 from dreamdrive.prior.photo.height import height_of
+from dreamdrive.prior.photo.traffic import flowing
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import FLAT
 
 BACKDROP_M = 40.0
 """Where what stands is put by the plane and backdrop."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a camera truly saw so many seconds later: its pose in the frame of the first picture's camera."""
+
+    name: str
+    t_s: float
+    pose: Float[np.ndarray, "4 4"]
+    rgb: UInt8[np.ndarray, "h w 3"]
+
 
 Picture = UInt8[np.ndarray, "h w 3"]
 
@@ -71,19 +83,30 @@ class Start:
         return layers_of(replace(street, depth_m=depth))
 
 
-def drawn(start: Start, pose: Float[np.ndarray, "4 4"]) -> Picture:
-    """By the prior."""
-    return view(start.layers, start.street.camera.at(pose), start.street)[0]
+def drawn(start: Start, sight: Sight) -> Picture:
+    """By the prior, where everything stands."""
+    return view(start.layers, start.street.camera.at(sight.pose), start.street)[0]
 
 
-def frozen(start: Start, _: Float[np.ndarray, "4 4"]) -> Picture:
+def flows(start: Start, sight: Sight) -> Picture:
+    """By the prior, with traffic as fast as the own car."""
+    if not sight.t_s:
+        return drawn(start, sight)
+    speed_m_s = float(np.linalg.norm(sight.pose[:3, 3])) / sight.t_s
+    velocities = flowing(start.street, speed_m_s)
+    ahead = 1 + np.flatnonzero(velocities[:, 2] > 0)
+    layers = layers_of(start.street, ahead.tolist()).at(sight.t_s, velocities)
+    return view(layers, start.street.camera.at(sight.pose), start.street)[0]
+
+
+def frozen(start: Start, _: Sight) -> Picture:
     """The picture itself."""
     return start.rgb
 
 
-def homography(start: Start, pose: Float[np.ndarray, "4 4"]) -> Picture:
+def homography(start: Start, sight: Sight) -> Picture:
     """The road's plane carries what lies below the horizon; above it a picture only turns."""
-    camera, ground = start.street.camera, start.street.ground
+    camera, ground, pose = start.street.camera, start.street.ground, sight.pose
     there = camera.at(pose)
     depth = np.minimum(ground.depth_m(there), 1e4)
     rays = there.rays() @ pose[:3, :3].T
@@ -97,18 +120,19 @@ def homography(start: Start, pose: Float[np.ndarray, "4 4"]) -> Picture:
     return cv2.remap(start.rgb, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def popped_up(start: Start, pose: Float[np.ndarray, "4 4"]) -> Picture:
+def popped_up(start: Start, sight: Sight) -> Picture:
     """By the classical pop-up."""
-    return view(start.upright, start.street.camera.at(pose), start.street)[0]
+    return view(start.upright, start.street.camera.at(sight.pose), start.street)[0]
 
 
-def before_backdrop(start: Start, pose: Float[np.ndarray, "4 4"]) -> Picture:
+def before_backdrop(start: Start, sight: Sight) -> Picture:
     """By road and backdrop."""
-    return view(start.backdrop, start.street.camera.at(pose), start.street)[0]
+    return view(start.backdrop, start.street.camera.at(sight.pose), start.street)[0]
 
 
-WAYS: Mapping[str, Callable[[Start, Float[np.ndarray, "4 4"]], Picture]] = {
+WAYS: Mapping[str, Callable[[Start, Sight], Picture]] = {
     "photo": drawn,
+    "photo, traffic flows": flows,
     "frozen": frozen,
     "homography": homography,
     "plane and backdrop": before_backdrop,

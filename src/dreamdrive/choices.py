@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 QualityName = Literal["draft", "standard", "high"]
 MethodName = Literal["dreamdrive", "paper"]
+TrafficName = Literal["still", "flow"]
 RepresentationName = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
 Stage = Literal["prior", "look", "geometry", "initialise", "static", "score", "group", "fit"]

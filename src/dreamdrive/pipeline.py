@@ -94,7 +94,7 @@ def generate(
     Args:
         control: The input and how to read it; its seed is that of everything random.
         out: The output folder, see ``run.workspace``.
-        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.prior_of``.
+        prior: Name in ``prior.PRIORS``; without it the input decides, see ``prior.auto_prior``.
         geometry_files: File or folder with cameras, poses and depth to use, see ``geometry.backends.files``.
         weights: The network, of the prior if it has one, else of the geometry method: a file or folder, or a
             name, see ``models.find_weights``.

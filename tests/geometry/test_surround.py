@@ -92,3 +92,30 @@ def test_a_refusal_names_the_camera() -> None:
 
     with pytest.raises(InputError, match="camera 1 of the rig: too dark"):
         reconstruct_cameras(rig_clip(), picky)
+
+
+def test_drives_from_one_first_frame_share_its_metre() -> None:
+    """The second drive is reconstructed in a unit of half a metre: the depth of the common frame tells."""
+    front = drives()["front"]
+    one = true_geometry(front)
+
+    def method(clip: Clip) -> Geometry:
+        factor = 1.0 if int(clip.camera[0]) == 0 else 2.0
+        cameras = []
+        for camera in one.cameras:
+            pose = camera.world_from_camera.copy()
+            pose[:3, 3] *= factor
+            cameras.append(camera.at(pose))
+        return replace(one, cameras=tuple(cameras), depth_m=(factor * one.depth_m).astype(np.float32))
+
+    clip = rig_clip()
+    count = len(clip.rig)
+    rig = tuple(replace(clip.rig[0]) for _ in range(count))
+    shared = replace(clip, rig=rig, known=replace(clip.known, world_from_camera=None, shared_first=True))
+    found = reconstruct_cameras(shared, method)
+    for camera in range(count):
+        rows = shared.of_camera(camera)
+        poses = np.stack([found.cameras[row].world_from_camera for row in rows])
+        true = np.stack([each.world_from_camera for each in one.cameras])
+        np.testing.assert_allclose(poses, true, atol=1e-6)
+        np.testing.assert_allclose(found.depth_m[rows], one.depth_m, rtol=1e-5)

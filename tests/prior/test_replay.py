@@ -10,7 +10,7 @@ from tests.prior.paths import circle
 
 from dreamdrive.data import read_clip, write_trajectory
 from dreamdrive.errors import InputError
-from dreamdrive.prior import PRIORS, choose_prior, prior_of
+from dreamdrive.prior import PRIORS, choose_prior
 from dreamdrive.prior.replay import replay
 from dreamdrive.scene.action import Command
 from dreamdrive.scene.control import Control
@@ -47,12 +47,6 @@ def test_priors_are_found_by_name():
     assert all(prior.takes <= set(Control.__dataclass_fields__) for prior in PRIORS.values())
     with pytest.raises(InputError, match="--prior sora: unknown; available are replay, street-world"):
         choose_prior("sora")
-
-
-def test_without_a_name_the_input_decides():
-    assert prior_of(Path("street/layout.json")) == "street-world"
-    assert prior_of(Path("drive.mp4")) == "replay"
-    assert prior_of(None) == "replay"
 
 
 def test_the_path_that_a_recording_was_asked_for_is_kept(folder, tmp_path):

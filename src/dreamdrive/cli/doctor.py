@@ -1,6 +1,7 @@
 """``dreamdrive doctor``: what this installation and machine offer, and what is missing."""
 
 import platform
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -78,7 +79,22 @@ def _backends(console: Console) -> None:
             console.print(f"\n {what} {name}: {lines[0]}", highlight=False, soft_wrap=True)
             for line in lines[1:]:
                 console.print(f"   {line}", highlight=False, soft_wrap=True)
+    _choices(console)
     console.print()
+
+
+def _choices(console: Console) -> None:
+    """Which prior an input is given to where none is named."""
+    from dreamdrive.prior import auto_prior
+
+    console.print("\n without --prior", highlight=False)
+    for what, path in (
+        ("a recording", None),
+        ("a photo", Path("photo.jpg")),
+        ("a layout", Path("layout.json")),
+    ):
+        choice = auto_prior(path)
+        console.print(f"   {what}: {choice.name}, {choice.why}", highlight=False, soft_wrap=True)
 
 
 def _about(entry: "Backend | DataSet") -> list[str]:

@@ -6,9 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rich.console import Console
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName, Stage
+from dreamdrive.choices import (
+    DeviceName,
+    MethodName,
+    QualityName,
+    RepresentationName,
+    Stage,
+    TrafficName,
+)
 from dreamdrive.cli.arguments import DataSetName, GeometryName, PriorName, parse_action, parse_size
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
 from dreamdrive.cli.progress import Bars
@@ -42,7 +49,10 @@ def generate(
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    trajectories: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    action: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="TEXT")] = (),
+    traffic: Annotated[TrafficName | None, arg(help_behavior_hint="(default: flow)")] = None,
+    traffic_speed: Annotated[float | None, arg(metavar="M/S", help_behavior_hint="(default: 8)")] = None,
     prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
@@ -88,9 +98,14 @@ def generate(
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         trajectory: Path that a video model shall drive, JSON or TUM, or that a replayed video was to drive:
             KITTI or PandaSet as well.
+        trajectories: Several paths from the same first frame, a JSON list: each a drive of its own, all one
+            scene.
         action: What a video model shall do instead: command=left; speed=8,8,8,8 wheel=0,0,0.1,0.1 (m/s and
             radians, left is positive, at 0.5, 1, 1.5 and 2 s); ahead=4,8,12,16 right=0,0,0,1 (m);
-            goal=0.5,0.55 (shares of the photo's width and height).
+            goal=0.5,0.55 (shares of the photo's width and height). Given more than once, each is a drive of
+            its own from the same first frame, and all become one scene.
+        traffic: Whether the road users of a photo go on: vehicles along their lane, people along the street.
+        traffic_speed: Speed of its vehicles in metres a second.
         prompt: What a video model shall show, in words.
         steps: Steps of a video model's sampler.
         features: Features of a recording's frames that another program computed, see docs/replay.md.
@@ -121,7 +136,10 @@ def generate(
         poses=poses,
         hfov_deg=hfov,
         trajectory=trajectory,
-        action=None if action is None else parse_action(action),
+        trajectories=trajectories,
+        **_actions(action),
+        traffic=traffic,
+        traffic_speed_m_s=traffic_speed,
         prompt=prompt,
         steps=steps,
         features=features,
@@ -129,8 +147,7 @@ def generate(
         seed=seed,
     )
     chosen = with_method(QUALITIES[quality], method)
-    if options is not None:
-        chosen = read_options(options, chosen)
+    chosen = chosen if options is None else read_options(options, chosen)
     found = _given(method=geometry, camera_height_m=camera_height, refine_poses=refine_poses or None)
     chosen = replace(chosen, geometry=replace(chosen.geometry, **found))
     chosen = replace(chosen, **_given(representation=representation, device=device, knowledge=knowledge))
@@ -163,6 +180,12 @@ def _tell(console: Console, outcome: "Outcome", out: Path) -> None:
         console.print(line)
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
         console.print(f"{what:<7} {out / name}")
+
+
+def _actions(words: tuple[str, ...]) -> dict[str, Any]:
+    """One action, or several, each a drive of its own."""
+    actions = tuple(map(parse_action, words))
+    return {"action": actions[0]} if len(actions) == 1 else {"actions": actions or None}
 
 
 def _given(**flags: Any) -> dict[str, Any]:

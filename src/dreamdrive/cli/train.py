@@ -87,9 +87,10 @@ def _weights(words: tuple[str, ...]) -> dict[str, float]:
 
 def photo(
     *,
-    pictures: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")],
+    pictures: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")] = (),
+    streets: Annotated[int, arg(metavar="N")] = 0,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
-    steps: Annotated[int, arg(metavar="N")] = 30_000,
+    steps: Annotated[int, arg(metavar="N")] = 12_000,
     each: Annotated[int, arg(metavar="N")] = 4,
     seed: Annotated[int, arg(metavar="S")] = 0,
     batch: Annotated[int, arg(metavar="N")] = 4,
@@ -97,13 +98,14 @@ def photo(
     knowledge: Annotated[str, arg(metavar="street|FILE")] = "street",
     licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
 ) -> None:
-    """Train the network of the prior photo on folders of pictures.
+    """Train the network of the prior photo on folders of pictures and on drawn streets.
 
     Args:
         pictures: Folder of pictures of streets; those in folders below it count.
+        streets: How many streets of the second edition are drawn.
         out: Folder for the pairs, weights, losses and checkpoint; the same command goes on from there.
         steps: Steps of the whole training.
-        each: Pairs made of each picture.
+        each: Pairs made of each picture and street.
         seed: Seed of everything random.
         batch: Pairs a step.
         rate: Largest step of the optimiser.
@@ -113,7 +115,13 @@ def photo(
     use_all_cores()
     from dreamdrive.data.images import SUFFIXES
     from dreamdrive.machine import available_cores
-    from dreamdrive.prior.photo.training import PairOptions, PhotoTraining, make_pairs, train_photo
+    from dreamdrive.prior.photo.training import (
+        FIRST_SEED,
+        PairOptions,
+        PhotoTraining,
+        make_pairs,
+        train_photo,
+    )
 
     if min(steps, batch, each) < 1 or seed < 0 or not 0 < rate < 1:
         raise InputError(
@@ -121,13 +129,18 @@ def photo(
             "one step, pair and picture, a seed of 0 or more and a rate between 0 and 1"
         )
     found = sorted(p for folder in pictures for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES)
-    if not found:
-        raise InputError(f"--pictures {' '.join(map(str, pictures))}: no pictures are there")
+    if not found and (pictures or streets < 1):
+        raise InputError(
+            f"--pictures {' '.join(map(str, pictures))}: no pictures are there"
+            if pictures
+            else "nothing to train on; give --pictures DIR, --streets N or both"
+        )
     options = PhotoTraining(steps=steps, seed=seed, rate=rate, batch=batch)
     console = Console(highlight=False)
-    with Bars(console) as bars:
+    with asked_to_stop() as stop, Bars(console) as bars:
         pairs = make_pairs(
             found,
+            range(FIRST_SEED, FIRST_SEED + streets),
             out / "pairs",
             knowledge,
             PairOptions(each=each),
@@ -140,8 +153,12 @@ def photo(
             knowledge,
             options,
             licence=licence,
+            stop=stop,
             progress=lambda done, total, _: bars("photo", done, total),
         )
+    if weights is None:
+        stop.end()
+        return
     console.print(f"{weights}: {steps} steps on {len(pairs)} pairs", soft_wrap=True, markup=False)
 
 

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -47,6 +49,24 @@ def read_trajectory(path: Path) -> Trajectory:
     if rows.times_s is None:
         raise InputError(f"trajectory {path} has poses but no times; expected Trajectory JSON or TUM")
     return Trajectory(rows.world_from_camera, rows.times_s)
+
+
+def read_trajectories(path: Path) -> list[Trajectory]:
+    """Read several paths of the camera: a JSON list of objects, each as ``read_trajectory`` takes it."""
+    expected = "a JSON list of Trajectory objects, each with world_from_camera and times_s"
+    try:
+        values = msgspec.json.decode(read_text(path, f"trajectories {path}"), type=list[dict[str, Any]])
+    except msgspec.DecodeError as error:
+        raise InputError(f"trajectories {path}: {error}; expected {expected}") from None
+    found: list[Trajectory] = []
+    for number, each in enumerate(values):
+        rows = poses_of_json(each, f"trajectories {path}, number {number + 1}")
+        if rows.times_s is None:
+            raise InputError(f"trajectories {path}, number {number + 1}: no times_s; expected {expected}")
+        found.append(Trajectory(rows.world_from_camera, rows.times_s))
+    if not found:
+        raise InputError(f"trajectories {path} is an empty list; expected {expected}")
+    return found
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Clips of several cameras on one car: each camera by itself, in the world of the first."""
+"""Clips of several cameras, on one car or on several drives: each by itself, in the world of the first."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,12 +19,15 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
     """Reconstruct the first camera, then the others from where it tells that they were.
 
     The path of the first camera and the mountings of the rig give the poses of all others, unless poses are
-    known; metres and the road are those of the first camera. ``reconstruct`` takes frames of one camera.
+    known or all begin at the same frame; metres and the road are those of the first camera. ``reconstruct``
+    takes frames of one camera.
 
     Raises:
         InputError: Neither poses nor mountings are known; or see ``reconstruct``.
     """
     lead = int(clip.camera[0])
+    if clip.known.world_from_camera is None and clip.known.shared_first:
+        return _from_first_frame(clip, lead, reconstruct)
     if clip.known.world_from_camera is None and _unmounted(clip):
         raise InputError(
             f"the clip has {len(clip.rig)} cameras, and neither their poses nor how they are mounted is "
@@ -36,6 +39,20 @@ def reconstruct_cameras(clip: Clip, reconstruct: Callable[[Clip], Geometry]) -> 
     for camera in np.unique(clip.camera).tolist():
         if camera != lead:
             parts[camera] = _other(clip, camera, poses, first, reconstruct)
+    return _merged(clip, lead, parts, poses)
+
+
+def _from_first_frame(clip: Clip, lead: int, reconstruct: Callable[[Clip], Geometry]) -> Geometry:
+    """Drives from one first frame, each by itself: the depth of that frame tells their common metre."""
+    parts = {camera: reconstruct(clip.only(camera)) for camera in np.unique(clip.camera).tolist()}
+    first, poses = parts[lead], np.zeros((len(clip), 4, 4))
+    for camera, part in parts.items():
+        both = (first.depth_m[0] > 0) & (part.depth_m[0] > 0)
+        scale = float(np.median(first.depth_m[0][both] / part.depth_m[0][both])) if both.any() else 1.0
+        parts[camera] = replace(part, depth_m=(scale * part.depth_m).astype(np.float32))
+        own = np.stack([each.world_from_camera for each in part.cameras])
+        own[:, :3, 3] *= scale
+        poses[clip.of_camera(camera)] = own
     return _merged(clip, lead, parts, poses)
 
 

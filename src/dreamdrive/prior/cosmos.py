@@ -10,11 +10,10 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.path import from_first
+from dreamdrive.prior.path import from_first, wanted_path
 from dreamdrive.prior.protocol import Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent
@@ -46,11 +45,12 @@ def cosmos(control: Control, progress: Progress = silent) -> Clip:
     The poses of ``requested`` are what was asked for, with the first frame at the identity. They were not
     measured in the frames and are not ``known``: how well the model keeps to them, the geometry has to find.
     """
-    if control.trajectory is None:
+    wanted = wanted_path(control)
+    if wanted is None:
         raise InputError(
             f"the prior cosmos needs --trajectory FILE: a path of at least {(FRAMES - 1) / RATE_HZ:g} s"
         )
-    path, size = from_first(read_trajectory(control.trajectory)), control.size or SIZE
+    path, size = from_first(wanted), control.size or SIZE
     if size not in TIERS:
         known = ", ".join(f"{width}x{height}" for width, height in TIERS)
         raise InputError(f"--size {size[0]}x{size[1]}: Cosmos 3 makes {known}")
@@ -151,7 +151,18 @@ COSMOS = Prior(
     name="cosmos",
     make=cosmos,
     takes=frozenset(
-        {"path", "trajectory", "prompt", "steps", "frames", "size", "intrinsics", "hfov_deg", "hold_out"}
+        {
+            "path",
+            "trajectory",
+            "trajectories",
+            "prompt",
+            "steps",
+            "frames",
+            "size",
+            "intrinsics",
+            "hfov_deg",
+            "hold_out",
+        }
     ),
     gives="61 frames at 10 Hz, the path asked for (not measured); intrinsics, where they are given",
     about="Cosmos 3 of NVIDIA: a photo and the path to drive become a video",

@@ -7,6 +7,7 @@ road wheels at the angle a turn it by tan(a) / ``WHEEL_BASE_M`` radians a metre.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -15,9 +16,11 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.scene.action import AT_S, Four, Steering, Waypoints, check_action
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.control import Control
 from dreamdrive.scene.trajectory import Trajectory
 
 WHEEL_BASE_M = 2.588
@@ -34,6 +37,12 @@ def from_first(path: Trajectory) -> Trajectory:
     """The path in the frame of its first pose, from time 0 on."""
     first = Camera(1, 1, 0, 0, 1, 1, path.world_from_camera[0].astype(np.float64)).camera_from_world
     return Trajectory(first @ path.world_from_camera, path.times_s - path.times_s[0])
+
+
+def wanted_path(control: Control) -> Trajectory | None:
+    """The path that is asked for, from its file where it is in one; None where none is."""
+    asked = control.trajectory
+    return read_trajectory(asked) if isinstance(asked, Path) else asked
 
 
 def asked_path(path: Trajectory, times_s: Float[np.ndarray, " f"]) -> Trajectory:

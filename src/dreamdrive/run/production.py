@@ -14,6 +14,7 @@ from dreamdrive.machine import available_cores, free_bytes
 from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run.cost import announcement, check_memory, plan
 from dreamdrive.run.held_out import score_baselines, score_scene
+from dreamdrive.run.in_motion import found_again
 from dreamdrive.run.outcome import Outcome, outcome_of
 from dreamdrive.run.report import describe
 from dreamdrive.run.request import Request
@@ -69,11 +70,16 @@ class Production(Stages):
             clip,
             geometry,
             scene,
-            {**request.document, "input": None if path is None else str(path)},
+            {
+                **request.document,
+                "input": None if path is None else str(path),
+                "prior": {"name": request.prior, "why": request.choice.why},
+            },
             self.records,
             request.options.steps,
             score_scene(clip, geometry, scene),
             score_baselines(clip, geometry),
+            found_again(clip, scene),
         )
         self.workspace.publish(report)
         return outcome_of(report, REPORT, already_finished=False)
@@ -96,7 +102,8 @@ class Production(Stages):
 def start(
     workspace: Workspace, request: Request, recompute_from: str | None, progress: StageProgress, say: Say
 ) -> Production:
-    """Say what the run will cost, where that is known before the frames are read, and begin."""
+    """Say which prior it is, and what the run will cost where that is known before, and begin."""
+    say(f"The prior is {request.prior}: {request.choice.why}.")
     planned = plan(request.control, request.prior)
     if planned is not None:
         check_memory(planned, free_bytes())

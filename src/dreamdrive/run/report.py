@@ -10,7 +10,7 @@ import numpy as np
 
 from dreamdrive import __version__
 from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
-from dreamdrive.evaluate import compare_paths
+from dreamdrive.evaluate import Retrieval, compare_paths
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.run.held_out import Likeness
 from dreamdrive.run.judge import facts_of, limits_of, remarks_of, rough_because
@@ -34,10 +34,12 @@ def describe(
     steps: dict[str, int],
     held_out: dict[int, Likeness],
     baselines: dict[str, dict[int, Likeness]],
+    in_motion: Retrieval | None = None,
 ) -> dict[str, Any]:
     """The report as JSON values; a number that is not finite becomes null.
 
     Likeness is that of held-out frames, by index in the clip; baselines are predictions that need no scene.
+    ``in_motion`` compares what moves with what the prior set in motion.
     """
     options = request["options"]
     blended = baselines.get("flow_interpolation", {})
@@ -51,6 +53,7 @@ def describe(
         "version": __version__,
         "versions": {"python": platform.python_version(), **package_versions(), **outside},
         "input": request["input"],
+        "prior": request.get("prior"),
         "options": options,
         "seed": request["seed"],
         "stages": {name: asdict(record) for name, record in records.items()},
@@ -58,6 +61,7 @@ def describe(
         "frames": {"count": len(clip), "size": list(clip.size), "source_index": clip.source_index.tolist()},
         "gaussians": {"static": len(scene.static), "dynamic": len(scene.dynamic)},
         "actors": [_of_actor(actor) for actor in scene.actors],
+        "set_in_motion": None if in_motion is None else asdict(in_motion),
         "scale": {**asdict(geometry.scale), "disagreement": geometry.scale.disagreement},
         "focal": asdict(geometry.focal),
         "requested": against_request(clip, geometry),

@@ -11,11 +11,12 @@ from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, b
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, weights_of
 from dreamdrive.models import find_weights
 from dreamdrive.options import QUALITIES, Options, with_method
-from dreamdrive.prior import choose_prior, prior_of
+from dreamdrive.prior import Choice, auto_prior, choose_prior
 from dreamdrive.progress import Work
 from dreamdrive.run.stages import digest, file_digest
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,16 @@ class Request:
     """
 
     control: Control
-    prior: str
+    choice: Choice
     geometry_files: Path | None
     options: Options
     quality: str
     digests: dict[str, str]
+
+    @property
+    def prior(self) -> str:
+        """Its name."""
+        return self.choice.name
 
     @property
     def reading(self) -> list[object]:
@@ -78,7 +84,8 @@ def request_of(
     options: Options | QualityName = "standard",
 ) -> Request:
     """Check a request as far as it can be before anything is read; arguments as of ``pipeline.generate``."""
-    prior = prior or ("replay" if control.dataset else prior_of(control.path, weights is not None))
+    choice = _choice_of(control, prior, weights is not None)
+    prior, weights = choice.name, choice.weights if weights is None else weights
     whole = QUALITIES[options] if isinstance(options, str) else options
     control, network = _with_networks(control, prior, weights, geometry_weights or whole.geometry.weights)
     control = _with_look(control, prior, whole)
@@ -90,7 +97,15 @@ def request_of(
     options = replace(whole, geometry=geometry, seed=control.seed)
     knowledge = None if options.knowledge == NO_KNOWLEDGE else weights_of(options.knowledge)
     digests = _digests(control, geometry_files, network, knowledge)
-    return Request(control, prior, geometry_files, options, quality, digests)
+    return Request(control, choice, geometry_files, options, quality, digests)
+
+
+def _choice_of(control: Control, prior: str | None, with_weights: bool) -> Choice:
+    if prior is not None:
+        return Choice(prior, "named")
+    if control.dataset:
+        return Choice("replay", "--dataset says how the recording lies on disk")
+    return auto_prior(control.path, with_weights)
 
 
 def _quality_of(options: Options) -> str:
@@ -135,11 +150,13 @@ def _with_lens(control: Control, geometry_files: Path | None) -> Control:
 def _digests(
     control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None = None
 ) -> dict[str, str]:
+    asked = control.trajectory
     given = {
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
         "poses": (control.poses, "a file with poses"),
-        "trajectory": (control.trajectory, "a file with poses"),
+        "trajectory": (asked if isinstance(asked, Path) else None, "a file with poses"),
+        "trajectories": (control.trajectories, "a file with several paths"),
         "features": (control.features, "a .safetensors file, see docs/replay.md"),
         "prior-weights": (control.weights, "a file of weights or its folder"),
         "geometry-files": (geometry_files, EXPECTED),
@@ -147,6 +164,8 @@ def _digests(
         "knowledge": (knowledge, "weights of the street network"),
     }
     digests: dict[str, str] = {}
+    if isinstance(asked, Trajectory):
+        digests["trajectory"] = digest([asked.world_from_camera.tolist(), asked.times_s.tolist()])
     for name, (path, expected) in given.items():
         if path is None:
             continue

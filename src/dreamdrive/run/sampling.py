@@ -12,7 +12,7 @@ from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import check_free
 from dreamdrive.models import find_weights
-from dreamdrive.prior import choose_prior, prior_of
+from dreamdrive.prior import Choice, auto_prior, choose_prior
 from dreamdrive.progress import Progress, silent
 from dreamdrive.run.stages import file_digest
 from dreamdrive.scene.action import Action
@@ -33,16 +33,17 @@ def sample(
 ) -> Clip:
     """Run a prior and write what it gives in the format of ``data.recording``, for ``replay`` to take up.
 
-    Without a name the input decides on the prior, see ``prior.prior_of``; weights as of ``hub.find_weights``.
-    ``force`` replaces an older folder of this kind.
+    Without a name the input decides on the prior, see ``prior.auto_prior``; weights as of
+    ``hub.find_weights``. ``force`` replaces an older folder of this kind.
     """
-    name = prior or prior_of(control.path, weights is not None)
+    choice = Choice(prior, "named") if prior else auto_prior(control.path, weights is not None)
+    name, weights = choice.name, choice.weights if weights is None else weights
     control = control if weights is None else replace(control, weights=find_weights(weights))
     chosen = choose_prior(name)
     chosen.check(control)
     for file in FILES:
-        path: Path | None = getattr(control, file)
-        if path is not None and not path.exists():
+        path: object = getattr(control, file)
+        if isinstance(path, Path) and not path.exists():
             raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")

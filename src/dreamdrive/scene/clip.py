@@ -31,6 +31,7 @@ class Known:
         generated: Whether a model drew the frames for these poses, or for the rig's mountings: that the
             frames show something else is then no mistake of the user's.
         hfov: Whether the field of view at least was told; what turning shows may correct it.
+        shared_first: Whether the cameras of the rig are one, on several drives that begin at one frame.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
@@ -42,6 +43,7 @@ class Known:
     ground: Ground | None = None
     generated: bool = False
     hfov: bool = False
+    shared_first: bool = False
 
     @property
     def focal(self) -> bool:
@@ -87,6 +89,7 @@ class Clip:
         latents: What the frames were decoded from, for priors with a latent space (F, h, w, C).
         known: What the input says about the geometry.
         requested: The trajectory a generative prior was asked for.
+        set_in_motion: Pixels of what a generative prior made move (F, H, W), to judge by; no stage sees them.
         looks: What the street network sees, one look a camera of the rig; empty where it was not asked.
         cuts: Index of each first frame of its camera after a change to another scene.
         recorded: How the frames were taken from pictures on disk; None where they were drawn or generated.
@@ -105,6 +108,7 @@ class Clip:
     latents: Float[np.ndarray, "f _ _ _"] | None = None
     known: Known = field(default_factory=Known)
     requested: Trajectory | None = None
+    set_in_motion: Bool[np.ndarray, "f h w"] | None = None
     looks: tuple[Look, ...] = ()
     cuts: tuple[int, ...] = ()
     recorded: Recorded | None = None

@@ -4,10 +4,12 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from dreamdrive.choices import TrafficName
 from dreamdrive.errors import InputError
 from dreamdrive.scene.action import Action
+from dreamdrive.scene.trajectory import Trajectory
 
-FILES = ("path", "intrinsics", "poses", "trajectory", "weights", "features", "knowledge")
+FILES = ("path", "intrinsics", "poses", "trajectory", "trajectories", "weights", "features", "knowledge")
 """Fields of ``Control`` that name files; they count by their content."""
 
 
@@ -24,8 +26,12 @@ class Control:
         intrinsics: Calibration file of the input.
         poses: Pose file of the input.
         hfov_deg: Horizontal field of view in degrees, where there is no calibration.
-        trajectory: File with the wanted path of the camera, for priors that make one.
+        trajectory: The wanted path of the camera or a file with it, for priors that make one.
+        trajectories: File with several wanted paths from the same first frame, each a drive of its own.
         action: What the car shall do, for priors that take no path.
+        actions: Several of these from the same first frame, each a drive of its own.
+        traffic: ``"still"`` or ``"flow"``: whether the road users of a photo go on.
+        traffic_speed_m_s: Speed of its vehicles then.
         prompt: What shall be seen, in words.
         steps: Steps of a diffusion sampler.
         weights: The prior's network, a file or folder.
@@ -44,8 +50,12 @@ class Control:
     intrinsics: Path | None = None
     poses: Path | None = None
     hfov_deg: float | None = None
-    trajectory: Path | None = None
+    trajectory: Path | Trajectory | None = None
+    trajectories: Path | None = None
     action: Action | None = None
+    actions: tuple[Action, ...] | None = None
+    traffic: TrafficName | None = None
+    traffic_speed_m_s: float | None = None
     prompt: str | None = None
     steps: int | None = None
     weights: Path | None = None

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 
 from dreamdrive.data.photo import read_photo
 from dreamdrive.errors import InputError
-from dreamdrive.prior import prior_of
 from dreamdrive.prior.photo import PHOTO
+from dreamdrive.scene.action import Command
 from dreamdrive.scene.control import Control
 from dreamdrive.world import make_street
 
@@ -42,12 +43,6 @@ def test_a_photo_is_driven_into(photo: Path) -> None:
     assert any("made up" in note for note in clip.provenance["notes"])
 
 
-def test_a_photo_needs_no_name_of_a_prior(photo: Path) -> None:
-    assert prior_of(photo) == "photo"
-    with pytest.raises(InputError, match="--prior NAME"):
-        prior_of(photo, with_weights=True)
-
-
 @pytest.mark.parametrize(
     ("control", "message"),
     [
@@ -74,3 +69,40 @@ def test_a_picture_of_nothing_is_a_sentence(tmp_path: Path) -> None:
     cv2.imwrite(str(path), np.broadcast_to(clear, (270, 480, 3)).astype(np.uint8))
     with pytest.raises(InputError, match="nothing solid"):
         PHOTO(Control(path=path, frames="0:2"))
+
+
+def test_what_is_set_in_motion_is_told_and_what_stands_is_not(photo: Path) -> None:
+    control = Control(path=photo, frames="0:7:3", size=(160, 90), camera_height_m=1.5)
+    clip = PHOTO(control)
+    assert clip.set_in_motion is not None
+    assert clip.set_in_motion[0].any()
+    assert any("set in motion" in note for note in clip.provenance["notes"])
+    still = PHOTO(replace(control, traffic="still"))
+    assert still.set_in_motion is not None
+    assert not still.set_in_motion.any()
+    assert not any("set in motion" in note for note in still.provenance["notes"])
+
+
+def test_two_drives_begin_at_the_photo_and_are_drawn_in_one_world(photo: Path) -> None:
+    control = Control(path=photo, frames="0:9:4", size=(160, 90), camera_height_m=1.5)
+    clip = PHOTO(replace(control, actions=(Command("forward"), Command("left"))))
+    assert clip.camera.tolist() == [0, 1] * 3
+    np.testing.assert_array_equal(clip.frames[0], clip.frames[1])
+    poses = clip.known.world_from_camera
+    assert poses is not None
+    np.testing.assert_allclose(poses[:2], np.tile(np.eye(4), (2, 1, 1)), atol=1e-12)
+    alone = PHOTO(replace(control, action=Command("left")))
+    np.testing.assert_array_equal(clip.frames[1::2], alone.frames)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"traffic_speed_m_s": 0.0}, "--traffic-speed 0: expected metres a second"),
+        ({"traffic_speed_m_s": 99.0}, "--traffic-speed 99"),
+        ({"traffic": "still", "traffic_speed_m_s": 5.0}, "exclude each other"),
+    ],
+)
+def test_a_speed_that_cannot_be_is_a_sentence(photo: Path, given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        PHOTO(Control(path=photo, **given))

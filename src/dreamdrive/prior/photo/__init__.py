@@ -17,9 +17,13 @@ PHOTO = Prior(
             "intrinsics",
             "hold_out",
             "action",
+            "actions",
             "trajectory",
+            "trajectories",
             "camera_height_m",
             "knowledge",
+            "traffic",
+            "traffic_speed_m_s",
         }
     ),
     gives="25 frames at 10 Hz with the poses, depth and sky that they were drawn from",

@@ -1,11 +1,12 @@
 """A photo as Gaussians in layers: what it shows, what that hides, and what goes on beyond its borders."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, UInt8, UInt16
 
 from dreamdrive.prior.photo.fill import continued, inpainted
 from dreamdrive.prior.photo.street import FAR_M, Street
@@ -17,6 +18,12 @@ from dreamdrive.scene.surfels import surfels, tangents
 
 _THIN = (*ROAD_USERS, StreetClass.POLE)
 """What something goes on behind: all of it is hidden street."""
+_RIM_PX = 9
+"""The outline of a road user is not exact, and its colours would be smeared over all that it hides."""
+_ROOM_M = 25.0
+"""How far what is behind a vehicle that drives on is at least behind it."""
+_LEVEL = 0.3
+"""What is hidden and at most by this share nearer than the road is the road."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +52,31 @@ class Layers:
     """A photo in space.
 
     Attributes:
-        gaussians: Of all layers; ``source_frame`` is 0 for what the photo shows, 1 for what is made up.
+        gaussians: Of all layers; ``source_frame`` is 0 for what the photo shows, 1 for what is made up,
+            ``actor`` the index of a road user, -1 for none.
         sky: Behind them.
+        rgb: The picture of the front layer, wider than the photo (H, W, 3), and its camera.
+        behind: Which Gaussians are not of that layer (N,).
+        carried_m: How far each has been carried from its place in the photo (N, 3).
+        moving: Which are of road users that move (N,).
     """
 
     gaussians: Gaussians
     sky: Sky
+    rgb: UInt8[np.ndarray, "h w 3"]
+    camera: Camera
+    behind: Bool[torch.Tensor, " n"]
+    carried_m: Float[torch.Tensor, "n 3"]
+    moving: Bool[torch.Tensor, " n"]
+
+    def at(self, t_s: float, velocities_m_s: Float[np.ndarray, "u 3"]) -> "Layers":
+        """With the road users of the photo where they are so long after it."""
+        actor = self.gaussians.actor
+        if actor is None or not velocities_m_s.any():
+            return self
+        velocity = torch.cat([_tensor(velocities_m_s), torch.zeros(1, 3)])[actor]  # the last: of all else
+        carried = replace(self.gaussians, means=self.gaussians.means + t_s * velocity)
+        return replace(self, gaussians=carried, carried_m=t_s * velocity, moving=(velocity != 0).any(1))
 
 
 @dataclass(frozen=True)
@@ -61,17 +87,31 @@ class _Sheet:
     depth_m: Float[np.ndarray, "h w"]
 
 
-def layers_of(street: Street, options: LayerOptions = LayerOptions()) -> Layers:
-    """All that a drive into the photo may uncover."""
+def layers_of(street: Street, leaving: Sequence[int] = (), options: LayerOptions = LayerOptions()) -> Layers:
+    """All that a drive into the photo may uncover; users of the numbers ``leaving``, from 1, drive on."""
     margin = round(options.beyond * street.camera.width_px)
     wide = _widened(street, margin)
     inside = np.zeros(wide.classes.shape, bool)
     photo = slice(0, street.camera.height_px), slice(margin, margin + street.camera.width_px)
     inside[photo] = street.classes != StreetClass.OWN_CAR
-    behind = _behind(wide, options)
-    front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, options)
-    back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), options)
-    return Layers(Gaussians.concatenate(front, back), sky_of(street))
+    behind = _behind(wide, leaving, options)
+    none = np.zeros_like(wide.users)
+    front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, _whole(wide), options)
+    back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), none, options)
+    gaussians = Gaussians.concatenate(front, back)
+    is_behind = torch.arange(len(gaussians)) >= len(front)
+    nowhere = torch.zeros_like(gaussians.means)
+    none_moves = torch.zeros_like(is_behind)
+    return Layers(gaussians, sky_of(street), wide.rgb, wide.camera, is_behind, nowhere, none_moves)
+
+
+def _whole(street: Street) -> UInt16[np.ndarray, "h w"]:
+    """Road users with the rim that is as deep as they are, which would stay behind when they move."""
+    around = cv2.dilate(street.users, np.ones((5, 5)))
+    deep = cv2.dilate(np.where(street.users > 0, street.depth_m, 0).astype(np.float32), np.ones((5, 5)))
+    rim = (street.users == 0) & (around > 0) & (street.depth_m < 1.05 * deep)
+    rim &= ~np.isin(street.classes, FLAT)
+    return np.where(rim, around, street.users)
 
 
 def _widened(street: Street, margin: int) -> Street:
@@ -87,7 +127,7 @@ def _widened(street: Street, margin: int) -> Street:
         height_px=street.camera.height_px + margin,
     )
     own = (street.classes == StreetClass.OWN_CAR).astype(np.uint8)
-    rgb = inpainted(street.rgb, cv2.dilate(own, np.ones((5, 5))) > 0) if own.any() else street.rgb
+    rgb = inpainted(street.rgb, _grown(own > 0, _RIM_PX)) if own.any() else street.rgb
     classes = street.classes.copy()
     classes[own > 0] = StreetClass.ROAD
     users = cv2.copyMakeBorder(street.users, 0, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
@@ -108,28 +148,64 @@ def _widened(street: Street, margin: int) -> Street:
     return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
 
 
-def _behind(street: Street, options: LayerOptions) -> _Sheet:
+def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _Sheet:
     """What is hidden: the street without road users and poles, and what goes on behind edges."""
     solid, plane = street.depth_m > 0, street.ground.depth_m(street.camera)
-    thin = np.isin(street.classes, _THIN)
+    shadow = np.isin(street.classes, FLAT) & (street.users > 0)
+    thin = np.isin(street.classes, _THIN) | shadow
     reach = 2 * round(options.reach_px * street.camera.width_px / 480) + 1
     inverse = np.where(solid, 1 / np.maximum(street.depth_m, 1e-3), 1 / FAR_M).astype(np.float32)
     farther = cv2.erode(inverse, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
     smooth = cv2.blur(farther, (reach // 2, reach // 2))
-    # A road user's whole shape hides something: there depth runs from what is beside it to the other side.
-    around = ~cv2.dilate(thin.astype(np.uint8), np.ones((3, 3))).astype(bool) & solid
-    across = continued(inverse[..., None], around.astype(np.float32))[..., 0]
+    # A road user's whole shape hides something: there depth runs from side to side.
+    around = ~_grown(thin, _RIM_PX) & (street.classes != StreetClass.OWN_CAR)
+    across = _across(inverse, around)
+    road = np.isin(street.users, leaving)
+    across = np.where(road, np.minimum(across, 1 / (street.depth_m + _ROOM_M)), across)
     inverse_behind = np.maximum(np.where(thin, across, smooth), 1 / FAR_M)
-    depth = np.minimum(1 / inverse_behind, plane)
+    level = plane * inverse_behind < 1 + _LEVEL
+    depth = np.where(level, plane, 1 / inverse_behind)
     hidden = solid & (thin | (depth > (1 + options.edge) * street.depth_m)) & (depth > 1.02 * street.depth_m)
-    source = inpainted(street.rgb, cv2.dilate(hidden.astype(np.uint8), np.ones((3, 3))) > 0)
-    sky = cv2.dilate((street.classes == StreetClass.SKY).astype(np.uint8), np.ones((reach, reach))) > 0
-    open_ = sky & (1 / inverse_behind >= 0.8 * FAR_M) & (plane > FAR_M)
+    depth, hidden = np.where(shadow, 1.02 * street.depth_m, depth), hidden | shadow
+    source = _without(street, hidden, level)
+    sky = _across((street.classes == StreetClass.SKY).astype(np.float32), around) > 0.5
+    open_ = (sky | ~thin) & (1 / inverse_behind >= 0.8 * FAR_M) & (plane > FAR_M)
     return _Sheet(source, np.where(hidden & ~open_, depth, 0).astype(np.float32))
 
 
+def _without(
+    street: Street, hidden: Bool[np.ndarray, "h w"], level: Bool[np.ndarray, "h w"]
+) -> UInt8[np.ndarray, "h w 3"]:
+    """The picture without what hides something: ground goes on as ground, what stands as what stands."""
+    flat, sky = np.isin(street.classes, FLAT), street.classes == StreetClass.SKY
+    users = _grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), _RIM_PX)
+    edges = inpainted(street.rgb, _grown(hidden, 3))
+    stands = inpainted(street.rgb, users | flat | sky)
+    ground = inpainted(street.rgb, _grown(hidden, 3) | users | ~flat)
+    return np.where(level[..., None], ground, np.where(users[..., None], stands, edges))
+
+
+def _across(values: Float[np.ndarray, "h w"], known: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    """Values where they are known, and straight between these along each row; 0 in rows without any.
+
+    Inverse depth runs straight over a plane, such as the front of a row of houses.
+    """
+    found, columns = np.zeros_like(values), np.arange(values.shape[1])
+    for row in np.flatnonzero(known.any(1)):
+        found[row] = np.interp(columns, columns[known[row]], values[row, known[row]])
+    return found
+
+
+def _grown(mask: Bool[np.ndarray, "h w"], side: int) -> Bool[np.ndarray, "h w"]:
+    return cv2.dilate(mask.astype(np.uint8), np.ones((side, side))) > 0
+
+
 def _gaussians(
-    sheet: _Sheet, camera: Camera, shown: Bool[np.ndarray, "h w"], options: LayerOptions
+    sheet: _Sheet,
+    camera: Camera,
+    shown: Bool[np.ndarray, "h w"],
+    users: UInt16[np.ndarray, "h w"],
+    options: LayerOptions,
 ) -> Gaussians:
     """A disc for each pixel that has depth."""
     chosen, depth = sheet.depth_m > 0, sheet.depth_m.astype(np.float64)
@@ -144,6 +220,7 @@ def _gaussians(
         logit_opacities=torch.full((count,), float(np.log(options.opacity / (1 - options.opacity)))),
         sh=_tensor((colour - 0.5) / SH_C0)[:, None],
         source_frame=torch.from_numpy(np.where(shown[chosen], 0, 1)),
+        actor=torch.from_numpy(users[chosen].astype(np.int64) - 1),
     )
 
 

@@ -17,6 +17,7 @@ from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
+from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
 from dreamdrive.prior.photo.way import path_for
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
@@ -24,6 +25,7 @@ from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.trajectory import Trajectory
 
 FRAMES = 25
 RATE_HZ = 10.0
@@ -47,9 +49,9 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     wanted = _wanted(control.frames)
     photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg)
     street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
-    layers = layers_of(street)
-    path = path_for(control, street, wanted / RATE_HZ)
-    frames, depth_m, sky = _driven(street, layers, path.world_from_camera, progress)
+    velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
+    path = path_for(control, street, wanted / RATE_HZ, gone=going_ahead(street, velocities))
+    frames, depth_m, sky, moving = _driven(street, path, velocities, progress)
     first = np.linalg.inv(path.world_from_camera[0])
     valid = np.ones(frames.shape[:3], bool)
     return Clip(
@@ -69,7 +71,11 @@ def make_clip(control: Control, progress: Progress) -> Clip:
             generated=True,
         ),
         requested=path if control.trajectory is not None else None,
-        provenance={"prior": "photo", "notes": [*photo.notes, *_notes(control, photo, seen, height)]},
+        set_in_motion=moving,
+        provenance={
+            "prior": "photo",
+            "notes": [*photo.notes, *_notes(control, photo, seen, height, velocities)],
+        },
     )
 
 
@@ -114,19 +120,25 @@ def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
 
 
 def _driven(
-    street: Street, layers: Layers, poses: Float[np.ndarray, "f 4 4"], progress: Progress
-) -> tuple[UInt8[np.ndarray, "f h w 3"], Float[np.ndarray, "f h w"], Bool[np.ndarray, "f h w"]]:
-    """Frames, depth and sky along a path; the photo itself where the path begins."""
-    drawn: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    for number, pose in enumerate(poses):
-        frame, sight = view(layers, street.camera.at(pose), street)
-        if np.allclose(pose, np.eye(4)):
+    street: Street, path: Trajectory, velocities: Float[np.ndarray, "u 3"], progress: Progress
+) -> tuple[
+    UInt8[np.ndarray, "f h w 3"],
+    Float[np.ndarray, "f h w"],
+    Bool[np.ndarray, "f h w"],
+    Bool[np.ndarray, "f h w"],
+]:
+    """Frames, depth, sky and what moves, along a path; the photo itself where the path begins."""
+    drawn: list[tuple[np.ndarray, ...]] = []
+    layers = layers_of(street, going_ahead(street, velocities))
+    for number, (t_s, pose) in enumerate(zip(path.times_s.tolist(), path.world_from_camera, strict=True)):
+        frame, sight = view(layers.at(t_s, velocities), street.camera.at(pose), street)
+        if np.allclose(pose, np.eye(4)) and t_s == 0:
             own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5)))
             frame = np.where(own[..., None] > 0, frame, street.rgb)
-        drawn.append((frame, sight.depth_m, sight.sky))
-        progress(number + 1, len(poses))
-    frames, depth_m, sky = (np.stack(each) for each in zip(*drawn, strict=True))
-    return frames, depth_m, sky
+        drawn.append((frame, sight.depth_m, sight.sky, sight.moving))
+        progress(number + 1, len(path.times_s))
+    frames, depth_m, sky, moving = (np.stack(each) for each in zip(*drawn, strict=True))
+    return frames, depth_m, sky, moving
 
 
 def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:
@@ -135,7 +147,9 @@ def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarr
     return inpainted(sight.rgb, sight.holes), sight
 
 
-def _notes(control: Control, photo: Photo, seen: Look, height: Height) -> list[str]:
+def _notes(
+    control: Control, photo: Photo, seen: Look, height: Height, velocities: Float[np.ndarray, "u 3"]
+) -> list[str]:
     notes = ["The frames are drawn from one photo: what it does not show is made up."]
     if not (photo.calibrated or photo.hfov):
         spread = 100 * seen.camera.focal_spread
@@ -153,5 +167,10 @@ def _notes(control: Control, photo: Photo, seen: Look, height: Height) -> list[s
         notes.append(
             f"Metres rest on a camera {height.metres:.2f} m above the road, by {by} (within "
             f"{100 * height.spread:.0f} %); --camera-height tells it."
+        )
+    if moving := int(velocities.any(1).sum()):
+        notes.append(
+            f"{moving} of {len(velocities)} road users were set in motion; where they go is made up, and "
+            "--traffic still leaves them in place."
         )
     return notes

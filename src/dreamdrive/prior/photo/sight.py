@@ -12,8 +12,8 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.splat import one_torch_thread, render
 
-_HALF = 0.5
-_EDGE = 0.1
+_HALF, _SOLID = 0.5, 0.8
+_EDGE, _JITTER = 0.1, 0.04
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class Sight:
         alpha: Share of each pixel that the layers cover (H, W).
         made_up: Share of that which the photo does not show (H, W).
         nearer: Logarithm of how much nearer it is than it was in the photo (H, W), and so how blurred.
+        moving: Where it shows what moves (H, W).
         sky: Where there is none of the layers, above the horizon (H, W).
     """
 
@@ -34,6 +35,7 @@ class Sight:
     alpha: Float[np.ndarray, "h w"]
     made_up: Float[np.ndarray, "h w"]
     nearer: Float[np.ndarray, "h w"]
+    moving: Bool[np.ndarray, "h w"]
     sky: Bool[np.ndarray, "h w"]
 
     @property
@@ -44,31 +46,55 @@ class Sight:
 
 def places_in(other: Camera, camera: Camera, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
     """Column, row and depth in the picture of another camera of what a camera sees at a depth, float32."""
-    points = camera.rays() * depth_m[..., None] @ camera.world_from_camera[:3, :3].T
-    points += camera.world_from_camera[:3, 3]
+    points = _points(camera, depth_m)
     return other.project(points.reshape(-1, 3)).reshape(points.shape).astype(np.float32)
+
+
+def _points(camera: Camera, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
+    rays = camera.rays() @ camera.world_from_camera[:3, :3].T
+    return rays * depth_m[..., None] + camera.world_from_camera[:3, 3]
 
 
 @one_torch_thread()
 @torch.no_grad()
 def sight_of(layers: Layers, camera: Camera, ground: Ground) -> Sight:
     """Draw the layers, whose photo was taken at the identity, from another place."""
-    g = layers.gaussians
-    marks = torch.stack([g.source_frame.float(), g.means[:, 2].clamp(min=0.1).log()], dim=1)
-    drawn = render(g, camera, channels=marks)
-    colour = drawn.colour + (1 - drawn.alpha)[..., None] * layers.sky.colour(camera)
+    g, carried_m = layers.gaussians, layers.carried_m
+    log_depth = (g.means - carried_m)[:, 2].clamp(min=0.1).log()
+    marks = [g.source_frame.float(), log_depth, layers.behind.float(), layers.moving.float()]
+    drawn = render(g, camera, channels=torch.cat([torch.stack(marks, dim=1), carried_m], dim=1))
+    colour = (drawn.colour + (1 - drawn.alpha)[..., None] * layers.sky.colour(camera)).numpy()
     alpha, depth = drawn.alpha.numpy(), drawn.expected_depth_m().numpy()
-    covered = np.maximum(alpha, 1e-3)
-    made_up, log_before = (drawn.channels[..., k].numpy() / covered for k in (0, 1))
-    nearer = np.where(alpha > _HALF, log_before - np.log(np.maximum(depth, 0.1)), 0)
+    means = drawn.channels.numpy() / np.maximum(alpha, 1e-3)[..., None]
+    made_up, log_before, behind, moving = (means[..., k] for k in range(4))
     near, far = cv2.erode(depth, np.ones((3, 3))), cv2.dilate(depth, np.ones((3, 3)))
     mixed = (depth > (1 + _EDGE) * near) & (depth < far / (1 + _EDGE))
     empty = alpha < _HALF
+    # Discs that overlap jitter in depth.
+    calm = cv2.blur(cv2.medianBlur(np.ascontiguousarray(depth, np.float32), 5), (3, 3))
+    one = ~mixed & (alpha > _SOLID) & (behind < 1 - _SOLID) & (np.abs(calm - depth) < _JITTER * depth)
+    points = _points(camera, calm) - means[..., 4:]
     return Sight(
-        rgb=np.rint(np.clip(colour.numpy(), 0, 1) * 255).astype(np.uint8),
+        rgb=_sharp(np.rint(np.clip(colour, 0, 1) * 255).astype(np.uint8), layers, points, one),
         depth_m=np.where(empty | mixed, 0, depth).astype(np.float32),
         alpha=alpha,
         made_up=np.clip(made_up, 0, 1).astype(np.float32),
-        nearer=nearer.astype(np.float32),
+        nearer=np.where(empty, 0, log_before - np.log(np.maximum(depth, 0.1))).astype(np.float32),
+        moving=~empty & (moving > _HALF),
         sky=empty & ~np.isfinite(ground.depth_m(camera)),
     )
+
+
+def _sharp(
+    rgb: UInt8[np.ndarray, "h w 3"],
+    layers: Layers,
+    points: Float[np.ndarray, "h w 3"],
+    one: Bool[np.ndarray, "h w"],
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Where one surface of the picture is seen its own pixels, which discs would blur; else as drawn."""
+    at = layers.camera.project(points.reshape(-1, 3)).reshape(points.shape).astype(np.float32)
+    found = cv2.remap(
+        layers.rgb, at[..., 0] - 0.5, at[..., 1] - 0.5, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+    share = np.clip(2 * cv2.blur(one.astype(np.float32), (3, 3)) - 1, 0, 1)[..., None]
+    return np.rint(share * found + (1 - share) * rgb).astype(np.uint8)

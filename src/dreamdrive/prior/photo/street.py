@@ -20,6 +20,8 @@ _FOOT = 0.12
 _LIKE = 2.0
 """A depth that has to be changed by more than this factor is no foot on the road."""
 _EDGE = 0.1
+_SHADOW, _DARK = 0.2, 0.75
+"""How far a shadow reaches over the size of its user, and how light it is over the ground below."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,29 @@ def street_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Camera, look: Look, heigh
     depth = np.where(plane < _LEVEL_M, np.minimum(depth, plane), depth)
     depth = np.clip(depth, 0, FAR_M)
     depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
-    return Street(rgb, camera, depth.astype(np.float32), classes, users, ground)
+    return Street(rgb, camera, depth.astype(np.float32), classes, _with_shadows(users, classes, rgb), ground)
+
+
+def _with_shadows(
+    users: UInt16[np.ndarray, "h w"], classes: UInt8[np.ndarray, "h w"], rgb: UInt8[np.ndarray, "h w 3"]
+) -> UInt16[np.ndarray, "h w"]:
+    """Road users with the dark ground under them, which goes where they go."""
+    light, flat, out = rgb.mean(2), np.isin(classes, FLAT), users.copy()
+    for user in range(1, int(users.max(initial=0)) + 1):
+        mask = users == user
+        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+        if not len(rows):
+            continue
+        down, aside = max(2, int(_SHADOW * len(rows))), max(1, int(_SHADOW * len(columns) / 2))
+        around = np.ones((2 * down + 1, 2 * aside + 1), np.uint8)
+        around[down + 1 :] = 0  # what is above a pixel reaches down to it
+        under = (cv2.dilate(mask.astype(np.uint8), around) > 0) & flat & (users == 0)
+        under[: rows[-1] - 2 * down] = False
+        road = flat[rows[-1] :, columns[0] : columns[-1] + 1]
+        if under.any() and road.any():
+            usual = np.median(light[rows[-1] :, columns[0] : columns[-1] + 1][road])
+            out[under & (light < _DARK * usual)] = user
+    return out
 
 
 def _factor(plane: np.ndarray, seen: np.ndarray, road: np.ndarray) -> float:

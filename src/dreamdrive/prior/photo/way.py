@@ -1,11 +1,12 @@
 """Where a photo is driven into: the path that was asked for, or straight ahead as far as the road is free."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
-from dreamdrive.prior.path import asked_path, path_of
+from dreamdrive.prior.path import asked_path, path_of, wanted_path
 from dreamdrive.prior.photo.street import Street
 from dreamdrive.scene.action import AT_S, Action, Command, Four, Goal, Steering, Waypoints
 from dreamdrive.scene.control import Control
@@ -13,7 +14,7 @@ from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.street_class import FLAT
 from dreamdrive.scene.trajectory import Trajectory
 
-SPEED_M_S = 6.0
+DRIVEN_M_S = 6.0
 """Where nothing is asked for and nothing is in the way."""
 _HALF_WIDTH_M, _KEEP_M = 1.2, 4.0
 """Of the own car's way, and how far it stays from what is in it."""
@@ -24,41 +25,51 @@ _LOW_M, _HIGH_M = 0.3, 2.5
 _LEAST_PX = 20
 
 
-def path_for(control: Control, street: Street, times_s: Float[np.ndarray, " f"]) -> Trajectory:
-    """The camera's path from its place in the photo on, at the times of the frames since then."""
-    if control.trajectory is not None:
-        path = read_trajectory(control.trajectory)
+def path_for(
+    control: Control, street: Street, times_s: Float[np.ndarray, " f"], gone: Sequence[int] = ()
+) -> Trajectory:
+    """The camera's path from its place in the photo on, at the times of the frames since then.
+
+    Road users that are ``gone``, see ``free_m``, make way.
+    """
+    path = wanted_path(control)
+    if path is not None:
         needed_s = float(path.times_s[0] + times_s[-1])
         if path.times_s[-1] < needed_s - 1e-6:
             raise InputError(
-                f"trajectory {control.trajectory}: it ends at {path.times_s[-1]:.3g} s; expected a path "
+                f"trajectory: it ends at {path.times_s[-1]:.3g} s; expected a path "
                 f"until {needed_s:.3g} s: give a longer one or fewer --frames"
             )
         return asked_path(path, times_s)
-    action = _driven(control.action, street, float(times_s[-1]))
+    action = _driven(control.action, street, float(times_s[-1]), gone)
     level = path_of(action, np.concatenate([[0.0], times_s[times_s > 0]]))
     return Trajectory(_tilted(level, street.ground).world_from_camera[-len(times_s) :], times_s)
 
 
-def free_m(street: Street) -> float:
-    """How far the own way is free ahead, in metres along z; infinite where nothing is in it."""
+def free_m(street: Street, gone: Sequence[int] = ()) -> float:
+    """How far the own way is free ahead, in metres along z; infinite where nothing is in it.
+
+    Road users whose numbers, from 1, are among ``gone`` do not count.
+    """
     points = street.camera.rays() * street.depth_m[..., None]
     up = street.ground.height_m(points)
     solid = (street.depth_m > 0) & (up > _LOW_M) & (up < _HIGH_M) & (np.abs(points[..., 0]) < _HALF_WIDTH_M)
-    solid &= ~np.isin(street.classes, FLAT)
+    solid &= ~np.isin(street.classes, FLAT) & ~np.isin(street.users, gone)
     return float(np.sort(street.depth_m[solid])[_LEAST_PX]) if solid.sum() > _LEAST_PX else float("inf")
 
 
-def _driven(action: Action | None, street: Street, seconds: float) -> Waypoints | Steering:
+def _driven(
+    action: Action | None, street: Street, seconds: float, gone: Sequence[int]
+) -> Waypoints | Steering:
     if isinstance(action, Waypoints | Steering):
         return action
     if isinstance(action, Goal):
         return _to(action, street)
-    free = max(free_m(street) - _KEEP_M, 0.0)
-    speed = min(SPEED_M_S, free / max(seconds, 1e-3))
+    free = max(free_m(street, gone) - _KEEP_M, 0.0)
+    speed = min(DRIVEN_M_S, free / max(seconds, 1e-3))
     wheel: Four = (0.0, 0.0, 0.0, 0.0)
     if isinstance(action, Command) and action.direction == "stop":
-        return Steering((0.6 * SPEED_M_S, 0.3 * SPEED_M_S, 0.1, 0.0), wheel)
+        return Steering((0.6 * DRIVEN_M_S, 0.3 * DRIVEN_M_S, 0.1, 0.0), wheel)
     if isinstance(action, Command) and action.direction in ("left", "right"):
         speed, sign = min(_SLOWER_M_S, max(speed, 1.0)), 1 if action.direction == "left" else -1
         turned = sign * _TURN_RAD

@@ -43,7 +43,7 @@ VISTA = replace(
     SVD,
     name="vista",
     make=partial(_make, "vista"),
-    takes=SVD.takes | {"action", "trajectory"},
+    takes=SVD.takes | {"action", "actions", "trajectory", "trajectories"},
     gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
     about="a street goes on from a photo or up to three frames, as told by an action (Vista)",
     licence=(

@@ -9,12 +9,11 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from dreamdrive.data import read_trajectory
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, waypoints_by_round
+from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, wanted_path, waypoints_by_round
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.engine import Engine
@@ -116,8 +115,8 @@ def _told(
     """Columns of the action in each round, None for SVD; and the path that it asks for, if it does."""
     if kind is SVD:
         return [None] * len(spans), None
-    if control.trajectory is not None:
-        path = read_trajectory(control.trajectory)
+    path = wanted_path(control)
+    if path is not None:
         starts_s = np.array([span.start for span in spans]) / kind.rate_hz
         points = waypoints_by_round(path, starts_s, float(times_s[-1]))
         return [embed_action(numbers_of(each)) for each in points], asked_path(path, times_s)

@@ -34,18 +34,18 @@ class PhotoTraining:
         crop_px: Side of the square that is cut from each.
         rate: Largest step of Adam; it rises for ``warm`` steps and falls as a cosine.
         warm: Steps until then.
-        perceptual: Weight of the distance in features of the street network's encoder beside L1.
+        perceptual: Weight of the distance in features of the street network's encoder, beside L1.
         spoilt: How much more what is made up, empty or stretched counts.
         average: Share of the averaged weights that a step keeps.
         seed: Of everything random.
     """
 
-    steps: int = 30_000
+    steps: int = 12_000
     batch: int = 4
-    crop_px: int = 192
+    crop_px: int = 144
     rate: float = 4e-4
     warm: int = 200
-    perceptual: float = 0.5
+    perceptual: float = 0.2
     spoilt: float = 3.0
     average: float = 0.999
     seed: int = 0
@@ -59,9 +59,13 @@ def train_photo(
     *,
     licence: str = "Apache-2.0",
     checkpoint_s: float = 120.0,
+    stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int, int, float], None] = lambda step, steps, loss: None,
-) -> Path:
-    """Train on pairs and write ``photo.safetensors``; the same call goes on where it stopped."""
+) -> Path | None:
+    """Train on pairs and write ``photo.safetensors``; the same call goes on where it stopped.
+
+    ``stop`` is asked after each step; then a checkpoint is written and no weights.
+    """
     if not pairs:
         raise InputError("there are no pairs to train on: no street was seen in any of the pictures")
     out.mkdir(parents=True, exist_ok=True)
@@ -84,12 +88,15 @@ def train_photo(
                 mean.lerp_(value, 1 - keep)
         losses.append(loss)
         progress(step + 1, options.steps, loss)
-        if time.monotonic() - saved > checkpoint_s or step + 1 == options.steps:
+        stopped = step + 1 < options.steps and stop()
+        if stopped or time.monotonic() - saved > checkpoint_s or step + 1 == options.steps:
             spent_s = before_s + time.monotonic() - began
             save_checkpoint(out, step + 1, spent_s, both, optimiser, options, data)
             with (out / _LOG).open("a") as file:
                 file.write(json.dumps({"step": step + 1, "loss": round(float(np.mean(losses)), 5)}) + "\n")
             saved, losses = time.monotonic(), []
+        if stopped:
+            return None
     state = {name: value.half().contiguous() for name, value in averaged.state_dict().items()}
     with new_file(out / WEIGHTS) as partial:
         save_file(state, partial, {"licence": licence, "options": json.dumps(asdict(options))})
@@ -134,7 +141,7 @@ def _step(
     there, wanted = judge.encoder(said), judge.encoder(true_there)
     for a, b in zip(there[:3], wanted[:3], strict=True):
         scale = b.square().mean().sqrt() + 1e-3
-        loss = loss + options.perceptual / 3 * ((a - b.detach()).abs().mean() / scale) * 0.1
+        loss = loss + options.perceptual / 3 * (a - b.detach()).abs().mean() / scale
     optimiser.zero_grad(set_to_none=True)
     loss.backward()
     torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
