@@ -81,6 +81,15 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
+def parse_view(text: str) -> tuple[float, float]:
+    """Heading and pitch from ``30,-5``, in degrees."""
+    try:
+        heading, pitch = _numbers(text, 2)
+    except InputError as error:
+        raise InputError(f"--view {error}; such as 30,0, in degrees") from None
+    return heading, pitch
+
+
 def parse_action(text: str) -> Action:
     """An action from words like those of ``EXAMPLES``: metres, metres a second, radians; left is positive.
 

@@ -16,11 +16,19 @@ from dreamdrive.choices import (
     Stage,
     TrafficName,
 )
-from dreamdrive.cli.arguments import DataSetName, GeometryName, PriorName, parse_action, parse_size
+from dreamdrive.cli.arguments import (
+    DataSetName,
+    GeometryName,
+    PriorName,
+    parse_action,
+    parse_size,
+    parse_view,
+)
 from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
 from dreamdrive.cli.progress import Bars
 
 if TYPE_CHECKING:
+    from dreamdrive.options import Options
     from dreamdrive.run import Outcome
 
 _ROUGH = 3
@@ -47,6 +55,7 @@ def generate(
     refine_poses: bool = False,
     geometry_files: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None,
     hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
+    view: Annotated[str | None, arg(metavar="HEADING,PITCH", help_behavior_hint="")] = None,
     camera_height: Annotated[float | None, arg(metavar="M", help_behavior_hint="(default: 1.5)")] = None,
     trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     trajectories: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
@@ -95,6 +104,7 @@ def generate(
         refine_poses: Let given poses tell only how long the path is, and the frames how it runs: for poses of
             a positioning system, which are not exact between two frames.
         hfov: Horizontal field of view, where there is no calibration.
+        view: What is taken out of a photo that is a panorama: degrees to the right of its middle, and up.
         camera_height: Height of the camera above the road in metres; fixes the metric scale.
         trajectory: Path that a video model shall drive, JSON or TUM, or that a replayed video was to drive:
             KITTI or PandaSet as well.
@@ -120,9 +130,7 @@ def generate(
         strict: Exit with code 3 where the result is rough; it is kept.
     """
     use_all_cores()
-    from dreamdrive.options import QUALITIES, with_method
     from dreamdrive.pipeline import generate as run
-    from dreamdrive.run import read_options
     from dreamdrive.scene.control import Control
 
     stop_like_an_interruption()
@@ -135,6 +143,7 @@ def generate(
         intrinsics=intrinsics,
         poses=poses,
         hfov_deg=hfov,
+        view=None if view is None else parse_view(view),
         trajectory=trajectory,
         trajectories=trajectories,
         **_actions(action),
@@ -146,11 +155,10 @@ def generate(
         hold_out=hold_out,
         seed=seed,
     )
-    chosen = with_method(QUALITIES[quality], method)
-    chosen = chosen if options is None else read_options(options, chosen)
+    chosen = _options(quality, method, options)
     found = _given(method=geometry, camera_height_m=camera_height, refine_poses=refine_poses or None)
-    chosen = replace(chosen, geometry=replace(chosen.geometry, **found))
-    chosen = replace(chosen, **_given(representation=representation, device=device, knowledge=knowledge))
+    others = _given(representation=representation, device=device, knowledge=knowledge)
+    chosen = replace(chosen, geometry=replace(chosen.geometry, **found), **others)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     with Bars(console) as bars:
         outcome = run(
@@ -180,6 +188,15 @@ def _tell(console: Console, outcome: "Outcome", out: Path) -> None:
         console.print(line)
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
         console.print(f"{what:<7} {out / name}")
+
+
+def _options(quality: QualityName, method: MethodName, file: Path | None) -> "Options":
+    """Those of the quality and the method, and in their place what the file says."""
+    from dreamdrive.options import QUALITIES, with_method
+    from dreamdrive.run import read_options
+
+    chosen = with_method(QUALITIES[quality], method)
+    return chosen if file is None else read_options(file, chosen)
 
 
 def _actions(words: tuple[str, ...]) -> dict[str, Any]:

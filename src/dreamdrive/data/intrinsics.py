@@ -17,6 +17,7 @@ from dreamdrive.scene.camera import Camera
 
 DEFAULT_FOCAL = 0.85
 """Focal length over the longer side of the image where nothing is known: 61 degrees, a usual dashcam."""
+GUESSED = f"No calibration: the focal length is taken as {DEFAULT_FOCAL} times the longer side."
 _ASPECT_TOLERANCE = 0.005
 _OPENCV_ORDER = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty"]
 
@@ -48,7 +49,7 @@ def guess_camera(size: tuple[int, int], hfov_deg: float | None = None) -> Calibr
     width, height = size
     if hfov_deg is None:
         focal = DEFAULT_FOCAL * max(size)
-        said = f"No calibration: the focal length is taken as {DEFAULT_FOCAL} times the longer side."
+        said = GUESSED
     elif not 1 <= hfov_deg <= 179:
         raise InputError(f"--hfov {hfov_deg:g}: expected degrees between 1 and 179, such as 60")
     else:

@@ -1,14 +1,16 @@
 """What a video model starts from: a photo, or the first frames of a recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
 
+from dreamdrive.data.exif import PhotoFacts, read_exif
 from dreamdrive.data.images import SUFFIXES, RawFrame, read_image
-from dreamdrive.data.intrinsics import calibration
+from dreamdrive.data.intrinsics import Calibration, calibration
 from dreamdrive.data.lens import Lens, Undistorter
+from dreamdrive.data.panorama import USUAL_HFOV_DEG, is_panorama, view_of
 from dreamdrive.data.remarks import of_damage
 from dreamdrive.data.select import UNBOUNDED
 from dreamdrive.data.size import cover
@@ -37,17 +39,35 @@ class Photo:
 
 
 def read_photo(
-    path: Path, size: tuple[int, int], intrinsics: Path | None = None, hfov_deg: float | None = None
+    path: Path,
+    size: tuple[int, int],
+    intrinsics: Path | None = None,
+    hfov_deg: float | None = None,
+    view: tuple[float, float] | None = None,
 ) -> Photo:
     """Read a photo, or the first frame of a recording, at the size (width, height) that a model wants.
 
     It is scaled to cover the size and cut around its centre; a known distortion is taken out of it.
-    Calibration as of ``intrinsics.calibration``.
+    Calibration as of ``intrinsics.calibration``; without one the focal length of the photo's EXIF data counts
+    as a field of view that was told. Of a panorama, ``view`` is the heading and pitch of what is taken, in
+    degrees, and ``hfov_deg`` its field of view.
     """
     (raw,), notes = leading_frames(path, 1)
+    if view is not None:
+        if intrinsics is not None:
+            raise InputError("--view takes a pinhole out of a panorama; leave --intrinsics out")
+        return _out_of_panorama(path, raw, size, view, hfov_deg or USUAL_HFOV_DEG)
     if not is_photo(path):
         notes.append(f"The video goes on from the first frame of {path.name}.")
+    elif is_panorama(raw.size):
+        notes.append(
+            f"{path.name} is twice as wide as high; --view HEADING,PITCH takes a view out of a panorama."
+        )
+    facts = read_exif(path) if is_photo(path) else PhotoFacts()
     known = calibration(raw.size, intrinsics, hfov_deg)
+    if not known.known and not known.hfov:
+        known = _by_exif(known, facts, raw.size)
+    notes += _place(facts)
     sizing = cover(raw.size, size)
     camera = sizing.camera(known.camera)
     if known.distortion is None:
@@ -60,6 +80,38 @@ def read_photo(
     if sizing.shrink < 1:
         notes.append(f"The photo was enlarged {1 / sizing.shrink:.2f} times; it holds no more detail.")
     return Photo(rgb, camera, known.known, (*raw.notes, *known.notes, *notes), known.hfov)
+
+
+def _out_of_panorama(
+    path: Path, raw: RawFrame, size: tuple[int, int], view: tuple[float, float], hfov_deg: float
+) -> Photo:
+    rgb, camera = view_of(raw.rgb, *view, hfov_deg, size, str(path))
+    heading, pitch = view
+    said = (
+        f"A view was taken out of the panorama {path.name}: heading {heading:g}, pitch {pitch:g}, field of "
+        f"view {hfov_deg:g} degrees."
+    )
+    return Photo(rgb, camera, True, (*raw.notes, said, *_place(read_exif(path))))
+
+
+def _by_exif(guess: Calibration, facts: PhotoFacts, size: tuple[int, int]) -> Calibration:
+    """The guess with the focal length that the photo tells, if it does."""
+    focal = facts.focal_px(size)
+    if focal is None:
+        return guess
+    said = (
+        f"The photo's EXIF data tell the focal length, {facts.focal_35_mm:g} mm on film of 36 x 24 mm.",
+        *guess.notes[1:],
+    )
+    return replace(guess, camera=replace(guess.camera, fx_px=focal, fy_px=focal), hfov=True, notes=said)
+
+
+def _place(facts: PhotoFacts) -> list[str]:
+    if facts.latitude_deg is None or facts.longitude_deg is None:
+        return []
+    heading = "" if facts.heading_deg is None else f", heading {facts.heading_deg:.0f} degrees"
+    where = f"{facts.latitude_deg:.5f}, {facts.longitude_deg:.5f}{heading}"
+    return [f"The photo was taken at {where}, by its EXIF data."]
 
 
 def is_photo(path: Path) -> bool:

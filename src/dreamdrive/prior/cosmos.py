@@ -161,6 +161,7 @@ COSMOS = Prior(
             "size",
             "intrinsics",
             "hfov_deg",
+            "view",
             "hold_out",
         }
     ),

@@ -86,7 +86,7 @@ def photo_of(control: Control, size: tuple[int, int], prior: str) -> Photo:
     """The picture that the video starts from."""
     if control.path is None:
         raise InputError(f"the prior {prior} needs an input: a photo, or a recording for its first frame")
-    return read_photo(control.path, size, control.intrinsics, control.hfov_deg)
+    return read_photo(control.path, size, control.intrinsics, control.hfov_deg, control.view)
 
 
 def wanted_frames(control: Control, usual: int) -> tuple[int, Int[np.ndarray, " f"]]:

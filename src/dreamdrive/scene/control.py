@@ -26,6 +26,7 @@ class Control:
         intrinsics: Calibration file of the input.
         poses: Pose file of the input.
         hfov_deg: Horizontal field of view in degrees, where there is no calibration.
+        view: Heading and pitch in degrees of what is taken out of a panorama.
         trajectory: The wanted path of the camera or a file with it, for priors that make one.
         trajectories: File with several wanted paths from the same first frame, each a drive of its own.
         action: What the car shall do, for priors that take no path.
@@ -50,6 +51,7 @@ class Control:
     intrinsics: Path | None = None
     poses: Path | None = None
     hfov_deg: float | None = None
+    view: tuple[float, float] | None = None
     trajectory: Path | Trajectory | None = None
     trajectories: Path | None = None
     action: Action | None = None

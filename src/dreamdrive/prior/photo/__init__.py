@@ -14,6 +14,7 @@ PHOTO = Prior(
             "frames",
             "size",
             "hfov_deg",
+            "view",
             "intrinsics",
             "hold_out",
             "action",

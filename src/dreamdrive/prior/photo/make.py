@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.data.intrinsics import GUESSED
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.data.size import check_largest
@@ -24,7 +25,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street_class import FLAT, StreetClass
 from dreamdrive.scene.trajectory import Trajectory
 
 FRAMES = 25
@@ -32,7 +33,7 @@ RATE_HZ = 10.0
 SIZE = (480, 270)
 _MOST_FRAMES = 1000
 _HALF = 0.5
-_LEAST_SOLID = 0.05
+_LEAST_SOLID, _LITTLE_GROUND = 0.05, 0.05
 _LEAST_CONTRAST = 3.0  # grey levels: a street at night has more
 
 
@@ -47,7 +48,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
         raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
     check_largest(size, f"--size {size[0]}x{size[1]}")
     wanted = _wanted(control.frames)
-    photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg)
+    photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg, control.view)
     street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
     velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
     path = path_for(control, street, wanted / RATE_HZ, gone=going_ahead(street, velocities))
@@ -74,7 +75,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
         set_in_motion=moving,
         provenance={
             "prior": "photo",
-            "notes": [*photo.notes, *_notes(control, photo, seen, height, velocities)],
+            "notes": _notes(control, photo, seen, height, velocities),
         },
     )
 
@@ -86,7 +87,7 @@ def seen_in(photo: Photo, knowledge: str, height_m: float | None) -> tuple[Stree
         InputError: Nothing solid is seen.
     """
     if float(photo.rgb.std(axis=(0, 1)).max()) < _LEAST_CONTRAST:
-        raise InputError("the photo is of one colour; expected a street, seen from a car")
+        raise InputError("the photo is of one colour, or dark all over; expected a street, seen from a car")
     told = photo.calibrated or photo.hfov
     seen = look(photo.rgb[None], knowledge, focal_px=photo.camera.fx_px if told else None)
     camera = photo.camera
@@ -150,7 +151,10 @@ def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarr
 def _notes(
     control: Control, photo: Photo, seen: Look, height: Height, velocities: Float[np.ndarray, "u 3"]
 ) -> list[str]:
-    notes = ["The frames are drawn from one photo: what it does not show is made up."]
+    notes = [note for note in photo.notes if note != GUESSED]  # the street network guesses better
+    notes.append("The frames are drawn from one photo: what it does not show is made up.")
+    if float(np.isin(seen.classes[0], FLAT).mean()) < _LITTLE_GROUND:
+        notes.append("Hardly any ground is seen in the photo: the road is a guess, and so are all distances.")
     if not (photo.calibrated or photo.hfov):
         spread = 100 * seen.camera.focal_spread
         notes.append(
