@@ -178,11 +178,19 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     return run(
         "fit",
         [o.representation, o.fit, o.cast, o.drift, o.motion, o.densify, o.device, given.tracks],
-        lambda work: fit(
-            clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work, device
+        lambda work: _completed(
+            clip,
+            fit(clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work, device),
         ),
         check=partial(check.scene, clip),
     )
+
+
+def _completed(clip: Clip, scene: Scene) -> Scene:
+    """The scene with what the prior knows to stand where no frame looks."""
+    if clip.known.unseen is None or scene.drifts or not len(scene.static):
+        return scene
+    return scene.with_standing(clip.known.unseen)
 
 
 def decompose(

@@ -5,12 +5,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import torch
 
 from dreamdrive.data import read_trajectories
 from dreamdrive.data.select import Selection
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.gaussians import Gaussians
 
 
 def rollouts_of(control: Control) -> list[Control]:
@@ -45,11 +47,13 @@ def together(clips: Sequence[Clip]) -> Clip:
         return woven(lambda clip: clip.features[name])
 
     names = set.intersection(*(set(clip.features) for clip in clips))
+    unseen = [clip.known.unseen for clip in clips if clip.known.unseen is not None]
     known = replace(
         first.known,
         world_from_camera=woven(lambda clip: clip.known.world_from_camera),
         depth_m=woven(lambda clip: clip.known.depth_m),
         sky=woven(lambda clip: clip.known.sky),
+        unseen=_in_all(unseen) if len(unseen) == len(clips) else None,
         shared_first=True,
     )
     notes = [
@@ -71,3 +75,12 @@ def together(clips: Sequence[Clip]) -> Clip:
         set_in_motion=woven(lambda clip: clip.set_in_motion),
         provenance={**first.provenance, "notes": notes},
     )
+
+
+def _in_all(parts: Sequence[Gaussians]) -> Gaussians:
+    """Gaussians that are in all of several selections of the same ones, in the order of the first."""
+    rows = [np.ascontiguousarray(part.means.numpy()).view(np.dtype((np.void, 12))).ravel() for part in parts]
+    kept = np.ones(len(rows[0]), bool)
+    for other in rows[1:]:
+        kept &= np.isin(rows[0], other)
+    return parts[0].select(torch.from_numpy(np.flatnonzero(kept)))

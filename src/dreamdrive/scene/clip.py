@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry, Ground
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.trajectory import Trajectory
@@ -31,6 +32,8 @@ class Known:
         generated: Whether a model drew the frames for these poses, or for the rig's mountings: that the
             frames show something else is then no mistake of the user's.
         hfov: Whether the field of view at least was told; what turning shows may correct it.
+        unseen: What stands and no frame shows, in the world of the poses, as the prior made it up: it is no
+            part of any fit.
         shared_first: Whether the cameras of the rig are one, on several drives that begin at one frame.
     """
 
@@ -43,6 +46,7 @@ class Known:
     ground: Ground | None = None
     generated: bool = False
     hfov: bool = False
+    unseen: Gaussians | None = None
     shared_first: bool = False
 
     @property

@@ -142,6 +142,12 @@ class Scene:
         dynamic = self.dynamic.select(torch.nonzero(~members).squeeze(1))
         return replace(self, dynamic=dynamic, actors=tuple(a for a in self.actors if a.id != id))
 
+    def with_standing(self, more: Gaussians) -> "Scene":
+        """The scene with more of what never moves; the fewer coefficients of colour are filled with zeros."""
+        coefficients = max(self.static.sh.shape[1], more.sh.shape[1])
+        parts = [replace(part, sh=_widened(part.sh, coefficients)) for part in (self.static, more)]
+        return replace(self, static=Gaussians.concatenate(*parts))
+
     def with_track(self, id: int, track: Track) -> "Scene":
         """The scene with an actor on another track, whose places are those of the same point of it.
 
@@ -178,3 +184,7 @@ class Scene:
         """All Gaussians at ``t_s``: the static ones, then the living dynamic ones; no gradients."""
         static = self.static_at(t_s)
         return Gaussians.concatenate(static, self.dynamic_at(t_s)) if len(self.dynamic) else static
+
+
+def _widened(sh: Float[Tensor, "n k 3"], coefficients: int) -> Float[Tensor, "n m 3"]:
+    return torch.nn.functional.pad(sh, (0, 0, 0, coefficients - sh.shape[1]))

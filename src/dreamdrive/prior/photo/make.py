@@ -19,6 +19,7 @@ from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
 from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
+from dreamdrive.prior.photo.unseen import unseen_of
 from dreamdrive.prior.photo.way import path_for
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
@@ -52,8 +53,10 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
     velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
     path = path_for(control, street, wanted / RATE_HZ, gone=going_ahead(street, velocities))
-    frames, depth_m, sky, moving = _driven(street, path, velocities, progress)
+    layers = layers_of(street, going_ahead(street, velocities))
+    frames, depth_m, sky, moving = _driven(street, layers, path, velocities, progress)
     first = np.linalg.inv(path.world_from_camera[0])
+    cameras = [street.camera.at(pose) for pose in path.world_from_camera]
     valid = np.ones(frames.shape[:3], bool)
     return Clip(
         frames=frames,
@@ -69,6 +72,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
             intrinsics=True,
             depth_m=depth_m,
             sky=sky,
+            unseen=unseen_of(layers, cameras, depth_m) if np.allclose(first, np.eye(4)) else None,
             generated=True,
         ),
         requested=path if control.trajectory is not None else None,
@@ -121,7 +125,11 @@ def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
 
 
 def _driven(
-    street: Street, path: Trajectory, velocities: Float[np.ndarray, "u 3"], progress: Progress
+    street: Street,
+    layers: Layers,
+    path: Trajectory,
+    velocities: Float[np.ndarray, "u 3"],
+    progress: Progress,
 ) -> tuple[
     UInt8[np.ndarray, "f h w 3"],
     Float[np.ndarray, "f h w"],
@@ -130,7 +138,6 @@ def _driven(
 ]:
     """Frames, depth, sky and what moves, along a path; the photo itself where the path begins."""
     drawn: list[tuple[np.ndarray, ...]] = []
-    layers = layers_of(street, going_ahead(street, velocities))
     for number, (t_s, pose) in enumerate(zip(path.times_s.tolist(), path.world_from_camera, strict=True)):
         frame, sight = view(layers.at(t_s, velocities), street.camera.at(pose), street)
         if np.allclose(pose, np.eye(4)) and t_s == 0:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.choices import TrafficName
 from dreamdrive.prior.photo.street import Street
 from dreamdrive.prior.photo.way import DRIVEN_M_S, level_axes
-from dreamdrive.scene.street_class import FLAT, StreetClass
+from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
 
 TRAFFIC: TrafficName = "flow"
 """Unless told."""
@@ -33,11 +33,12 @@ _LAMPS = (0.003, 0.15)
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a user stands: metres to the right and ahead, and its lowest row."""
+    """Where a user stands: metres to the right and ahead, its lowest row, whether it is cut off."""
 
     right_m: float
     ahead_m: float
     row: int
+    cut_off: bool
 
 
 def velocities_of(street: Street, traffic: TrafficName, speed_m_s: float | None) -> Float[np.ndarray, "u 3"]:
@@ -56,8 +57,8 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
     """Velocities of the road users in the street's world, in m/s; row k is of user k + 1.
 
     What is in the own lane, or beside it on the own side with road all around, drives ahead; on the other
-    side it comes towards the camera, unless its back is seen. Vehicles at the edge of the road are parked.
-    Users that the picture's border cuts off, and far ones, stand still.
+    side it comes towards the camera, unless its back is seen. Vehicles that stand at the edge of the road, or
+    may do, are parked. Far users, and nearly all that the picture's border cuts off, stand still.
     """
     count = int(street.users.max(initial=0))
     velocities, axes = np.zeros((count, 3)), level_axes(street.ground)
@@ -71,7 +72,7 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
             continue
         kind = StreetClass(int(np.bincount(street.classes[mask]).argmax()))
         if kind == StreetClass.PERSON:
-            way = WALK_M_S * (1 if user % 2 else -1)
+            way = 0.0 if place.cut_off else WALK_M_S * (1 if user % 2 else -1)
         else:
             way = speed_m_s * _direction(street, mask, place, side)
             if kind == StreetClass.TWO_WHEELER and abs(place.right_m) > _LANE_M / 2:
@@ -94,8 +95,8 @@ def _own_side(street: Street, axes: Float[np.ndarray, "3 3"]) -> int:
 def _place_of(
     mask: Bool[np.ndarray, "h w"], depth_m: Float[np.ndarray, "h w"], points: Float[np.ndarray, "h w 3"]
 ) -> _Place | None:
-    """None where the user is cut off, far or hardly seen."""
-    if mask.sum() < _LEAST_PX or mask[:, :2].any() or mask[:, -2:].any() or mask[-2:].any():
+    """None where the user is far or hardly seen."""
+    if mask.sum() < _LEAST_PX:
         return None
     rows = np.flatnonzero(mask.any(1))
     foot = mask.copy()
@@ -104,30 +105,34 @@ def _place_of(
     if not foot.any() or np.median(depth_m[foot]) > _FAR_M:
         return None
     right_m = float(np.median(points[mask & (depth_m > 0)][:, 0]))
-    return _Place(right_m, float(np.median(points[foot][:, 2])), int(rows[-1]))
+    cut_off = bool(mask[:, :2].any() or mask[:, -2:].any() or mask[-2:].any())
+    return _Place(right_m, float(np.median(points[foot][:, 2])), int(rows[-1]), cut_off)
 
 
 def _direction(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, side: int) -> int:
     """1 ahead, -1 towards the camera, 0 where it is parked."""
     if abs(place.right_m) < _LANE_M / 2:
+        return 0 if place.cut_off else 1
+    strict, may_be = (_on_road(street, mask, place, hidden_is_road=each) for each in (False, True))
+    if place.right_m * side > 0:
+        return 1 if strict and not place.cut_off else 0
+    if may_be and _back_is_seen(street, mask):
         return 1
-    if not _on_road(street, mask, place):
-        return 0
-    return 1 if place.right_m * side > 0 or _back_is_seen(street, mask) else -1
+    return -1 if strict and not place.cut_off else 0
 
 
-def _on_road(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place) -> bool:
-    """Whether the road goes on at both sides of the foot."""
+def _on_road(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, *, hidden_is_road: bool) -> bool:
+    """Whether the road goes on at both sides of the foot; what other users hide is road or is not."""
     kerb = (_KERB_M, _BESIDE_M) if place.right_m < 0 else (_BESIDE_M, _KERB_M)
     left, right = (max(2, round(street.camera.fx_px * metres / place.ahead_m)) for metres in kerb)
     columns = np.flatnonzero(mask[max(place.row - 1, 0) : place.row + 1].any(0))
-    road = np.isin(street.classes, (StreetClass.ROAD, StreetClass.MARKING))
-    rows = slice(max(place.row - 1, 0), place.row + 3)
+    kinds = (StreetClass.ROAD, StreetClass.MARKING, *(ROAD_USERS if hidden_is_road else ()))
+    road, rows = np.isin(street.classes, kinds), slice(max(place.row - 1, 0), place.row + 3)
     beside = (
         road[rows, max(columns[0] - left, 0) : columns[0]],
         road[rows, columns[-1] + 1 : columns[-1] + 1 + right],
     )
-    return all(each.size > 0 and each.mean() > _ON_ROAD for each in beside)
+    return all(each.size > 0 and float(each.mean()) > _ON_ROAD for each in beside)
 
 
 def _back_is_seen(street: Street, mask: Bool[np.ndarray, "h w"]) -> bool:

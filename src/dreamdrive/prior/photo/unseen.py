@@ -1,0 +1,32 @@
+"""What stands in the layers of a photo and no frame of a drive shows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from dreamdrive.prior.photo.layers import Layers
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import Gaussians
+
+_BEHIND = 1.03
+"""Depth over that of a frame from which on a Gaussian is hidden there."""
+
+
+def unseen_of(layers: Layers, cameras: Sequence[Camera], depth_m: Float[np.ndarray, "f h w"]) -> Gaussians:
+    """Gaussians that are outside of all frames, or behind what these show; none of road users."""
+    g = layers.gaussians
+    standing = np.ones(len(g), bool) if g.actor is None else g.actor.numpy() < 0
+    points, seen = g.means.numpy().astype(np.float64), ~standing
+    for camera, depth in zip(cameras, depth_m, strict=True):
+        left = np.flatnonzero(~seen)
+        at = camera.project(points[left])
+        inside = camera.shows(at)
+        column, row = (
+            np.clip(at[inside, k].astype(int), 0, n - 1) for k, n in ((0, depth.shape[1]), (1, len(depth)))
+        )
+        shown = depth[row, column]
+        seen[left[inside]] = (shown <= 0) | (at[inside, 2] < _BEHIND * shown)
+    chosen = g.select(torch.from_numpy(np.flatnonzero(~seen)))
+    return Gaussians(**{name: value for name, value in chosen.tensors().items() if name != "actor"})
