@@ -131,3 +131,14 @@ def test_a_street_that_drifts_is_where_its_velocities_take_it() -> None:
     assert then.lifespan is None
     with pytest.raises(ValueError, match="need life spans"):
         replace(scene.static, lifespan=None).drifted_at(0.0)
+
+
+def test_more_that_stands_is_drawn_beside_what_was_fitted() -> None:
+    scene = make_scene()
+    more = replace(scene.static, sh=scene.static.sh[:, :1], features=None)
+    both = scene.with_standing(more)
+    assert len(both.static) == 2 * len(scene.static)
+    assert both.static.sh.shape[1] == scene.static.sh.shape[1]
+    torch.testing.assert_close(both.static.means[len(scene.static) :], scene.static.means)
+    assert (both.static.sh[len(scene.static) :, 1:] == 0).all()
+    assert both.dynamic is scene.dynamic
