@@ -23,7 +23,15 @@ from dreamdrive.run.workspace import REPORT, Workspace
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Provenance, Scene
-from dreamdrive.show import Scored, draw_geometry, lens_of, write_held_out, write_png, write_videos
+from dreamdrive.show import (
+    Scored,
+    draw_drives,
+    draw_geometry,
+    lens_of,
+    write_held_out,
+    write_png,
+    write_videos,
+)
 from dreamdrive.stored import save_scene
 
 T = TypeVar("T")
@@ -64,6 +72,8 @@ class Production(Stages):
             write_videos(staging / "video", scene, self._recorded(clip, scene), self._scored(), progress)
             write_held_out(staging / "held_out", scene, clip.source_index.tolist())
             write_png(staging / "report.png", draw_geometry(clip, geometry))
+            if (drives := draw_drives(scene)) is not None:
+                write_png(staging / "video" / "drives.png", drives)
 
         self.measure("videos", show)
         report = describe(

@@ -1,5 +1,6 @@
 """All drawing: videos, panels, pictures of the geometry, renderings of drives."""
 
+from dreamdrive.show.drives import draw_drives
 from dreamdrive.show.geometry import draw_geometry
 from dreamdrive.show.geometry_truth import draw_geometry_errors
 from dreamdrive.show.look import draw_look
