@@ -1,5 +1,6 @@
 """A drive into a photo."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import cv2
@@ -27,7 +28,6 @@ from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import FLAT, StreetClass
-from dreamdrive.scene.trajectory import Trajectory
 
 FRAMES = 25
 RATE_HZ = 10.0
@@ -54,7 +54,8 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
     path = path_for(control, street, wanted / RATE_HZ, gone=going_ahead(street, velocities))
     layers = layers_of(street, going_ahead(street, velocities))
-    frames, depth_m, sky, moving = _driven(street, layers, path, velocities, progress)
+    later = (layers.at(float(t_s), velocities) for t_s in wanted / RATE_HZ)
+    frames, depth_m, sky, moving = _driven(street, later, path.world_from_camera, progress)
     first = np.linalg.inv(path.world_from_camera[0])
     cameras = [street.camera.at(pose) for pose in path.world_from_camera]
     valid = np.ones(frames.shape[:3], bool)
@@ -126,9 +127,8 @@ def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
 
 def _driven(
     street: Street,
-    layers: Layers,
-    path: Trajectory,
-    velocities: Float[np.ndarray, "u 3"],
+    layers: Iterable[Layers],
+    poses: Float[np.ndarray, "f 4 4"],
     progress: Progress,
 ) -> tuple[
     UInt8[np.ndarray, "f h w 3"],
@@ -136,15 +136,15 @@ def _driven(
     Bool[np.ndarray, "f h w"],
     Bool[np.ndarray, "f h w"],
 ]:
-    """Frames, depth, sky and what moves, along a path; the photo itself where the path begins."""
+    """Frames, depth, sky and what moves, of the layers at each pose; the photo itself where it was taken."""
     drawn: list[tuple[np.ndarray, ...]] = []
-    for number, (t_s, pose) in enumerate(zip(path.times_s.tolist(), path.world_from_camera, strict=True)):
-        frame, sight = view(layers.at(t_s, velocities), street.camera.at(pose), street)
-        if np.allclose(pose, np.eye(4)) and t_s == 0:
+    for number, (now, pose) in enumerate(zip(layers, poses, strict=True)):
+        frame, sight = view(now, street.camera.at(pose), street)
+        if np.allclose(pose, np.eye(4)) and not now.carried_m.any():
             own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5)))
             frame = np.where(own[..., None] > 0, frame, street.rgb)
         drawn.append((frame, sight.depth_m, sight.sky, sight.moving))
-        progress(number + 1, len(path.times_s))
+        progress(number + 1, len(poses))
     frames, depth_m, sky, moving = (np.stack(each) for each in zip(*drawn, strict=True))
     return frames, depth_m, sky, moving
 
