@@ -15,7 +15,7 @@ from dreamdrive.prior.photo.height import height_of
 from dreamdrive.prior.photo.traffic import flowing
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import FLAT
+from dreamdrive.scene.street_class import FLAT, StreetClass
 
 BACKDROP_M = 40.0
 """Where what stands is put by the plane and backdrop."""
@@ -130,11 +130,26 @@ def before_backdrop(start: Start, sight: Sight) -> Picture:
     return view(start.backdrop, start.street.camera.at(sight.pose), start.street)[0]
 
 
+def _with_own_car(way: Callable[[Start, Sight], Picture]) -> Callable[[Start, Sight], Picture]:
+    """What is fixed to the camera stays where it was in the picture: no way has to guess it."""
+
+    def shown(start: Start, sight: Sight) -> Picture:
+        own = cv2.dilate((start.street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5))) > 0
+        return np.where(own[..., None], start.rgb, way(start, sight))
+
+    return shown
+
+
 WAYS: Mapping[str, Callable[[Start, Sight], Picture]] = {
-    "photo": drawn,
-    "photo, traffic flows": flows,
     "frozen": frozen,
-    "homography": homography,
-    "plane and backdrop": before_backdrop,
-    "pop-up": popped_up,
+    **{
+        name: _with_own_car(way)
+        for name, way in {
+            "photo": drawn,
+            "photo, traffic flows": flows,
+            "homography": homography,
+            "plane and backdrop": before_backdrop,
+            "pop-up": popped_up,
+        }.items()
+    },
 }
