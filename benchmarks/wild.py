@@ -14,7 +14,7 @@ takes DREAMDRIVE_VISTA. Runs are kept and go on.
 """
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +25,12 @@ from common.machine import describe_machine
 from common.markdown import grid
 from common.options import parser_of
 from common.report import publish
-from dreamdrive.cli.arguments import parse_action
+from dreamdrive.cli.arguments import parse_actions
 from dreamdrive.data.images import read_image
 from dreamdrive.data.photo import read_photo
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate import VideoSettings, evaluate_video
+from dreamdrive.options import QUALITIES
 from dreamdrive.pipeline import generate
 from dreamdrive.scene.control import Control
 from dreamdrive.show import panels, write_png
@@ -60,17 +61,12 @@ def main(doc: str | None) -> int:
 def _made(place: Place, path: Path, prior: str, args: Any) -> dict[str, Any]:
     """Figures of one place; what the program said where it made no scene."""
     out = args.runs / prior / place.name
-    actions = tuple(map(parse_action, place.actions))
-    control = Control(
-        path=path,
-        view=place.view,
-        hfov_deg=place.hfov_deg,
-        camera_height_m=place.camera_height_m,
-        action=actions[0] if len(actions) == 1 else None,
-        actions=actions if len(actions) > 1 else None,
-    )
+    control = Control(path=path, view=place.view, hfov_deg=place.hfov_deg, **parse_actions(place.actions))
+    options = QUALITIES[args.quality]
+    geometry = replace(options.geometry, camera_height_m=place.camera_height_m)
+    options = replace(options, geometry=geometry)
     try:
-        generate(control, out, prior=None if prior == "auto" else prior, options=args.quality, force=True)
+        generate(control, out, prior=None if prior == "auto" else prior, options=options, force=True)
     except InputError as error:
         return {"said": str(error)}
     row, pictures = figures_of(out)

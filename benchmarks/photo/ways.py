@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from common.twin import TWIN
 from dreamdrive.data.photo import Photo
 from dreamdrive.prior.photo import Layers, Street, layers_of, seen_in, view
+from dreamdrive.prior.photo.fill import grown
 from dreamdrive.prior.photo.height import height_of
 from dreamdrive.prior.photo.traffic import flowing
 from dreamdrive.scene.camera import Camera
@@ -134,7 +135,7 @@ def _with_own_car(way: Callable[[Start, Sight], Picture]) -> Callable[[Start, Si
     """What is fixed to the camera stays where it was in the picture: no way has to guess it."""
 
     def shown(start: Start, sight: Sight) -> Picture:
-        own = cv2.dilate((start.street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5))) > 0
+        own = grown(start.street.classes == StreetClass.OWN_CAR, 5)
         return np.where(own[..., None], start.rgb, way(start, sight))
 
     return shown

@@ -106,6 +106,12 @@ def parse_action(text: str) -> Action:
         raise InputError(f"--action {text!r}: {error}; examples are: {', or '.join(EXAMPLES)}") from None
 
 
+def parse_actions(words: Iterable[str]) -> dict[str, Any]:
+    """Of ``Control``: one action, or several, each a drive of its own."""
+    actions = tuple(map(parse_action, words))
+    return {"action": actions[0]} if len(actions) == 1 else {"actions": actions or None}
+
+
 def _direction(word: str) -> Direction:
     if word not in get_args(Direction):
         raise InputError(f"{word!r} is no command; expected one of {', '.join(get_args(Direction))}")

@@ -20,7 +20,7 @@ from dreamdrive.cli.arguments import (
     DataSetName,
     GeometryName,
     PriorName,
-    parse_action,
+    parse_actions,
     parse_size,
     parse_view,
 )
@@ -146,7 +146,7 @@ def generate(
         view=None if view is None else parse_view(view),
         trajectory=trajectory,
         trajectories=trajectories,
-        **_actions(action),
+        **parse_actions(action),
         traffic=traffic,
         traffic_speed_m_s=traffic_speed,
         prompt=prompt,
@@ -197,12 +197,6 @@ def _options(quality: QualityName, method: MethodName, file: Path | None) -> "Op
 
     chosen = with_method(QUALITIES[quality], method)
     return chosen if file is None else read_options(file, chosen)
-
-
-def _actions(words: tuple[str, ...]) -> dict[str, Any]:
-    """One action, or several, each a drive of its own."""
-    actions = tuple(map(parse_action, words))
-    return {"action": actions[0]} if len(actions) == 1 else {"actions": actions or None}
 
 
 def _given(**flags: Any) -> dict[str, Any]:

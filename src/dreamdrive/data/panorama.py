@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from dreamdrive.data.intrinsics import guess_camera
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -46,15 +47,14 @@ def view_of(
             f"--view {heading_deg:g},{pitch_deg:g} --hfov {hfov_deg:g}: expected a heading within 360 and a "
             "pitch within 60 degrees, and a field of view of 10 to 120"
         )
-    focal = 0.5 * size[0] / np.tan(np.deg2rad(hfov_deg) / 2)
-    camera = Camera(focal, focal, size[0] / 2, size[1] / 2, *size)
+    camera = guess_camera(size, hfov_deg).camera
     right, down, ahead = np.moveaxis(camera.rays(), -1, 0)
     pitch = np.deg2rad(pitch_deg)
     level, up = np.cos(pitch) * ahead + np.sin(pitch) * down, np.sin(pitch) * ahead - np.cos(pitch) * down
     azimuth = np.arctan2(right, level) + np.deg2rad(heading_deg)
     elevation = np.arctan2(up, np.hypot(right, level))
     # A view shrinks the panorama by this, which would alias.
-    shrink = max(1.0, width / (2 * np.pi) / focal)
+    shrink = max(1.0, width / (2 * np.pi) / camera.fx_px)
     soft = cv2.GaussianBlur(panorama, (0, 0), 0.4 * shrink) if shrink > 1.2 else panorama
     u = np.mod(azimuth / (2 * np.pi) + 0.5, 1.0) * width - 0.5
     v = (0.5 - elevation / np.pi) * height - 0.5

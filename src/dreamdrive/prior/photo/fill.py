@@ -8,6 +8,11 @@ _RADIUS_PX = 3.0
 _LEAST_PX = 4  # sides of the coarsest picture
 
 
+def grown(mask: Bool[np.ndarray, "h w"], side: int) -> Bool[np.ndarray, "h w"]:
+    """The mask widened by a square of that side, an odd number of pixels."""
+    return cv2.dilate(mask.astype(np.uint8), np.ones((side, side))) > 0
+
+
 def inpainted(rgb: UInt8[np.ndarray, "h w 3"], holes: Bool[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w 3"]:
     """The picture with its holes filled by OpenCV (Telea 2004), from the border inwards."""
     return cv2.inpaint(rgb, holes.astype(np.uint8), _RADIUS_PX, cv2.INPAINT_TELEA) if holes.any() else rgb

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8, UInt16
 
-from dreamdrive.prior.photo.fill import continued, inpainted
+from dreamdrive.prior.photo.fill import continued, grown, inpainted
 from dreamdrive.prior.photo.street import FAR_M, Street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
@@ -127,12 +127,12 @@ def _widened(street: Street, margin: int) -> Street:
         height_px=street.camera.height_px + margin,
     )
     own = (street.classes == StreetClass.OWN_CAR).astype(np.uint8)
-    rgb = inpainted(street.rgb, _grown(own > 0, _RIM_PX)) if own.any() else street.rgb
+    rgb = inpainted(street.rgb, grown(own > 0, _RIM_PX)) if own.any() else street.rgb
     classes = street.classes.copy()
     classes[own > 0] = StreetClass.ROAD
     users = cv2.copyMakeBorder(street.users, 0, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
     hidden = np.isin(classes, _THIN)
-    empty = inpainted(rgb, cv2.dilate(hidden.astype(np.uint8), np.ones((5, 5))) > 0)
+    empty = inpainted(rgb, grown(hidden, 5))
     rgb_out = wider(empty, cv2.BORDER_REFLECT_101)
     height, width = classes.shape
     rgb_out[:height, margin : margin + width] = rgb
@@ -158,7 +158,7 @@ def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _S
     farther = cv2.erode(inverse, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
     smooth = cv2.blur(farther, (reach // 2, reach // 2))
     # A road user's whole shape hides something: there depth runs from side to side.
-    around = ~_grown(thin, _RIM_PX) & (street.classes != StreetClass.OWN_CAR)
+    around = ~grown(thin, _RIM_PX) & (street.classes != StreetClass.OWN_CAR)
     across = _across(inverse, around)
     road = np.isin(street.users, leaving)
     across = np.where(road, np.minimum(across, 1 / (street.depth_m + _ROOM_M)), across)
@@ -178,10 +178,11 @@ def _without(
 ) -> UInt8[np.ndarray, "h w 3"]:
     """The picture without what hides something: ground goes on as ground, what stands as what stands."""
     flat, sky = np.isin(street.classes, FLAT), street.classes == StreetClass.SKY
-    users = _grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), _RIM_PX)
-    edges = inpainted(street.rgb, _grown(hidden, 3))
+    users = grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), _RIM_PX)
+    hiding = grown(hidden, 3)
+    edges = inpainted(street.rgb, hiding)
     stands = inpainted(street.rgb, users | flat | sky)
-    ground = inpainted(street.rgb, _grown(hidden, 3) | users | ~flat)
+    ground = inpainted(street.rgb, hiding | users | ~flat)
     return np.where(level[..., None], ground, np.where(users[..., None], stands, edges))
 
 
@@ -194,10 +195,6 @@ def _across(values: Float[np.ndarray, "h w"], known: Bool[np.ndarray, "h w"]) ->
     for row in np.flatnonzero(known.any(1)):
         found[row] = np.interp(columns, columns[known[row]], values[row, known[row]])
     return found
-
-
-def _grown(mask: Bool[np.ndarray, "h w"], side: int) -> Bool[np.ndarray, "h w"]:
-    return cv2.dilate(mask.astype(np.uint8), np.ones((side, side))) > 0
 
 
 def _gaussians(
@@ -240,13 +237,13 @@ def sky_of(street: Street) -> Sky:
     camera, safe = street.camera, np.maximum(ahead, 1e-3)
     u = (camera.fx_px * x / safe + camera.cx_px - 0.5).astype(np.float32)
     v = (camera.fy_px * y / safe + camera.cy_px - 0.5).astype(np.float32)
-    own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((3, 3)))
+    own = grown(street.classes == StreetClass.OWN_CAR, 3)
     clear = cv2.erode(street.sky.astype(np.uint8), np.ones((5, 5))).astype(np.float32)
     colours = street.rgb.astype(np.float32) / 255
-    backdrop = continued(colours, (own == 0).astype(np.float32))
+    backdrop = continued(colours, (~own).astype(np.float32))
     sky = continued(colours, clear) if clear.any() else backdrop
     low = cv2.GaussianBlur(backdrop, (0, 0), street.camera.width_px / 40)
-    is_sky = cv2.dilate(street.sky.astype(np.uint8), np.ones((9, 9)))[..., None] > 0
+    is_sky = grown(street.sky, 9)[..., None]
     level = (street.ground.depth_m(camera) > FAR_M)[..., None]
     shown = np.where(is_sky | level, sky, low).astype(np.float32)
     texture = cv2.remap(shown, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
@@ -14,7 +13,7 @@ from dreamdrive.data.size import check_largest
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
 from dreamdrive.prior.appearance import appearance
-from dreamdrive.prior.photo.fill import inpainted
+from dreamdrive.prior.photo.fill import grown, inpainted
 from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.sight import Sight, sight_of
@@ -52,8 +51,9 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg, control.view)
     street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
     velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
-    path = path_for(control, street, wanted / RATE_HZ, gone=going_ahead(street, velocities))
-    layers = layers_of(street, going_ahead(street, velocities))
+    ahead = going_ahead(street, velocities)
+    path = path_for(control, street, wanted / RATE_HZ, gone=ahead)
+    layers = layers_of(street, leaving=ahead)
     later = (layers.at(float(t_s), velocities) for t_s in wanted / RATE_HZ)
     frames, depth_m, sky, moving = _driven(street, later, path.world_from_camera, progress)
     first = np.linalg.inv(path.world_from_camera[0])
@@ -78,10 +78,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
         ),
         requested=path if control.trajectory is not None else None,
         set_in_motion=moving,
-        provenance={
-            "prior": "photo",
-            "notes": _notes(control, photo, seen, height, velocities),
-        },
+        provenance={"prior": "photo", "notes": _notes(control, photo, seen, height, velocities)},
     )
 
 
@@ -141,8 +138,8 @@ def _driven(
     for number, (now, pose) in enumerate(zip(layers, poses, strict=True)):
         frame, sight = view(now, street.camera.at(pose), street)
         if np.allclose(pose, np.eye(4)) and not now.carried_m.any():
-            own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((5, 5)))
-            frame = np.where(own[..., None] > 0, frame, street.rgb)
+            own = grown(street.classes == StreetClass.OWN_CAR, 5)
+            frame = np.where(own[..., None], frame, street.rgb)
         drawn.append((frame, sight.depth_m, sight.sky, sight.moving))
         progress(number + 1, len(poses))
     frames, depth_m, sky, moving = (np.stack(each) for each in zip(*drawn, strict=True))

@@ -20,6 +20,7 @@ from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.errors import InputError
 from dreamdrive.files.atomic import new_file
 from dreamdrive.knowledge.training import CLASS_OF
+from dreamdrive.prior.photo.fill import grown
 from dreamdrive.prior.photo.height import USUAL_M
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.make import seen_in
@@ -115,7 +116,7 @@ def picture_pairs(
     """Pairs of one picture, as planes of bytes."""
     street, _, _ = seen_in(photo, knowledge, height_m=USUAL_M)
     layers = layers_of(street)
-    own = cv2.dilate((street.classes == StreetClass.OWN_CAR).astype(np.uint8), np.ones((7, 7))) > 0
+    own = grown(street.classes == StreetClass.OWN_CAR, 7)
     for _ in range(options.each):
         away = _moved(street.ground, -_way_m(options, generator), options, generator)
         between = _seen_from(street, layers, street.camera.at(away))
@@ -143,9 +144,9 @@ def street_pairs(
     depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
     users = made.instance[0].astype(np.uint16)
     street = Street(made.frames[0], made.cameras[0], depth.astype(np.float32), classes, users, made.ground)
-    layers = layers_of(street)
+    layers, room_m = layers_of(street), max(free_m(street) - _KEEP_M, 0.0)
     for _ in range(options.each):
-        ahead = min(_way_m(options, generator), max(free_m(street) - _KEEP_M, 0.0))
+        ahead = min(_way_m(options, generator), room_m)
         pose = _moved(made.ground, ahead, options, generator)
         here = street.camera.at(pose)
         earlier = here.at(pose @ _stepped_back(made.ground, options, generator))
