@@ -12,7 +12,7 @@ def test_what_the_frames_show_is_left_out_and_what_is_aside_and_behind_stays() -
     photo = street()
     layers = layers_of(photo)
     depth = sight_of(layers, photo.camera, GROUND).depth_m
-    unseen = unseen_of(layers, [photo.camera], depth[None])
+    unseen = unseen_of(layers, np.zeros((photo.users.max(), 3)), [photo.camera], depth[None])
     at = photo.camera.project(unseen.means.numpy().astype(np.float64))
     inside = photo.camera.shows(at)
     assert (~inside).sum() > 500
@@ -34,5 +34,5 @@ def test_nothing_is_left_where_another_frame_looks() -> None:
     pose[0, 3] = 1.5
     cameras = [photo.camera, photo.camera.at(pose)]
     depth = np.stack([sight_of(layers, camera, GROUND).depth_m for camera in cameras])
-    one, both = (unseen_of(layers, cameras[:n], depth[:n]) for n in (1, 2))
+    one, both = (unseen_of(layers, np.zeros((photo.users.max(), 3)), cameras[:n], depth[:n]) for n in (1, 2))
     assert 0 < len(both) < len(one)

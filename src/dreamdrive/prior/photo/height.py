@@ -1,76 +1,113 @@
-"""How high the camera is above the road, by the sizes of the road users that a photo shows whole."""
+"""How high the camera is above the road, by the sizes of road users and the widths of lanes in a photo."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from dreamdrive.prior.photo.lanes import lane_widths
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.look import Look
+from dreamdrive.scene.look import Look, RoadUser
 from dreamdrive.scene.street_class import StreetClass
 
 USUAL_M = 1.5
 _USUAL_SPREAD = 0.25
 """Of the logarithm of the height of cameras in cars, vans and lorries."""
 _SIZES: dict[StreetClass, tuple[tuple[float, float, float], ...]] = {
-    StreetClass.VEHICLE: ((0.62, 1.48, 0.06), (0.2, 1.75, 0.07), (0.1, 2.2, 0.12), (0.08, 3.2, 0.15)),
+    StreetClass.VEHICLE: (
+        (0.5, 1.47, 0.05),
+        (0.32, 1.67, 0.05),
+        (0.05, 1.93, 0.05),
+        (0.07, 2.3, 0.12),
+        (0.06, 3.3, 0.13),
+    ),
     StreetClass.PERSON: ((0.9, 1.7, 0.06), (0.1, 1.3, 0.15)),
 }
-"""Shares, heights in metres and relative spreads: cars, tall cars, vans, lorries; grown-ups, children."""
-_READING = 0.08
-"""Relative spread of a height as it is read off the picture, besides two pixels."""
-_READING_PX = 2.0
+"""Shares, heights in metres and relative spreads: low and high cars, pick-ups, vans, lorries; grown-ups, children."""
+_READING, _TOP_PX, _FOOT_PX = 0.06, 2.0, 1.5
+"""Relative spread of a size as it is read off the picture, beside that of its top and of its foot."""
+_TOO_TALL = 0.05
+"""By how much vehicles are read too tall: what the network takes for them reaches out of them."""
 _WRONG = 0.15
 """Chance that what was read means nothing: hidden feet, two users taken for one."""
-_LEAST_SCORE, _LEAST_PX, _MOST_M = 0.3, 12, 40.0
+_LANE_M, _LANE_SPREAD, _NO_LANE = 3.35, 0.1, 0.2
+"""Widths of lanes, and the chance that what lies between two lines is none."""
+_LEAST_SCORE, _LEAST_PX, _LEAST_DROP_PX, _MOST_M = 0.3, 12, 3.0, 30.0
 _GRID_M = np.exp(np.linspace(np.log(0.6), np.log(4.0), 400))
+_HORIZONS = np.linspace(-2.5, 2.5, 21)
+"""Rows tried for the horizon, in standard deviations from where it is seen."""
 
 
 @dataclass(frozen=True)
 class Height:
-    """The camera's height above the road in metres, its relative spread, and how many users told it."""
+    """The camera's height above the road in metres, its relative spread, and what told it.
+
+    Attributes:
+        metres: The height.
+        spread: Standard deviation of its logarithm.
+        users: How many road users told it.
+        lanes: And how many lanes.
+    """
 
     metres: float
     spread: float
     users: int
+    lanes: int = 0
 
 
 def height_of(look: Look, camera: Camera) -> Height:
-    """The likeliest height, of what is usual for cameras and for the road users of the photo.
+    """The median height, of what is usual for cameras and for the road users and lanes of the photo.
 
-    A user's height over the camera's is read off its foot on the level road and its top; who is cut off by a
-    border, or far, tells nothing.
+    Over the camera's height a user's is its rows from foot to top over those from foot to horizon, wherever on
+    a level road it is (Hoiem et al. 2008). As the horizon is not exact, it is sought together with the height.
+    Who is cut off by a border, or far, tells nothing.
     """
-    ground = Ground(look.camera.up_in(camera), 1.0)
-    plane, rays = ground.depth_m(camera), camera.rays()
-    chance = np.exp(-0.5 * (np.log(_GRID_M / USUAL_M) / _USUAL_SPREAD) ** 2)
+    horizons_px = _HORIZONS * look.camera.horizon_spread_px
+    chance = -0.5 * (_HORIZONS[:, None] ** 2 + (np.log(_GRID_M / USUAL_M) / _USUAL_SPREAD) ** 2)
     told = 0
-    for user in look.road_users[0]:
-        left, top, right, below = user.box_px
-        column = min((left + right) // 2, camera.width_px - 1)
-        inside = left > 1 and top > 1 and right < camera.width_px - 1 and below < camera.height_px - 1
-        if user.kind not in _SIZES or user.score < _LEAST_SCORE or not inside or below - top < _LEAST_PX:
+    for number, user in enumerate(look.road_users[0], 1):
+        if not _whole(user, camera):
             continue
-        foot = float(plane[below - 1, column])
-        if foot * USUAL_M > _MOST_M:
+        left, _, right, below = user.box_px
+        horizon = float(look.camera.horizon_rows(np.array([(left + right) / 2]))[0])
+        if look.camera.focal_px * USUAL_M > _MOST_M * (below - horizon):
             continue
-        over = float(ground.height_m(rays[top, column] * foot))
-        if over <= 0:
-            continue
-        spread = np.hypot(_READING, _READING_PX / (below - top))
-        chance = chance * _likely(over * _GRID_M, user.kind, spread)
+        drop = below - horizon - horizons_px
+        tall = below - _top(user, look.instances[0] == number)
+        chance = chance + np.log(_likely(tall, np.maximum(drop, _LEAST_DROP_PX), user.kind))
         told += 1
-    chance = chance / chance.sum()
-    mean = float((chance * np.log(_GRID_M)).sum())
-    deviation = float(np.sqrt((chance * (np.log(_GRID_M) - mean) ** 2).sum()))
-    return Height(float(_GRID_M[chance.argmax()]), deviation, told)
+    lanes = lane_widths(look, camera)
+    for width in lanes:
+        off = np.log(_GRID_M * width / _LANE_M) / _LANE_SPREAD
+        chance = chance + np.log(_NO_LANE + (1 - _NO_LANE) * np.exp(-0.5 * off**2))
+    share = np.exp(chance - chance.max()).sum(0)
+    share = share / share.sum()
+    mean = float((share * np.log(_GRID_M)).sum())
+    deviation = float(np.sqrt((share * (np.log(_GRID_M) - mean) ** 2).sum()))
+    return Height(float(np.interp(0.5, share.cumsum(), _GRID_M)), deviation, told, len(lanes))
 
 
-def _likely(heights_m: Float[np.ndarray, " n"], kind: StreetClass, spread: float) -> Float[np.ndarray, " n"]:
-    """How likely a user of that kind is to be so high, over what a wrong reading makes of it."""
-    found = np.full(len(heights_m), _WRONG)
+def _whole(user: RoadUser, camera: Camera) -> bool:
+    left, top, right, below = user.box_px
+    inside = left > 1 and top > 1 and right < camera.width_px - 1 and below < camera.height_px - 1
+    return user.kind in _SIZES and user.score >= _LEAST_SCORE and inside and below - top >= _LEAST_PX
+
+
+def _top(user: RoadUser, mask: Bool[np.ndarray, "h w"]) -> int:
+    """Row of the top: of a vehicle where it is half as wide as anywhere, as single pixels stick out."""
+    wide = mask.sum(1)
+    if user.kind != StreetClass.VEHICLE or not wide.any():
+        return user.box_px[1]
+    return int(np.flatnonzero(wide >= 0.5 * wide.max())[0])
+
+
+def _likely(tall_px: float, drop_px: Float[np.ndarray, " o"], kind: StreetClass) -> Float[np.ndarray, "o n"]:
+    """How likely a user of that kind is seen so tall, by rows of the horizon and heights of the camera."""
+    spread = np.sqrt(_READING**2 + (_TOP_PX / tall_px) ** 2 + (_FOOT_PX / drop_px) ** 2)
+    read = np.log(_GRID_M[None] * (tall_px / drop_px)[:, None])
+    read -= _TOO_TALL if kind == StreetClass.VEHICLE else 0.0
+    found = np.full(read.shape, _WRONG)
     for share, metres, own in _SIZES[kind]:
-        off = np.log(heights_m / metres) / np.hypot(own, spread)
+        off = (read - np.log(metres)) / np.hypot(own, spread)[:, None]
         found += (1 - _WRONG) * share * np.exp(-0.5 * off**2)
     return found

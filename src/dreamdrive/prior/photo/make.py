@@ -73,7 +73,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
             intrinsics=True,
             depth_m=depth_m,
             sky=sky,
-            unseen=unseen_of(layers, cameras, depth_m) if np.allclose(first, np.eye(4)) else None,
+            unseen=unseen_of(layers, velocities, cameras, depth_m) if np.allclose(first, np.eye(4)) else None,
             generated=True,
         ),
         requested=path if control.trajectory is not None else None,
@@ -152,6 +152,12 @@ def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarr
     return inpainted(sight.rgb, sight.holes), sight
 
 
+def _told_by(height: Height) -> str:
+    users, lanes = f"the sizes of {height.users} road users", f"the widths of {height.lanes} lanes"
+    told = [words for words, count in ((users, height.users), (lanes, height.lanes)) if count]
+    return " and ".join(told) or "what is usual"
+
+
 def _notes(
     control: Control, photo: Photo, seen: Look, height: Height, velocities: Float[np.ndarray, "u 3"]
 ) -> list[str]:
@@ -171,7 +177,7 @@ def _notes(
             "the bend out."
         )
     if control.camera_height_m is None:
-        by = f"the sizes of {height.users} road users" if height.users else "what is usual"
+        by = _told_by(height)
         notes.append(
             f"Metres rest on a camera {height.metres:.2f} m above the road, by {by} (within "
             f"{100 * height.spread:.0f} %); --camera-height tells it."

@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
 
@@ -78,12 +79,12 @@ class Before:
 
 
 def told(sight: Sight, camera: Camera, before: Before | None) -> Float[np.ndarray, "11 h w"]:
-    """What the network is told of a view and of the frame before it, float32."""
+    """What the network is told of a view, its holes filled, and of the frame before it, float32."""
     shape = sight.alpha.shape
     carried = np.zeros((*shape, 4), np.float32) if before is None else _carried(sight, camera, before)
     inverse = np.where(sight.depth_m > 0, _NEAR_M / np.maximum(sight.depth_m, _NEAR_M), 0)
     maps = [sight.alpha, sight.made_up, np.clip(sight.nearer, -1, 3), inverse]
-    rgb = sight.rgb.astype(np.float32) / 255
+    rgb = inpainted(sight.rgb, sight.holes).astype(np.float32) / 255
     return np.concatenate([rgb.transpose(2, 0, 1), np.stack(maps), carried.transpose(2, 0, 1)]).astype(
         np.float32
     )

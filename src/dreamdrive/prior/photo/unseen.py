@@ -15,10 +15,16 @@ _BEHIND = 1.03
 """Depth over that of a frame from which on a Gaussian is hidden there."""
 
 
-def unseen_of(layers: Layers, cameras: Sequence[Camera], depth_m: Float[np.ndarray, "f h w"]) -> Gaussians:
-    """Gaussians that are outside of all frames, or behind what these show; none of road users."""
+def unseen_of(
+    layers: Layers,
+    velocities_m_s: Float[np.ndarray, "u 3"],
+    cameras: Sequence[Camera],
+    depth_m: Float[np.ndarray, "f h w"],
+) -> Gaussians:
+    """Gaussians that are outside of all frames, or behind what these show; none of road users that move."""
     g = layers.gaussians
-    standing = np.ones(len(g), bool) if g.actor is None else g.actor.numpy() < 0
+    stands = np.append(~velocities_m_s.any(1), True)  # the last: all else
+    standing = np.ones(len(g), bool) if g.actor is None else stands[g.actor.numpy()]
     points, seen = g.means.numpy().astype(np.float64), ~standing
     for camera, exact in zip(cameras, depth_m, strict=True):
         # On a road seen at a grazing angle depth differs much from pixel to pixel.
