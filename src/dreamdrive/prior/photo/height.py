@@ -23,7 +23,7 @@ _SIZES: dict[StreetClass, tuple[tuple[float, float, float], ...]] = {
     ),
     StreetClass.PERSON: ((0.9, 1.7, 0.06), (0.1, 1.3, 0.15)),
 }
-"""Shares, heights in metres and relative spreads: low and high cars, pick-ups, vans, lorries; grown-ups, children."""
+"""Shares, heights in metres, relative spreads: low, high cars, pick-ups, vans, lorries; adults, children."""
 _READING, _TOP_PX, _FOOT_PX = 0.06, 2.0, 1.5
 """Relative spread of a size as it is read off the picture, beside that of its top and of its foot."""
 _TOO_TALL = 0.05
@@ -58,9 +58,9 @@ class Height:
 def height_of(look: Look, camera: Camera) -> Height:
     """The median height, of what is usual for cameras and for the road users and lanes of the photo.
 
-    Over the camera's height a user's is its rows from foot to top over those from foot to horizon, wherever on
-    a level road it is (Hoiem et al. 2008). As the horizon is not exact, it is sought together with the height.
-    Who is cut off by a border, or far, tells nothing.
+    Over the camera's height a user's is its rows from foot to top over those from foot to horizon, wherever
+    on a level road it is (Hoiem et al. 2008). As the horizon is not exact, it is sought together with the
+    height. Who is cut off by a border, or far, tells nothing.
     """
     horizons_px = _HORIZONS * look.camera.horizon_spread_px
     chance = -0.5 * (_HORIZONS[:, None] ** 2 + (np.log(_GRID_M / USUAL_M) / _USUAL_SPREAD) ** 2)

@@ -8,24 +8,17 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8, UInt16
 
+from dreamdrive.prior.photo.beyond import RIM_PX, THIN, widened
 from dreamdrive.prior.photo.fill import continued, grown, inpainted
 from dreamdrive.prior.photo.street import FAR_M, Street
-from dreamdrive.prior.photo.way import level_axes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
-from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
 from dreamdrive.scene.surfels import surfels, tangents
 
-_THIN = (*ROAD_USERS, StreetClass.POLE)
-"""What something goes on behind: all of it is hidden street."""
-_RIM_PX = 9
-"""The outline of a road user is not exact, and its colours would be smeared over all that it hides."""
 _ROOM_M = 25.0
 """How far what is behind a vehicle that drives on is at least behind it."""
-_AHEAD, _LEAST_OF, _MEAN_OF = 1.03 ** np.arange(1, 34), 4, 12
-"""How much farther ahead bare ground is looked for, and of how many places colours beyond are means."""
 _LEVEL = 0.3
 """What is hidden and at most by this share nearer than the road is the road."""
 
@@ -94,7 +87,7 @@ class _Sheet:
 def layers_of(street: Street, leaving: Sequence[int] = (), options: LayerOptions = LayerOptions()) -> Layers:
     """All that a drive into the photo may uncover; users of the numbers ``leaving``, from 1, drive on."""
     margin = round(options.beyond * street.camera.width_px)
-    wide = _widened(street, margin)
+    wide = widened(street, margin)
     inside = np.zeros(wide.classes.shape, bool)
     photo = slice(0, street.camera.height_px), slice(margin, margin + street.camera.width_px)
     inside[photo] = street.classes != StreetClass.OWN_CAR
@@ -118,87 +111,17 @@ def _whole(street: Street) -> UInt16[np.ndarray, "h w"]:
     return np.where(rim, around, street.users)
 
 
-def _widened(street: Street, margin: int) -> Street:
-    """The street beyond the photo: the road goes on, all else is mirrored and no nearer than the border."""
-
-    def wider(values: np.ndarray, border: int) -> np.ndarray:
-        return np.asarray(cv2.copyMakeBorder(values, 0, margin, margin, margin, border))
-
-    camera = replace(
-        street.camera,
-        cx_px=street.camera.cx_px + margin,
-        width_px=street.camera.width_px + 2 * margin,
-        height_px=street.camera.height_px + margin,
-    )
-    own = (street.classes == StreetClass.OWN_CAR).astype(np.uint8)
-    rgb = inpainted(street.rgb, grown(own > 0, _RIM_PX)) if own.any() else street.rgb
-    classes = street.classes.copy()
-    classes[own > 0] = StreetClass.ROAD
-    height, width = classes.shape
-    photo = slice(0, height), slice(margin, margin + width)
-    # Who is cut off by a side of the photo goes on beyond it.
-    users = wider(street.users, cv2.BORDER_REFLECT_101)
-    users[users != wider(street.users, cv2.BORDER_REPLICATE)] = 0
-    users[height:] = 0
-    users[photo] = street.users
-    hidden = np.isin(classes, _THIN)
-    empty = inpainted(rgb, grown(hidden, 5))
-    rgb_out = wider(empty, cv2.BORDER_REFLECT_101)
-    rgb_out = np.where(users[..., None] > 0, wider(rgb, cv2.BORDER_REFLECT_101), rgb_out)
-    rgb_out[photo] = rgb
-    standing = np.where(hidden, StreetClass.STRUCTURE, classes).astype(np.uint8)
-    classes = np.where(users > 0, wider(classes, cv2.BORDER_REFLECT_101), wider(standing, cv2.BORDER_REPLICATE))
-    classes[photo] = np.where(own > 0, StreetClass.ROAD, street.classes)
-    depth = wider(street.depth_m, cv2.BORDER_REPLICATE)
-    plane = street.ground.depth_m(camera)
-    outside = np.ones(classes.shape, bool)
-    outside[photo] = own > 0
-    flat = outside & (np.isin(classes, FLAT) | (plane < depth))
-    depth = np.where(flat, np.minimum(plane, FAR_M), depth)
-    depth[outside & (classes == StreetClass.SKY)] = 0
-    bare = ~outside & np.isin(classes, FLAT) & ~grown((users > 0) | outside, _RIM_PX)
-    rgb_out = _as_ahead(rgb_out, camera, street.ground, flat & (plane < FAR_M), bare)
-    return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
-
-
-def _as_ahead(
-    rgb: UInt8[np.ndarray, "h w 3"],
-    camera: Camera,
-    ground: Ground,
-    wanted: Bool[np.ndarray, "h w"],
-    bare: Bool[np.ndarray, "h w"],
-) -> UInt8[np.ndarray, "h w 3"]:
-    """The picture with wanted ground as the mean of the bare ground that is seen nearest ahead of it.
-
-    Lane lines go on straight so; what is nowhere bare ahead is filled from around it.
-    """
-    ahead = level_axes(ground)[:, 2]
-    points = camera.rays()[wanted] * ground.depth_m(camera)[wanted][:, None]
-    sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
-    for farther in _AHEAD:
-        at = camera.project(points + (farther - 1) * points[:, 2:] * ahead)
-        column, row = np.clip(at[:, :2], 0, (camera.width_px - 1, camera.height_px - 1)).astype(int).T
-        found = camera.shows(at) & bare[row, column] & (counts < _MEAN_OF)
-        sums[found] += rgb[row[found], column[found]]
-        counts += found
-    out, rest = rgb.copy(), wanted.copy()
-    known = counts >= _LEAST_OF
-    rest[wanted] = ~known
-    out[wanted & ~rest] = np.rint(sums[known] / counts[known, None])
-    return inpainted(out, rest)
-
-
 def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _Sheet:
     """What is hidden: the street without road users and poles, and what goes on behind edges."""
     solid, plane = street.depth_m > 0, street.ground.depth_m(street.camera)
     shadow = np.isin(street.classes, FLAT) & (street.users > 0)
-    thin = np.isin(street.classes, _THIN) | shadow
+    thin = np.isin(street.classes, THIN) | shadow
     reach = 2 * round(options.reach_px * street.camera.width_px / 480) + 1
     inverse = np.where(solid, 1 / np.maximum(street.depth_m, 1e-3), 1 / FAR_M).astype(np.float32)
     farther = cv2.erode(inverse, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
     smooth = cv2.blur(farther, (reach // 2, reach // 2))
     # A road user's whole shape hides something: there depth runs from side to side.
-    around = ~grown(thin, _RIM_PX) & (street.classes != StreetClass.OWN_CAR)
+    around = ~grown(thin, RIM_PX) & (street.classes != StreetClass.OWN_CAR)
     across = _across(inverse, around)
     road = np.isin(street.users, leaving)
     across = np.where(road, np.minimum(across, 1 / (street.depth_m + _ROOM_M)), across)
@@ -218,7 +141,7 @@ def _without(
 ) -> UInt8[np.ndarray, "h w 3"]:
     """The picture without what hides something: ground goes on as ground, what stands as what stands."""
     flat, sky = np.isin(street.classes, FLAT), street.classes == StreetClass.SKY
-    users = grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), _RIM_PX)
+    users = grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), RIM_PX)
     hiding = grown(hidden, 3)
     edges = inpainted(street.rgb, hiding)
     stands = inpainted(street.rgb, users | flat | sky)

@@ -1,0 +1,95 @@
+"""How the street goes on beyond the borders of a photo."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from dreamdrive.prior.photo.fill import grown, inpainted
+from dreamdrive.prior.photo.street import FAR_M, Street
+from dreamdrive.prior.photo.way import level_axes
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.geometry import Ground
+from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
+
+THIN = (*ROAD_USERS, StreetClass.POLE)
+"""What something goes on behind: all of it is hidden street."""
+RIM_PX = 9
+"""The outline of a road user is not exact, and its colours would be smeared over all that it hides."""
+_AHEAD, _LEAST_OF, _MEAN_OF = 1.03 ** np.arange(1, 34), 4, 12
+"""How much farther ahead bare ground is looked for, and of how many places colours beyond are means."""
+
+
+def widened(street: Street, margin: int) -> Street:
+    """The street with so many pixels more to the left, to the right and below.
+
+    The road goes on; all else is mirrored, and no nearer than the border. Who is cut off by a side of the
+    photo goes on, too, as deep as there.
+    """
+
+    def wider(values: np.ndarray, border: int) -> np.ndarray:
+        return np.asarray(cv2.copyMakeBorder(values, 0, margin, margin, margin, border))
+
+    camera = replace(
+        street.camera,
+        cx_px=street.camera.cx_px + margin,
+        width_px=street.camera.width_px + 2 * margin,
+        height_px=street.camera.height_px + margin,
+    )
+    own = (street.classes == StreetClass.OWN_CAR).astype(np.uint8)
+    rgb = inpainted(street.rgb, grown(own > 0, RIM_PX)) if own.any() else street.rgb
+    classes = street.classes.copy()
+    classes[own > 0] = StreetClass.ROAD
+    height, width = classes.shape
+    photo = slice(0, height), slice(margin, margin + width)
+    users = wider(street.users, cv2.BORDER_REFLECT_101)
+    users[users != wider(street.users, cv2.BORDER_REPLICATE)] = 0
+    users[height:] = 0
+    users[photo] = street.users
+    hidden = np.isin(classes, THIN)
+    empty = inpainted(rgb, grown(hidden, 5))
+    rgb_out = wider(empty, cv2.BORDER_REFLECT_101)
+    rgb_out = np.where(users[..., None] > 0, wider(rgb, cv2.BORDER_REFLECT_101), rgb_out)
+    rgb_out[photo] = rgb
+    standing = np.where(hidden, StreetClass.STRUCTURE, classes).astype(np.uint8)
+    mirrored, level = wider(classes, cv2.BORDER_REFLECT_101), wider(standing, cv2.BORDER_REPLICATE)
+    classes = np.where(users > 0, mirrored, level)
+    classes[photo] = np.where(own > 0, StreetClass.ROAD, street.classes)
+    depth = wider(street.depth_m, cv2.BORDER_REPLICATE)
+    plane = street.ground.depth_m(camera)
+    outside = np.ones(classes.shape, bool)
+    outside[photo] = own > 0
+    flat = outside & (np.isin(classes, FLAT) | (plane < depth))
+    depth = np.where(flat, np.minimum(plane, FAR_M), depth)
+    depth[outside & (classes == StreetClass.SKY)] = 0
+    bare = ~outside & np.isin(classes, FLAT) & ~grown((users > 0) | outside, RIM_PX)
+    rgb_out = _as_ahead(rgb_out, camera, street.ground, flat & (plane < FAR_M), bare)
+    return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
+
+
+def _as_ahead(
+    rgb: UInt8[np.ndarray, "h w 3"],
+    camera: Camera,
+    ground: Ground,
+    wanted: Bool[np.ndarray, "h w"],
+    bare: Bool[np.ndarray, "h w"],
+) -> UInt8[np.ndarray, "h w 3"]:
+    """The picture with wanted ground as the mean of the bare ground that is seen nearest ahead of it.
+
+    Lane lines go on straight so; what is nowhere bare ahead is filled from around it.
+    """
+    ahead = level_axes(ground)[:, 2]
+    points = camera.rays()[wanted] * ground.depth_m(camera)[wanted][:, None]
+    sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
+    for farther in _AHEAD:
+        at = camera.project(points + (farther - 1) * points[:, 2:] * ahead)
+        column, row = np.clip(at[:, :2], 0, (camera.width_px - 1, camera.height_px - 1)).astype(int).T
+        found = camera.shows(at) & bare[row, column] & (counts < _MEAN_OF)
+        sums[found] += rgb[row[found], column[found]]
+        counts += found
+    out, rest = rgb.copy(), wanted.copy()
+    known = counts >= _LEAST_OF
+    rest[wanted] = ~known
+    out[wanted & ~rest] = np.rint(sums[known] / counts[known, None])
+    return inpainted(out, rest)
