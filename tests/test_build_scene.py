@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
 import torch
 
-from dreamdrive import Given, build_scene, options
+from dreamdrive import Given, build_scene, options, pipeline
 from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions
 from dreamdrive.progress import Work
 from dreamdrive.run import call
+from dreamdrive.scene.clip import Known
 from tests.streets import small_street, street_clip, true_geometry
 
 DRAFT = options.QUALITIES["draft"]
@@ -51,3 +54,12 @@ def test_the_same_clip_and_options_give_the_same_scene() -> None:
     one, other = (build_scene(clip, static, given=given) for _ in range(2))
     assert torch.equal(one.static.means, other.static.means)
     assert Work().keep("part", lambda: 3) == 3
+
+
+def test_a_street_that_was_drawn_from_its_depth_never_drifts(monkeypatch: pytest.MonkeyPatch) -> None:
+    street = small_street(frames=6)
+    clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
+    monkeypatch.setattr(pipeline, "explained", lambda *_: False)
+    assert build_scene(clip, TINY, given=Given(geometry)).drifts
+    known = Known(np.stack([each.world_from_camera for each in geometry.cameras]), depth_m=street.depth_m, generated=True)
+    assert not build_scene(replace(clip, known=known), TINY, given=Given(geometry)).drifts

@@ -236,7 +236,9 @@ def decompose(
     else:
         run("group", o.group, lambda _: labels, given=labels)
     moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
-    street = _drifting(clip, geometry, seeds, errors, labels, o) if o.drift.allowed else None
+    # Frames that were drawn from their depth show a street that stands, whatever the fit makes of it.
+    may_drift = o.drift.allowed and not (clip.known.generated and clip.known.depth_m is not None)
+    street = _drifting(clip, geometry, seeds, errors, labels, o) if may_drift else None
     standing = fitted.select(labels.static) if street is None else street
     return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
 

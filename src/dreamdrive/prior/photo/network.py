@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from dreamdrive.models import fill_network, read_state
 from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
@@ -17,6 +19,7 @@ CHANNELS = 11
 """RGB of the view, alpha, made up, nearer, inverse depth; RGB of the frame before, and where it is known."""
 WIDTHS = (40, 80, 144, 208)
 _NEAR_M = 2.0
+EXPECTED = "weights of the network of the prior photo, as `dreamdrive train photo` writes them"
 
 
 class _Block(nn.Module):
@@ -99,6 +102,15 @@ def _carried(sight: Sight, camera: Camera, before: Before) -> Float[np.ndarray, 
     )
     known = (shown & (sight.depth_m > 0)).astype(np.float32)[..., None]
     return np.concatenate([known * rgb / 255, known], axis=2).astype(np.float32)
+
+
+def load_photo_network(path: Path) -> PhotoNetwork:
+    """The network with the weights in a file, as ``dreamdrive train photo`` writes it.
+
+    Raises:
+        InputError: The file is of something else.
+    """
+    return fill_network(PhotoNetwork, read_state(path, EXPECTED), str(path), EXPECTED)
 
 
 @torch.inference_mode()
