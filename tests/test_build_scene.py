@@ -61,5 +61,6 @@ def test_a_street_that_was_drawn_from_its_depth_never_drifts(monkeypatch: pytest
     clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
     monkeypatch.setattr(pipeline, "explained", lambda *_: False)
     assert build_scene(clip, TINY, given=Given(geometry)).drifts
-    known = Known(np.stack([each.world_from_camera for each in geometry.cameras]), depth_m=street.depth_m, generated=True)
+    poses = np.stack([each.world_from_camera for each in geometry.cameras])
+    known = Known(poses, depth_m=street.depth_m, generated=True)
     assert not build_scene(replace(clip, known=known), TINY, given=Given(geometry)).drifts
