@@ -2,11 +2,12 @@
 
     python benchmarks/photo.py [--seeds SEED ...] [--no-clips] [--json FILE] [--markdown FILE]
 
-Streets of edition 2, of which one picture and the camera's height are known, and frames of the moving part
-of PandaSet, with its calibration. From one frame the frames 0.5, 1 and 2 s later are told along the true
-path, and on drawn streets the views 1 m aside; PSNR, SSIM and perceptual distance (stlpips-vgg), beside the
-frozen frame, the homography of the road's plane, a road plane before a backdrop, and the classical pop-up.
-The street network is the twin, which has seen none of these clips.
+Streets of edition 2, of which one picture and the camera's height are known; frames of the moving part of
+PandaSet, with its calibration; two motorways, with cameras that the whole clip tells. From one frame the
+frames 0.5, 1 and 2 s later are told along the true path, and on drawn streets the views 1 m aside; PSNR, SSIM
+and perceptual distance (stlpips-vgg), beside the frozen frame, the homography of the road's plane, a road
+plane before a backdrop, and the classical pop-up. The street network is the twin, which has seen none of
+these clips.
 """
 
 import sys
@@ -27,6 +28,7 @@ from dreamdrive.evaluate.networks.stlpips import load_stlpips
 from dreamdrive.evaluate.pixels import psnr
 from dreamdrive.splat import ssim
 from photo.cases import Case, drawn, pandaset
+from photo.highways import highways
 from photo.shape import shape_of
 from photo.ways import WAYS
 
@@ -52,6 +54,7 @@ def cases(seeds: list[int], *, clips: bool) -> Iterable[Case]:
     yield from map(drawn, seeds)
     if clips and (DATA / "clips").is_dir():
         yield from pandaset()
+        yield from highways()
 
 
 def measured(case: Case, distance: Any) -> dict[str, Any]:

@@ -46,11 +46,12 @@ def test_the_side_and_the_lamps_tell_the_way(
     np.testing.assert_allclose(velocity, [[0, 0, ahead_m_s]], atol=1e-9)
 
 
-def test_who_stands_at_the_kerb_is_parked() -> None:
+def test_who_stands_at_the_kerb_is_parked_unless_traffic_is_fast() -> None:
     made = with_user(slice(60, 72), StreetClass.VEHICLE)
     classes = made.classes.copy()
     classes[:, 74:][classes[:, 74:] == StreetClass.ROAD] = StreetClass.GROUND
     assert not flowing(replace(made, classes=classes), 8.0).any()
+    np.testing.assert_allclose(flowing(replace(made, classes=classes), 20.0), [[0, 0, 20.0]], atol=1e-9)
 
 
 def test_still_traffic_stands() -> None:

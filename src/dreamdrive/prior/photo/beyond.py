@@ -4,21 +4,16 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
 
 from dreamdrive.prior.photo.fill import grown, inpainted
+from dreamdrive.prior.photo.pavement import AHEAD, along_road
 from dreamdrive.prior.photo.street import FAR_M, Street
-from dreamdrive.prior.photo.way import level_axes
-from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
 
 THIN = (*ROAD_USERS, StreetClass.POLE)
 """What something goes on behind: all of it is hidden street."""
 RIM_PX = 9
 """The outline of a road user is not exact, and its colours would be smeared over all that it hides."""
-_AHEAD, _LEAST_OF, _MEAN_OF = 1.03 ** np.arange(1, 34), 4, 12
-"""How much farther ahead bare ground is looked for, and of how many places colours beyond are means."""
 
 
 def widened(street: Street, margin: int) -> Street:
@@ -64,32 +59,6 @@ def widened(street: Street, margin: int) -> Street:
     depth = np.where(flat, np.minimum(plane, FAR_M), depth)
     depth[outside & (classes == StreetClass.SKY)] = 0
     bare = ~outside & np.isin(classes, FLAT) & ~grown((users > 0) | outside, RIM_PX)
-    rgb_out = _as_ahead(rgb_out, camera, street.ground, flat & (plane < FAR_M), bare)
+    rgb_out, left = along_road(rgb_out, camera, street.ground, flat & (plane < FAR_M), bare, AHEAD)
+    rgb_out = inpainted(rgb_out, left)
     return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
-
-
-def _as_ahead(
-    rgb: UInt8[np.ndarray, "h w 3"],
-    camera: Camera,
-    ground: Ground,
-    wanted: Bool[np.ndarray, "h w"],
-    bare: Bool[np.ndarray, "h w"],
-) -> UInt8[np.ndarray, "h w 3"]:
-    """The picture with wanted ground as the mean of the bare ground that is seen nearest ahead of it.
-
-    Lane lines go on straight so; what is nowhere bare ahead is filled from around it.
-    """
-    ahead = level_axes(ground)[:, 2]
-    points = camera.rays()[wanted] * ground.depth_m(camera)[wanted][:, None]
-    sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
-    for farther in _AHEAD:
-        at = camera.project(points + (farther - 1) * points[:, 2:] * ahead)
-        column, row = np.clip(at[:, :2], 0, (camera.width_px - 1, camera.height_px - 1)).astype(int).T
-        found = camera.shows(at) & bare[row, column] & (counts < _MEAN_OF)
-        sums[found] += rgb[row[found], column[found]]
-        counts += found
-    out, rest = rgb.copy(), wanted.copy()
-    known = counts >= _LEAST_OF
-    rest[wanted] = ~known
-    out[wanted & ~rest] = np.rint(sums[known] / counts[known, None])
-    return inpainted(out, rest)

@@ -18,6 +18,12 @@ def inpainted(rgb: UInt8[np.ndarray, "h w 3"], holes: Bool[np.ndarray, "h w"]) -
     return cv2.inpaint(rgb, holes.astype(np.uint8), _RADIUS_PX, cv2.INPAINT_TELEA) if holes.any() else rgb
 
 
+def smoothed(rgb: UInt8[np.ndarray, "h w 3"], holes: Bool[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w 3"]:
+    """The picture with its holes filled smoothly, however large they are and as far as anything is known."""
+    filled = np.rint(continued(rgb.astype(np.float32), (~holes).astype(np.float32)))
+    return np.where(holes[..., None], np.clip(filled, 0, 255), rgb).astype(np.uint8)
+
+
 def continued(
     values: Float[np.ndarray, "h w c"], weights: Float[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w c"]:

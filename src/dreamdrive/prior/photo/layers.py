@@ -9,7 +9,8 @@ import torch
 from jaxtyping import Bool, Float, UInt8, UInt16
 
 from dreamdrive.prior.photo.beyond import RIM_PX, THIN, widened
-from dreamdrive.prior.photo.fill import continued, grown, inpainted
+from dreamdrive.prior.photo.fill import continued, grown, inpainted, smoothed
+from dreamdrive.prior.photo.pavement import AROUND, along_road
 from dreamdrive.prior.photo.street import FAR_M, Street
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
@@ -144,8 +145,11 @@ def _without(
     users = grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), RIM_PX)
     hiding = grown(hidden, 3)
     edges = inpainted(street.rgb, hiding)
-    stands = inpainted(street.rgb, users | flat | sky)
-    ground = inpainted(street.rgb, hiding | users | ~flat)
+    stands = smoothed(street.rgb, users | flat | sky)
+    bare = flat & ~hiding & ~users
+    wanted = level & ~bare & (street.ground.depth_m(street.camera) < FAR_M)
+    found, left = along_road(street.rgb, street.camera, street.ground, wanted, bare, AROUND)
+    ground = smoothed(found, ~bare & (left | ~wanted))
     return np.where(level[..., None], ground, np.where(users[..., None], stands, edges))
 
 

@@ -17,6 +17,8 @@ SPEED_M_S = 8.0
 """Of vehicles, unless told."""
 WALK_M_S = 1.3
 """Of people (Bohannon 1997, comfortable gait)."""
+_FAST_M_S = 15.0
+"""Where traffic is as fast, nobody parks."""
 _LANE_M = 3.5
 _FAR_M = 80.0
 _LEAST_PX = 60
@@ -58,7 +60,8 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
 
     What is in the own lane, or beside it on the own side with road all around, drives ahead; on the other
     side it comes towards the camera, unless its back is seen. Vehicles that stand at the edge of the road, or
-    may do, are parked. Far users, and nearly all that the picture's border cuts off, stand still.
+    may do, are parked, and nearly all that the picture's border cuts off; on the own side none are where
+    traffic is fast. Far users stand still.
     """
     count = int(street.users.max(initial=0))
     velocities, axes = np.zeros((count, 3)), level_axes(street.ground)
@@ -74,7 +77,7 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
         if kind == StreetClass.PERSON:
             way = 0.0 if place.cut_off else WALK_M_S * (1 if user % 2 else -1)
         else:
-            way = speed_m_s * _direction(street, mask, place, side)
+            way = speed_m_s * _direction(street, mask, place, side, parked=speed_m_s < _FAST_M_S)
             if kind == StreetClass.TWO_WHEELER and abs(place.right_m) > _LANE_M / 2:
                 way = 0.0  # most that are not in the lane lean on something
         velocities[user - 1] = axes[:, 2] * way
@@ -109,8 +112,12 @@ def _place_of(
     return _Place(right_m, float(np.median(points[foot][:, 2])), int(rows[-1]), cut_off)
 
 
-def _direction(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, side: int) -> int:
-    """1 ahead, -1 towards the camera, 0 where it is parked."""
+def _direction(
+    street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, side: int, *, parked: bool
+) -> int:
+    """1 ahead, -1 towards the camera, 0 where it is parked; on the own side none may be."""
+    if not parked and place.right_m * side > -_LANE_M / 2:
+        return 1
     if abs(place.right_m) < _LANE_M / 2:
         return 0 if place.cut_off else 1
     strict, may_be = (_on_road(street, mask, place, hidden_is_road=each) for each in (False, True))
