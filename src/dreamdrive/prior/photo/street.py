@@ -13,7 +13,7 @@ from dreamdrive.scene.look import Look
 from dreamdrive.scene.street_class import FLAT, StreetClass
 
 FAR_M = 250.0
-_LEVEL_M, _HILLY_M = 20.0, 40.0
+_LEVEL_M, _HILLY_M = 40.0, 120.0
 """Up to the first distance the ground is the level road; from the second on it is as deep as it looks."""
 _FOOT = 0.12
 """Share of a road user's height that counts as its foot."""
