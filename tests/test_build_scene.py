@@ -1,6 +1,7 @@
 """From nouns to a scene, with what is known already in place of what would be found."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,3 +65,18 @@ def test_a_street_that_was_drawn_from_its_depth_never_drifts(monkeypatch: pytest
     poses = np.stack([each.world_from_camera for each in geometry.cameras])
     known = Known(poses, depth_m=street.depth_m, generated=True)
     assert not build_scene(replace(clip, known=known), TINY, given=Given(geometry)).drifts
+
+
+def test_each_of_several_drives_gets_the_steps_of_one() -> None:
+    street = small_street(frames=6)
+    clip, given = street_clip(street, hold_out=4), Given(true_geometry(street))
+    two = replace(clip, rig=clip.rig * 2, known=replace(clip.known, shared_first=True))
+    asked: dict[str, Any] = {}
+
+    def noted(name, options, compute, **chosen):
+        asked[name] = options
+        return call(name, options, compute, **chosen)
+
+    build_scene(two, replace(TINY, representation="static", knowledge="none"), given=given, run=noted)
+    assert asked["static"][0].steps == 2 * TINY.static.steps
+    assert asked["fit"][1].steps == 2 * TINY.fit.steps

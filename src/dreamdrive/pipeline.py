@@ -143,7 +143,8 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     Raises:
         InputError: The clip cannot be used.
     """
-    o, seed = options, {name: stage_seed(options.seed, name) for name in ("geometry", "static", "fit")}
+    o = _with_steps(options, len(clip.rig) if clip.known.shared_first else 1)
+    seed = {name: stage_seed(o.seed, name) for name in ("geometry", "static", "fit")}
     device = torch.device(o.device)
     weights = None if o.knowledge == NO_KNOWLEDGE else file_digest(weights_of(o.knowledge))
     looks = run(
@@ -184,6 +185,12 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
         ),
         check=partial(check.scene, clip),
     )
+
+
+def _with_steps(options: Options, drives: int) -> Options:
+    """Options by which each of several drives gets the steps of one."""
+    fits = {name: getattr(options, name) for name in ("static", "fit")}
+    return replace(options, **{name: replace(each, steps=drives * each.steps) for name, each in fits.items()})
 
 
 def _completed(clip: Clip, scene: Scene) -> Scene:
