@@ -3,11 +3,11 @@
     python benchmarks/filling.py WEIGHTS [--seeds SEED ...] [--no-clips] [--json FILE] [--markdown FILE]
 
 Streets of edition 2 at one moment, in layers with their true depth, so that only the filling differs: what is
-seen some metres ahead and aside, at the end of a way of a few frames, each of which the network is told of.
-And frames of PandaSet 1 s later along its true path, with the depth that the street network sees. In the
-truth what had to be filled is replaced by what each way makes of it; such a picture against the truth: PSNR
-in those pixels, stlpips-vgg, and the Frechet distance of squares around them in features of stlpips-alex.
-No training used either network. Behind the two ways stands what no filling at all gives.
+seen some metres ahead and aside, with the frame before that the network is told of. And frames of PandaSet
+1 s later along its true path, with the depth that the street network sees. In the truth what had to be filled
+is replaced by what each way makes of it; such a picture against the truth: PSNR in those pixels, stlpips-vgg,
+and the Frechet distance of squares around them in features of stlpips-alex. No training used either network.
+Behind the two ways stands what no filling at all gives.
 """
 
 import sys

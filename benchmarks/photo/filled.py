@@ -20,8 +20,8 @@ from photo.cases import drawn, pandaset
 WAYS = ("network", "library", "none")
 _PLACES_M = ((0.0, 3.0), (0.0, 6.0), (-1.0, 0.0), (1.0, 0.0), (-1.0, 5.0), (1.0, 5.0))
 """Metres aside and ahead."""
-_FRAMES = 5
-"""Of the way to each place."""
+_BEFORE = 0.8
+"""Share of the way to each place at which the frame before was drawn."""
 _KEEP_M = 3.0
 _LEAST = 0.01
 
@@ -99,12 +99,9 @@ def _at_the_end(
     layers: Layers, street: Street, pose: Float[np.ndarray, "4 4"], network: PhotoNetwork
 ) -> tuple[Sight, UInt8[np.ndarray, "h w 3"]]:
     """The last view of a way, and what the network makes of it, told of the frame before."""
-    before = Before(street.rgb, street.camera)
-    for share in np.linspace(0, 1, _FRAMES + 1)[1:]:
-        there = np.eye(4)
-        there[:3, 3] = share * pose[:3, 3]
-        there[:3, :3] = pose[:3, :3] if share == 1 else there[:3, :3]
-        camera = street.camera.at(there)
-        sight = sight_of(layers, camera, street.ground)
-        before = Before(mended(network, sight, camera, before)[0], camera)
-    return sight, before.rgb
+    there = np.eye(4)
+    there[:3, 3] = _BEFORE * pose[:3, 3]
+    cameras = street.camera.at(there), street.camera.at(pose)
+    before, sight = (sight_of(layers, camera, street.ground) for camera in cameras)
+    told_of = Before(inpainted(before.rgb, before.holes), cameras[0])
+    return sight, mended(network, sight, cameras[1], told_of)[0]

@@ -62,6 +62,7 @@ def generate(
     action: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="TEXT")] = (),
     traffic: Annotated[TrafficName | None, arg(help_behavior_hint="(default: flow)")] = None,
     traffic_speed: Annotated[float | None, arg(metavar="M/S", help_behavior_hint="(default: 8)")] = None,
+    fill: Annotated[str | None, arg(metavar="network|inpaint|FILE", help_behavior_hint="")] = None,
     prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     features: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
@@ -116,6 +117,8 @@ def generate(
             its own from the same first frame, and all become one scene.
         traffic: Whether the road users of a photo go on: vehicles along their lane, people along the street.
         traffic_speed: Speed of its vehicles in metres a second.
+        fill: What fills what a photo does not show: network, the default, is one that ships, inpaint is
+            OpenCV; or a file of weights of dreamdrive train photo.
         prompt: What a video model shall show, in words.
         steps: Steps of a video model's sampler.
         features: Features of a recording's frames that another program computed, see docs/replay.md.
@@ -149,6 +152,7 @@ def generate(
         **parse_actions(action),
         traffic=traffic,
         traffic_speed_m_s=traffic_speed,
+        fill=fill,
         prompt=prompt,
         steps=steps,
         features=features,

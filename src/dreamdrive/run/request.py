@@ -151,6 +151,7 @@ def _digests(
     control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None = None
 ) -> dict[str, str]:
     asked = control.trajectory
+    fill = None if control.fill in (None, "network", "inpaint") else Path(control.fill)
     given = {
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),
@@ -162,6 +163,7 @@ def _digests(
         "geometry-files": (geometry_files, EXPECTED),
         "weights": (weights, "a file of weights or its folder"),
         "knowledge": (knowledge, "weights of the street network"),
+        "fill": (fill, "network, inpaint or a file of weights"),
     }
     digests: dict[str, str] = {}
     if isinstance(asked, Trajectory):

@@ -33,6 +33,7 @@ class Control:
         actions: Several of these from the same first frame, each a drive of its own.
         traffic: ``"still"`` or ``"flow"``: whether the road users of a photo go on.
         traffic_speed_m_s: Speed of its vehicles then.
+        fill: What fills what a photo does not show: ``"network"``, ``"inpaint"`` or a file of weights.
         prompt: What shall be seen, in words.
         steps: Steps of a diffusion sampler.
         weights: The prior's network, a file or folder.
@@ -58,6 +59,7 @@ class Control:
     actions: tuple[Action, ...] | None = None
     traffic: TrafficName | None = None
     traffic_speed_m_s: float | None = None
+    fill: str | None = None
     prompt: str | None = None
     steps: int | None = None
     weights: Path | None = None

@@ -106,3 +106,19 @@ def test_two_drives_begin_at_the_photo_and_are_drawn_in_one_world(photo: Path) -
 def test_a_speed_that_cannot_be_is_a_sentence(photo: Path, given: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         PHOTO(Control(path=photo, **given))
+
+
+def test_the_network_fills_unless_told_and_gives_its_features(photo: Path, tmp_path: Path) -> None:
+    control = Control(path=photo, frames="0:9:4", size=(160, 90), camera_height_m=1.5)
+    clip, plain = PHOTO(control), PHOTO(replace(control, fill="inpaint"))
+    assert clip.features["photo:last"].shape == (3, 45, 80, 16)
+    assert "photo:last" not in plain.features
+    off = np.abs(clip.frames.astype(int) - plain.frames).max(-1)
+    assert (off[0] > 0).mean() < 0.01  # where the own car was
+    assert 0.003 < (off[-1] > 0).mean() < 0.6
+    with pytest.raises(InputError, match=r"--fill none\.safetensors: there is no such file"):
+        PHOTO(replace(control, fill="none.safetensors"))
+    wrong = tmp_path / "wrong.safetensors"
+    wrong.write_bytes(b"nothing")
+    with pytest.raises(InputError, match=r"wrong\.safetensors"):
+        PHOTO(replace(control, fill=str(wrong)))

@@ -13,7 +13,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.knowledge import SHIPPED
 from dreamdrive.prior.photo import layers_of
 from dreamdrive.prior.photo.fill import inpainted
-from dreamdrive.prior.photo.network import CHANNELS, Before, PhotoNetwork, mended, told
+from dreamdrive.prior.photo.network import CHANNELS, Before, PhotoNetwork, load_photo_network, mended, told
 from dreamdrive.prior.photo.sight import sight_of
 from dreamdrive.prior.photo.training import PairOptions, PhotoTraining, make_pairs, train_photo
 from dreamdrive.prior.photo.training.loop import batch_of
@@ -37,6 +37,22 @@ def test_an_untrained_network_changes_nothing() -> None:
     picture, features = mended(PhotoNetwork(), sight, photo.camera, None)
     np.testing.assert_array_equal(picture, inpainted(sight.rgb, sight.holes))
     assert features.shape[:2] == (27, 48)
+
+
+def test_the_network_that_ships_answers_as_it_did_when_it_was_trained() -> None:
+    photo = street()
+    pose = np.eye(4)
+    pose[0, 3] = 1.5
+    here = photo.camera.at(pose)
+    sight = sight_of(layers_of(photo), here, GROUND)
+    picture, features = mended(load_photo_network(), sight, here, Before(photo.rgb, photo.camera))
+    made_up = (sight.made_up > 0.5) | sight.holes
+    np.testing.assert_allclose(picture[made_up].mean(0), [95.2, 77.6, 74.4], atol=0.6)
+    np.testing.assert_allclose(picture[made_up].std(0), [27.6, 12.2, 21.5], atol=0.6)
+    np.testing.assert_allclose((features.mean(), features.std()), (-0.0034, 0.1234), atol=0.001)
+    assert features.shape == (27, 48, 40)
+    known = ~made_up & (sight.made_up < 0.01)
+    np.testing.assert_array_equal(picture[known], sight.rgb[known])
 
 
 def test_the_frame_before_is_carried_along_the_surface() -> None:

@@ -25,6 +25,7 @@ PHOTO = Prior(
             "knowledge",
             "traffic",
             "traffic_speed_m_s",
+            "fill",
         }
     ),
     gives="25 frames at 10 Hz with the poses, depth and sky that they were drawn from",

@@ -13,9 +13,12 @@ from dreamdrive.data.size import check_largest
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.pca import reduce
 from dreamdrive.prior.photo.fill import grown, inpainted
 from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
+from dreamdrive.prior.photo.network import INPAINTED, Before, PhotoNetwork, load_photo_network, mended
+from dreamdrive.prior.photo.network import SHIPPED as SHIPPED_FILL
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
 from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
@@ -33,6 +36,13 @@ RATE_HZ = 10.0
 SIZE = (480, 270)
 _MOST_FRAMES = 1000
 _HALF = 0.5
+_Drawn = tuple[
+    UInt8[np.ndarray, "f h w 3"],
+    Float[np.ndarray, "f h w"],
+    Bool[np.ndarray, "f h w"],
+    Bool[np.ndarray, "f h w"],
+]
+"""Frames, depth, sky and what moves."""
 _LEAST_SOLID, _LITTLE_GROUND = 0.05, 0.05
 _LEAST_CONTRAST = 3.0  # grey levels: a street at night has more
 
@@ -54,8 +64,11 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     ahead = going_ahead(street, velocities)
     path = path_for(control, street, wanted / RATE_HZ, gone=ahead)
     layers = layers_of(street, leaving=ahead)
+    fill = control.fill or SHIPPED_FILL
+    network = None if fill == INPAINTED else load_photo_network(fill)
     later = (layers.at(float(t_s), velocities) for t_s in wanted / RATE_HZ)
-    frames, depth_m, sky, moving = _driven(street, later, path.world_from_camera, progress)
+    drawn, inner = _driven(street, later, path.world_from_camera, network, progress)
+    frames, depth_m, sky, moving = drawn
     first = np.linalg.inv(path.world_from_camera[0])
     cameras = [street.camera.at(pose) for pose in path.world_from_camera]
     valid = np.ones(frames.shape[:3], bool)
@@ -67,7 +80,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
         valid=valid,
         held_out=held_out_mask(len(wanted), control.hold_out),
         source_index=wanted,
-        features={"appearance": appearance(frames, valid)},
+        features={"appearance": appearance(frames, valid)} | ({"photo:last": reduce(inner)} if inner else {}),
         known=Known(
             world_from_camera=first @ path.world_from_camera,
             intrinsics=True,
@@ -126,24 +139,25 @@ def _driven(
     street: Street,
     layers: Iterable[Layers],
     poses: Float[np.ndarray, "f 4 4"],
+    network: PhotoNetwork | None,
     progress: Progress,
-) -> tuple[
-    UInt8[np.ndarray, "f h w 3"],
-    Float[np.ndarray, "f h w"],
-    Bool[np.ndarray, "f h w"],
-    Bool[np.ndarray, "f h w"],
-]:
-    """Frames, depth, sky and what moves, of the layers at each pose; the photo itself where it was taken."""
-    drawn: list[tuple[np.ndarray, ...]] = []
+) -> tuple[_Drawn, list[Float[np.ndarray, "h2 w2 c"]]]:
+    """What the layers are at each pose, the photo itself where it was taken; and features of the network."""
+    drawn, inner, before = list[tuple[np.ndarray, ...]](), list[np.ndarray](), None
     for number, (now, pose) in enumerate(zip(layers, poses, strict=True)):
-        frame, sight = view(now, street.camera.at(pose), street)
+        camera = street.camera.at(pose)
+        frame, sight = view(now, camera, street)
+        if network is not None:
+            plain, (frame, features) = frame, mended(network, sight, camera, before)
+            before = Before(plain, camera)
+            inner.append(features)
         if np.allclose(pose, np.eye(4)) and not now.carried_m.any():
             own = grown(street.classes == StreetClass.OWN_CAR, 5)
             frame = np.where(own[..., None], frame, street.rgb)
         drawn.append((frame, sight.depth_m, sight.sky, sight.moving))
         progress(number + 1, len(poses))
     frames, depth_m, sky, moving = (np.stack(each) for each in zip(*drawn, strict=True))
-    return frames, depth_m, sky, moving
+    return (frames, depth_m, sky, moving), inner
 
 
 def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:

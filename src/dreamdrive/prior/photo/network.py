@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from dreamdrive.errors import InputError
 from dreamdrive.models import fill_network, read_state
 from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.sight import Sight, places_in
@@ -19,6 +20,9 @@ CHANNELS = 11
 """RGB of the view, alpha, made up, nearer, inverse depth; RGB of the frame before, and where it is known."""
 WIDTHS = (40, 80, 144, 208)
 _NEAR_M = 2.0
+SHIPPED, INPAINTED = "network", "inpaint"
+"""Names in place of a file: the weights that ship, and no network at all."""
+_FILE = Path(__file__).with_name("photo.safetensors")
 EXPECTED = "weights of the network of the prior photo, as `dreamdrive train photo` writes them"
 
 
@@ -75,7 +79,10 @@ def _even(x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
 
 @dataclass(frozen=True)
 class Before:
-    """The frame before, as it was mended, and its camera."""
+    """The frame before, its holes filled by a library, and its camera.
+
+    Not as it was mended: what a network makes of its own answers drifts from frame to frame.
+    """
 
     rgb: UInt8[np.ndarray, "h w 3"]
     camera: Camera
@@ -104,12 +111,16 @@ def _carried(sight: Sight, camera: Camera, before: Before) -> Float[np.ndarray, 
     return np.concatenate([known * rgb / 255, known], axis=2).astype(np.float32)
 
 
-def load_photo_network(path: Path) -> PhotoNetwork:
-    """The network with the weights in a file, as ``dreamdrive train photo`` writes it.
+def load_photo_network(given: str | Path = SHIPPED) -> PhotoNetwork:
+    """The network with the weights that ship, or with those that ``dreamdrive train photo`` wrote to a file.
 
     Raises:
-        InputError: The file is of something else.
+        InputError: There is no such file, or it is of something else.
     """
+    path = _FILE if given == SHIPPED else Path(given)
+    if not path.is_file():
+        names = f"{SHIPPED}, {INPAINTED} or {EXPECTED}"
+        raise InputError(f"--fill {given}: there is no such file; expected {names}")
     return fill_network(PhotoNetwork, read_state(path, EXPECTED), str(path), EXPECTED)
 
 
@@ -117,7 +128,10 @@ def load_photo_network(path: Path) -> PhotoNetwork:
 def mended(
     network: PhotoNetwork, sight: Sight, camera: Camera, before: Before | None
 ) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h2 w2 c"]]:
-    """The view as the network mends it, and its features."""
-    rgb, features = network(torch.from_numpy(told(sight, camera, before))[None])
-    picture = np.rint(np.clip(rgb[0].permute(1, 2, 0).numpy(), 0, 1) * 255).astype(np.uint8)
+    """The view with what the photo does not show as the network mends it, and the network's features."""
+    seen = told(sight, camera, before)
+    rgb, features = network(torch.from_numpy(seen)[None])
+    made_up = np.clip(2 * np.maximum(sight.made_up, sight.holes), 0, 1).astype(np.float32)[..., None]
+    mixed = made_up * rgb[0].permute(1, 2, 0).numpy() + (1 - made_up) * seen[:3].transpose(1, 2, 0)
+    picture = np.rint(np.clip(mixed, 0, 1) * 255).astype(np.uint8)
     return picture, features[0].permute(1, 2, 0).numpy()
