@@ -108,9 +108,9 @@ def test_a_speed_that_cannot_be_is_a_sentence(photo: Path, given: dict[str, Any]
         PHOTO(Control(path=photo, **given))
 
 
-def test_the_network_fills_unless_told_and_gives_its_features(photo: Path, tmp_path: Path) -> None:
+def test_the_network_fills_where_it_is_asked_to_and_gives_its_features(photo: Path, tmp_path: Path) -> None:
     control = Control(path=photo, frames="0:9:4", size=(160, 90), camera_height_m=1.5)
-    clip, plain = PHOTO(control), PHOTO(replace(control, fill="inpaint"))
+    clip, plain = PHOTO(replace(control, fill="network")), PHOTO(control)
     assert clip.features["photo:last"].shape == (3, 45, 80, 16)
     assert "photo:last" not in plain.features
     off = np.abs(clip.frames.astype(int) - plain.frames).max(-1)

@@ -18,7 +18,6 @@ from dreamdrive.prior.photo.fill import grown, inpainted
 from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.network import INPAINTED, Before, PhotoNetwork, load_photo_network, mended
-from dreamdrive.prior.photo.network import SHIPPED as SHIPPED_FILL
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
 from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
@@ -64,8 +63,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     ahead = going_ahead(street, velocities)
     path = path_for(control, street, wanted / RATE_HZ, gone=ahead)
     layers = layers_of(street, leaving=ahead)
-    fill = control.fill or SHIPPED_FILL
-    network = None if fill == INPAINTED else load_photo_network(fill)
+    network = None if control.fill in (None, INPAINTED) else load_photo_network(control.fill)
     later = (layers.at(float(t_s), velocities) for t_s in wanted / RATE_HZ)
     drawn, inner = _driven(street, later, path.world_from_camera, network, progress)
     frames, depth_m, sky, moving = drawn
