@@ -117,7 +117,7 @@ def generate(
             its own from the same first frame, and all become one scene.
         traffic: Whether the road users of a photo go on: vehicles along their lane, people along the street.
         traffic_speed: Speed of its vehicles in metres a second.
-        fill: What fills what a photo does not show: inpaint, the default, is OpenCV, network is one that ships;
+        fill: What fills what a photo does not show: inpaint, the default, is OpenCV, network one that ships;
             or a file of weights of dreamdrive train photo.
         prompt: What a video model shall show, in words.
         steps: Steps of a video model's sampler.
