@@ -6,14 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.knowledge.training import CLASS_OF
 from dreamdrive.prior.photo import Layers, Street, layers_of
-from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.network import Before, PhotoNetwork, mended
 from dreamdrive.prior.photo.sight import Sight, sight_of
-from dreamdrive.prior.photo.street import FAR_M
+from dreamdrive.prior.photo.training import true_street
 from dreamdrive.prior.photo.way import free_m
-from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Semantic
 from photo.cases import drawn, pandaset
 
@@ -41,11 +38,7 @@ def drawn_ones(seed: int, network: PhotoNetwork) -> Iterator[Filled]:
     case = drawn(seed)
     assert case.made is not None
     made = case.made
-    classes, depth = CLASS_OF[made.semantic[0]], np.minimum(made.depth_m[0], FAR_M)
-    depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
-    users = made.instance[0].astype(np.uint16)
-    camera = made.cameras[0]
-    street = Street(made.frames[0], camera, depth.astype(np.float32), classes, users, made.ground)
+    street, camera = true_street(made), made.cameras[0]
     layers, room_m = layers_of(street), free_m(street) - _KEEP_M
     for aside_m, ahead_m in _PLACES_M:
         if ahead_m > room_m:
@@ -90,7 +83,7 @@ def _filled(
         moving=layers.moving[seen],
     )
     none = sight_of(bare, street.camera.at(pose), street.ground).rgb
-    said = {"network": mended_rgb, "library": inpainted(sight.rgb, sight.holes), "none": none}
+    said = {"network": mended_rgb, "library": sight.filled, "none": none}
     pasted = {way: np.where(region[..., None], rgb, truth) for way, rgb in said.items()}
     yield Filled(name, truth, region, pasted)
 
@@ -103,5 +96,5 @@ def _at_the_end(
     there[:3, 3] = _BEFORE * pose[:3, 3]
     cameras = street.camera.at(there), street.camera.at(pose)
     before, sight = (sight_of(layers, camera, street.ground) for camera in cameras)
-    told_of = Before(inpainted(before.rgb, before.holes), cameras[0])
+    told_of = Before(before.filled, cameras[0])
     return sight, mended(network, sight, cameras[1], told_of)[0]

@@ -4,9 +4,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.evaluate.networks.packaged import PackagedFile
-from dreamdrive.evaluate.networks.stlpips import FILES, alex
-from dreamdrive.models import fill_network, read_state
+from dreamdrive.evaluate.networks.stlpips import load_stlpips
 
 SIDE_PX = 64
 _STEP_PX = 32
@@ -29,14 +27,7 @@ def squares_of(
 
 def features_of(squares: list[UInt8[np.ndarray, "s s 3"]]) -> Float[np.ndarray, "n c"]:
     """Means over each square of the second and last values of stlpips-alex's trunk."""
-    file: PackagedFile = FILES["alex"]
-    path = file.locate()
-    state = {
-        "features." + key.split(".", 2)[2]: value
-        for key, value in read_state(path, file.path).items()
-        if key.startswith("net.")
-    }
-    trunk = fill_network(alex, state, str(path), file.path)
+    trunk = load_stlpips("alex").trunk
     rows: list[torch.Tensor] = []
     with torch.inference_mode():
         for start in range(0, len(squares), 32):

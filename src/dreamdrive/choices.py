@@ -30,6 +30,8 @@ Resize = Literal["tf1", "torch", "antialias", "clean"]
 """tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);
 antialias: the same with antialiasing (torchmetrics); clean: antialiased bicubic (clean-fid)."""
 Covariance = Literal["sample", "population"]
+FILL_NETWORK, FILL_INPAINT = "network", "inpaint"
+"""What fills what a photo does not show, in place of a file: the weights that ship, no network at all."""
 Stlpips = Literal["alex", "vgg", "both"]
 """Trunk of the shift-tolerant LPIPS; that of VGG takes four times as long."""
 

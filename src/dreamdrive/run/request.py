@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dreamdrive.choices import DATASETS, PRIORS, QualityName
+from dreamdrive.choices import DATASETS, FILL_INPAINT, FILL_NETWORK, PRIORS, QualityName
 from dreamdrive.data import dataset_of
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, bent_model, companions
@@ -151,7 +151,7 @@ def _digests(
     control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None = None
 ) -> dict[str, str]:
     asked = control.trajectory
-    fill = None if control.fill in (None, "network", "inpaint") else Path(control.fill)
+    fill = None if control.fill in (None, FILL_NETWORK, FILL_INPAINT) else Path(control.fill)
     given = {
         "input": (control.path, "a video or a folder of images"),
         "intrinsics": (control.intrinsics, "a calibration file"),

@@ -59,11 +59,11 @@ class Heads(nn.Module):
 
 
 class PerceptualDistance:
-    """A trunk and heads of a kind, ``vgg`` or ``alex``."""
+    """A trunk and heads of a kind, ``vgg`` or ``alex``; ``trunk`` gives the values behind them."""
 
     def __init__(self, kind: str, trunk: Trunk, heads: Heads) -> None:
         self.kind = kind
-        self._trunk = trunk
+        self.trunk = trunk
         self._heads = heads
 
     def __call__(self, a: Float[Tensor, "n 3 h w"], b: Float[Tensor, "n 3 h w"]) -> Float[Tensor, " n"]:
@@ -73,7 +73,7 @@ class PerceptualDistance:
         """
         with torch.inference_mode():
             parts = [
-                self._heads([_difference(x, y) for x, y in zip(self._trunk(p), self._trunk(q), strict=True)])
+                self._heads([_difference(x, y) for x, y in zip(self.trunk(p), self.trunk(q), strict=True)])
                 for p, q in zip(a.split(_PAIRS), b.split(_PAIRS), strict=True)
             ]
         return torch.cat(parts)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.choices import FILL_INPAINT
 from dreamdrive.data.intrinsics import GUESSED
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.data.select import Selection, held_out_mask
@@ -14,10 +15,10 @@ from dreamdrive.errors import InputError
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.pca import reduce
-from dreamdrive.prior.photo.fill import grown, inpainted
+from dreamdrive.prior.photo.fill import grown
 from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
-from dreamdrive.prior.photo.network import INPAINTED, Before, PhotoNetwork, load_photo_network, mended
+from dreamdrive.prior.photo.network import Before, PhotoNetwork, load_photo_network, mended
 from dreamdrive.prior.photo.sight import Sight, sight_of
 from dreamdrive.prior.photo.street import Street, street_of
 from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
@@ -63,7 +64,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     ahead = going_ahead(street, velocities)
     path = path_for(control, street, wanted / RATE_HZ, gone=ahead)
     layers = layers_of(street, leaving=ahead)
-    network = None if control.fill in (None, INPAINTED) else load_photo_network(control.fill)
+    network = None if control.fill in (None, FILL_INPAINT) else load_photo_network(control.fill)
     later = (layers.at(float(t_s), velocities) for t_s in wanted / RATE_HZ)
     drawn, inner = _driven(street, later, path.world_from_camera, network, progress)
     frames, depth_m, sky, moving = drawn
@@ -161,7 +162,7 @@ def _driven(
 def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:
     """What a camera sees, with its holes filled from around them."""
     sight = sight_of(layers, camera, street.ground)
-    return inpainted(sight.rgb, sight.holes), sight
+    return sight.filled, sight
 
 
 def _told_by(height: Height) -> str:

@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from dreamdrive.choices import FILL_INPAINT, FILL_NETWORK
 from dreamdrive.errors import InputError
 from dreamdrive.models import fill_network, read_state
-from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
 
@@ -20,8 +20,6 @@ CHANNELS = 11
 """RGB of the view, alpha, made up, nearer, inverse depth; RGB of the frame before, and where it is known."""
 WIDTHS = (40, 80, 144, 208)
 _NEAR_M = 2.0
-SHIPPED, INPAINTED = "network", "inpaint"
-"""Names in place of a file: the weights that ship, and no network at all."""
 _FILE = Path(__file__).with_name("photo.safetensors")
 EXPECTED = "weights of the network of the prior photo, as `dreamdrive train photo` writes them"
 
@@ -94,7 +92,7 @@ def told(sight: Sight, camera: Camera, before: Before | None) -> Float[np.ndarra
     carried = np.zeros((*shape, 4), np.float32) if before is None else _carried(sight, camera, before)
     inverse = np.where(sight.depth_m > 0, _NEAR_M / np.maximum(sight.depth_m, _NEAR_M), 0)
     maps = [sight.alpha, sight.made_up, np.clip(sight.nearer, -1, 3), inverse]
-    rgb = inpainted(sight.rgb, sight.holes).astype(np.float32) / 255
+    rgb = sight.filled.astype(np.float32) / 255
     return np.concatenate([rgb.transpose(2, 0, 1), np.stack(maps), carried.transpose(2, 0, 1)]).astype(
         np.float32
     )
@@ -111,15 +109,15 @@ def _carried(sight: Sight, camera: Camera, before: Before) -> Float[np.ndarray, 
     return np.concatenate([known * rgb / 255, known], axis=2).astype(np.float32)
 
 
-def load_photo_network(given: str | Path = SHIPPED) -> PhotoNetwork:
+def load_photo_network(given: str | Path = FILL_NETWORK) -> PhotoNetwork:
     """The network with the weights that ship, or with those that ``dreamdrive train photo`` wrote to a file.
 
     Raises:
         InputError: There is no such file, or it is of something else.
     """
-    path = _FILE if given == SHIPPED else Path(given)
+    path = _FILE if given == FILL_NETWORK else Path(given)
     if not path.is_file():
-        names = f"{SHIPPED}, {INPAINTED} or {EXPECTED}"
+        names = f"{FILL_NETWORK}, {FILL_INPAINT} or {EXPECTED}"
         raise InputError(f"--fill {given}: there is no such file; expected {names}")
     return fill_network(PhotoNetwork, read_state(path, EXPECTED), str(path), EXPECTED)
 

@@ -1,12 +1,14 @@
 """What a camera sees of the layers of a photo."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.layers import Layers
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
@@ -42,6 +44,11 @@ class Sight:
     def holes(self) -> Bool[np.ndarray, "h w"]:
         """Where the road or what stands should be, and nothing is (H, W)."""
         return (self.alpha < _HALF) & ~self.sky
+
+    @cached_property
+    def filled(self) -> UInt8[np.ndarray, "h w 3"]:
+        """The colours, its holes filled from around them (H, W, 3)."""
+        return inpainted(self.rgb, self.holes)
 
 
 def places_in(other: Camera, camera: Camera, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:

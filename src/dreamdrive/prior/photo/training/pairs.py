@@ -31,7 +31,7 @@ from dreamdrive.prior.photo.way import free_m, level_axes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.street_class import StreetClass
-from dreamdrive.world import Semantic, make_street
+from dreamdrive.world import Drive, Semantic, make_street
 
 PLANES = CHANNELS + 4
 """What a pair holds, in bytes: what the network is told, the truth, and 255 where that counts."""
@@ -140,10 +140,7 @@ def street_pairs(
     """Pairs of one street of the second edition: what is behind things is truly known there."""
     tall_m = float(generator.uniform(*HEIGHTS_M))
     made = make_street(seed, 1, 10.0, options.size, camera_height_m=tall_m, edition=2)
-    classes, depth = CLASS_OF[made.semantic[0]], np.minimum(made.depth_m[0], FAR_M)
-    depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
-    users = made.instance[0].astype(np.uint16)
-    street = Street(made.frames[0], made.cameras[0], depth.astype(np.float32), classes, users, made.ground)
+    street = true_street(made)
     layers, room_m = layers_of(street), max(free_m(street) - _KEEP_M, 0.0)
     for _ in range(options.each):
         ahead = min(_way_m(options, generator), room_m)
@@ -154,6 +151,14 @@ def street_pairs(
         before = _before(past.frame, sight_of(layers, earlier, made.ground).rgb, earlier, generator)
         seen = told(sight_of(layers, here, made.ground), here, before)
         yield _planes(seen, truth.frame, truth.semantic != Semantic.OWN_CAR)
+
+
+def true_street(made: Drive) -> Street:
+    """The first frame of a drawn street, with its true depth, classes and road users."""
+    classes, depth = CLASS_OF[made.semantic[0]], np.minimum(made.depth_m[0], FAR_M)
+    depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
+    users = made.instance[0].astype(np.uint16)
+    return Street(made.frames[0], made.cameras[0], depth.astype(np.float32), classes, users, made.ground)
 
 
 def _planes(
