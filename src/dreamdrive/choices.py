@@ -24,7 +24,7 @@ DeviceName = Literal["cpu", "cuda"]
 Stage = Literal["prior", "look", "geometry", "initialise", "static", "score", "group", "fit"]
 Show = Literal["colour", "depth", "dynamic", "static"]
 Format = Literal["mp4", "png", "npz"]
-ExportKind = Literal["ply"]
+ExportKind = Literal["ply", "nuscenes"]
 DtypeName = Literal["float16", "float32"]
 Resize = Literal["tf1", "torch", "antialias", "clean"]
 """tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);
@@ -176,6 +176,10 @@ DATASETS: "Table[DataSet]" = Table(
     "dreamdrive.data:DataSet",
     {
         "rig": "dreamdrive.data.rig:RIG_FOLDER",
+        "nuscenes": "dreamdrive.data.nuscenes:NUSCENES",
+        "pandaset": "dreamdrive.data.pandaset:PANDASET",
+        "kitti-raw": "dreamdrive.data.kitti:KITTI_RAW",
+        "kitti-odometry": "dreamdrive.data.kitti:KITTI_ODOMETRY",
         "recording": "dreamdrive.data.clip_reader:RECORDING",
     },
 )

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.data.pictures import texture
 
-from dreamdrive.data import Lens, clip_reader, read_clip
+from dreamdrive.data import Lens, read_clip, sampler
 from dreamdrive.errors import InputError
 
 CALIBRATION = {"width": 64, "height": 48, "intrinsics": {"fx": 60.0, "fy": 60.0, "cx": 31.5, "cy": 23.5}}
@@ -204,7 +204,7 @@ def test_a_clip_without_any_picture_is_refused(make_folder):
 
 
 def test_more_frames_than_memory_holds_are_refused(make_folder, monkeypatch):
-    monkeypatch.setattr(clip_reader, "MAX_FRAMES", 4)
+    monkeypatch.setattr(sampler, "MAX_FRAMES", 4)
     folder = make_folder(6)
     with pytest.raises(InputError, match="more than 4 frames of 64x48 are selected"):
         read_clip(folder)

@@ -102,7 +102,7 @@ def test_frames_that_memory_cannot_hold_are_not_all_read(
 ) -> None:
     for i in range(4):
         cv2.imwrite(str(tmp_path / f"{i}.png"), np.zeros((40, 64, 3), np.uint8))
-    monkeypatch.setattr("dreamdrive.data.clip_reader.free_bytes", lambda: 3 * 8 * 64 * 40)
+    monkeypatch.setattr("dreamdrive.data.sampler.free_bytes", lambda: 3 * 8 * 64 * 40)
     with pytest.raises(InputError) as caught:
         read_clip(tmp_path)
     assert str(caught.value) == (

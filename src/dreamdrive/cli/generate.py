@@ -40,6 +40,8 @@ def generate(
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     dataset: Annotated[DataSetName | None, arg(help_behavior_hint="")] = None,
+    scene: Annotated[str | None, arg(metavar="NAME|N", help_behavior_hint="")] = None,
+    cameras: Annotated[str | None, arg(metavar="all|NAME,...", help_behavior_hint="")] = None,
     prior: Annotated[PriorName | None, arg(help_behavior_hint="")] = None,
     geometry: Annotated[GeometryName | None, arg(help_behavior_hint="(default: classical)")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
@@ -82,6 +84,8 @@ def generate(
             or a photo; --prior street-world needs none.
         out: Output folder. The same command goes on where it stopped.
         dataset: How the recording lies on disk; without it that of dreamdrive's own that recognises INPUT.
+        scene: Which drive of a data set, by its name or its number from 0: dreamdrive data list INPUT.
+        cameras: Which of its cameras, such as front,front_left; without it the one that looks ahead.
         prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; photo
             drives into a photo; the others are video models, see docs/guides/priors.md. Without it the input
             decides.
@@ -140,6 +144,8 @@ def generate(
     control = Control(
         path=input,
         dataset=dataset,
+        scene=scene,
+        cameras=cameras,
         frames=frames,
         fps=fps,
         size=None if size is None else parse_size(size),
@@ -178,12 +184,11 @@ def generate(
             progress=bars,
             say=console.print,
         )
-    _tell(console, outcome, out)
-    if strict and outcome.rough:
-        sys.exit(_ROUGH)
+    _tell(console, outcome, out, strict)
 
 
-def _tell(console: Console, outcome: "Outcome", out: Path) -> None:
+def _tell(console: Console, outcome: "Outcome", out: Path, strict: bool) -> None:
+    """What became of it; a rough result ends the program where ``strict`` asks for that."""
     from dreamdrive.run import lines_of
 
     if outcome.already_finished:
@@ -192,6 +197,8 @@ def _tell(console: Console, outcome: "Outcome", out: Path) -> None:
         console.print(line)
     for what, name in (("scene", "scene"), ("videos", "video"), ("report", "report.json")):
         console.print(f"{what:<7} {out / name}")
+    if strict and outcome.rough:
+        sys.exit(_ROUGH)
 
 
 def _options(quality: QualityName, method: MethodName, file: Path | None) -> "Options":

@@ -11,6 +11,7 @@ from rich.logging import RichHandler
 import dreamdrive
 from dreamdrive.cli.arguments import REGISTRY
 from dreamdrive.cli.clean import clean
+from dreamdrive.cli.data import data
 from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
@@ -30,6 +31,7 @@ COMMANDS = {
     "export": export,
     "clean": clean,
     "evaluate": evaluate,
+    "data": data,
     "world": world,
     "prior": prior,
     "train": train,

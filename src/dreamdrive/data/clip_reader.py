@@ -1,37 +1,29 @@
 """A recording on disk becomes a clip: pinhole frames of one size, with times and whatever is known."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int
 
 from dreamdrive.data.cuts import find_cuts
 from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.images import ImageFolder, RawFrame
 from dreamdrive.data.intrinsics import Calibration, calibration
-from dreamdrive.data.lens import Lens, Undistorter
 from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
+from dreamdrive.data.sampler import Sampler, check_pictures, most_frames, too_many
 from dreamdrive.data.select import Selection, held_out_mask
-from dreamdrive.data.size import Sizing, choose_size
 from dreamdrive.data.source import Source, one_frame, open_source
 from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
-from dreamdrive.machine import free_bytes
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.trajectory import Trajectory
 
 FOLDER_RATE_HZ = 10.0
 """Rate at which the images of a folder count unless told."""
-BLACK, BLACK_SPREAD = 16.0, 4.0
-"""Grey levels: mean and standard deviation below which frames show nothing."""
-MAX_FRAMES = 1000
-"""Frames a clip may have: all are in memory, 0.4 MB each at 480x270, and every stage adds its own."""
 
 
 def read_clip(
@@ -93,7 +85,7 @@ def read_clip(
             f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
         )
     frames_rgb = np.stack([raw.rgb for raw in read])
-    _check_pictures(frames_rgb, valid, path)
+    check_pictures(frames_rgb, valid, path)
     found = find_cuts(frames_rgb, valid)
     notes += of_damage([raw.index for raw in read if raw.damaged])
     notes += [*_gaps(source, index, clock_s, fps), *of_cuts(found, index)]
@@ -119,56 +111,20 @@ def read_clip(
     )
 
 
-@dataclass(frozen=True)
-class _Sampler:
-    """How a source image becomes a clip frame."""
-
-    calibration: Calibration
-    sizing: Sizing
-    camera: Camera
-    lens: Lens | None
-    undistorter: Undistorter | None
-
-    @staticmethod
-    def create(source: tuple[int, int], size: tuple[int, int] | None, known: Calibration) -> "_Sampler":
-        sizing = choose_size(source, size)
-        camera = sizing.camera(known.camera)
-        if known.distortion is None:
-            return _Sampler(known, sizing, camera, None, None)
-        lens = Lens(known.distortion, camera)
-        return _Sampler(known, sizing, camera, lens, Undistorter.create(lens, known.camera, sizing))
-
-    @property
-    def notes(self) -> list[str]:
-        larger = f"The frames are enlarged {1 / self.sizing.shrink:.2f} times; they hold no more detail."
-        return [*self.calibration.notes, *([larger] if self.sizing.shrink < 1 else [])]
-
-    def __call__(self, raw: RawFrame) -> RawFrame:
-        apply = self.sizing.apply if self.undistorter is None else self.undistorter.apply
-        width, height = self.sizing.target
-        valid = np.ones((height, width), bool) if self.undistorter is None else self.undistorter.valid.copy()
-        if raw.opaque is not None:  # a clip pixel is valid when all of its footprint is
-            valid &= apply(raw.opaque.astype(np.uint8) * 255) == 255
-        frame = apply(raw.rgb)
-        frame[~valid] = 0
-        return replace(raw, rgb=frame, opaque=valid)
-
-
 def _gather(
     source: Source,
     selection: Selection,
     size: tuple[int, int] | None,
     calibrated: Callable[[tuple[int, int]], Calibration],
-) -> tuple[_Sampler, list[RawFrame]]:
+) -> tuple[Sampler, list[RawFrame]]:
     """The selected frames, each brought to the clip's size as it comes."""
     count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
-    sampler: _Sampler | None = None
-    read: list[RawFrame] = []
-    most = MAX_FRAMES
+    sampler: Sampler | None = None
+    read, most = list[RawFrame](), 0
     for raw in source.read(selection.resolve(count, str(source.path))):
         if sampler is None:
-            sampler = _Sampler.create(raw.size, size, calibrated(raw.size))
-            most = _most_frames(sampler.sizing.target)
+            sampler = Sampler.create(raw.size, size, calibrated(raw.size))
+            most = most_frames(sampler.sizing.target)
         if raw.size != sampler.sizing.source:
             (w, h), (w2, h2) = sampler.sizing.source, raw.size
             raise InputError(
@@ -176,22 +132,11 @@ def _gather(
                 "expected frames of one size"
             )
         if len(read) == most:
-            width, height = sampler.sizing.target
-            smaller = ", or give a smaller --size" if most < MAX_FRAMES else ""
-            raise InputError(
-                f"{source.path}: more than {most} frames of {width}x{height} are selected, too many to hold "
-                f"in memory; choose some with --frames START:STOP:STEP{smaller}"
-            )
+            raise too_many(most, sampler.sizing.target, source.path)
         read.append(sampler(raw))
     if sampler is None or len(read) < 2:
         raise one_frame(source.path)
     return sampler, read
-
-
-def _most_frames(size: tuple[int, int]) -> int:
-    """Frames that free memory holds: four bytes a pixel with its validity, twice while they are stacked."""
-    free = free_bytes()
-    return MAX_FRAMES if free is None else min(MAX_FRAMES, max(1, free // (8 * size[0] * size[1])))
 
 
 def _times(
@@ -214,18 +159,6 @@ def _times(
     )
 
 
-def _check_pictures(
-    frames: UInt8[np.ndarray, "f h w 3"], valid: Bool[np.ndarray, "f h w"], path: Path
-) -> None:
-    """Refuse a recording of nothing: a lens cap, a camera that failed."""
-    shown = (frame[where] for frame, where in zip(frames, valid, strict=True) if where.any())
-    if all(pixels.mean() < BLACK and pixels.std() < BLACK_SPREAD for pixels in shown):
-        raise InputError(
-            f"{path}: every selected frame is black; expected pictures of a street, choose others with "
-            "--frames"
-        )
-
-
 def _gaps(
     source: Source, index: Int[np.ndarray, " f"], clock_s: list[float | None], fps: float | None
 ) -> list[str]:
@@ -237,7 +170,7 @@ def _gaps(
     return of_time_jumps(index, np.array(clock_s, dtype=np.float64))
 
 
-def _recorded(source: Source, sampler: _Sampler) -> Recorded:
+def _recorded(source: Source, sampler: Sampler) -> Recorded:
     sizing = sampler.sizing
     lens = None if sampler.lens is None else sampler.lens.to_json()
     is_video = isinstance(source, Video)

@@ -1,14 +1,15 @@
-"""Scenes in other formats."""
+"""Scenes and drawn streets in other formats."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 from dreamdrive.choices import ExportKind
 from dreamdrive.errors import InputError
+from dreamdrive.export.nuscenes import export_scene, export_world
 from dreamdrive.export.ply import export_ply, left_out_of_ply, write_ply
 from dreamdrive.scene.scene import Scene
 
-KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {"ply": export_ply}
+KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {"ply": export_ply, "nuscenes": export_scene}
 """What ``export --to`` takes."""
 
 

@@ -3,8 +3,12 @@
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
+import numpy as np
+
 from dreamdrive.choices import DATASETS
-from dreamdrive.data.clip_reader import MAX_FRAMES
+from dreamdrive.data import log_of
+from dreamdrive.data.logs import choose_shots
+from dreamdrive.data.sampler import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
 from dreamdrive.data.source import open_source
@@ -16,6 +20,7 @@ from dreamdrive.prior import FRAMES, SIZE
 from dreamdrive.run.judge import ENOUGH_FRAMES
 from dreamdrive.run.outcome import duration
 from dreamdrive.scene.control import Control
+from dreamdrive.scene.log import Log
 
 
 class _Measured:
@@ -79,7 +84,18 @@ def plan(control: Control, prior: str) -> Planned | None:
         return Planned(count, 1, control.size or SIZE, None, selection.start, selection.step, True)
     if prior != "replay" or control.path is None or DATASETS.package(control.dataset):
         return None
-    return _of_recording(control, selection)
+    log = log_of(control)
+    return _of_recording(control, selection) if log is None else _of_log(control, log)
+
+
+def _of_log(control: Control, log: Log) -> Planned:
+    shots = choose_shots(log, control.cameras, control.frames)
+    lead = shots[0].camera
+    rows = shots[0].rows
+    size = choose_size((lead.pinhole.width_px, lead.pinhole.height_px), control.size).target
+    rate_hz = 1 / float(np.median(np.diff(lead.times_s)))
+    step = int(rows[1] - rows[0])
+    return Planned(len(rows), len(shots), size, rate_hz, int(rows[0]), step, control.frames is not None)
 
 
 def _of_recording(control: Control, selection: Selection) -> Planned | None:

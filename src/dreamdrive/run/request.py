@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from dreamdrive.choices import DATASETS, FILL_INPAINT, FILL_NETWORK, PRIORS, QualityName
-from dreamdrive.data import dataset_of
+from dreamdrive.data import dataset_of, log_of
+from dreamdrive.data.logs import choose_shots, files_of
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, bent_model, companions
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, weights_of
@@ -175,6 +176,9 @@ def _digests(
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
         deep = name in ("geometry-files", "prior-weights")
+        if name == "input" and (taken := _of_log(control)) is not None:
+            digests[name] = taken
+            continue
         if name == "input" and not (deep := dataset_of(control.dataset, path).deep):
             path = path / "frames" if (path / "frames").is_dir() else path  # as of ``data.source``
         digests[name] = file_digest(path, deep=deep)
@@ -182,3 +186,12 @@ def _digests(
         if beside:
             digests[name] = digest([digests[name], *(file_digest(each, deep=True) for each in beside)])
     return digests
+
+
+def _of_log(control: Control) -> str | None:
+    """The digest of the pictures of a drive and what is known of them; None where the input is none."""
+    log = log_of(control)
+    if log is None:
+        return None
+    files, told = files_of(choose_shots(log, control.cameras, control.frames))
+    return digest([told, [file_digest(file) for file in files]])

@@ -20,6 +20,8 @@ class Control:
     Attributes:
         path: A video, a folder of images, a photo, a layout; ``None`` where the prior needs no input.
         dataset: Name of the data set that the path is of; without it see ``data.dataset_of``.
+        scene: Which drive of a data set, by its name or its number.
+        cameras: Which of its cameras, by their names with commas; ``all`` takes all.
         frames: ``START:STOP:STEP`` over the indices of the source, or of the frames that a prior makes.
         fps: Rate of the input in frames a second, before the step of ``frames``.
         size: Width and height of the clip in pixels.
@@ -46,6 +48,8 @@ class Control:
 
     path: Path | None = None
     dataset: str | None = None
+    scene: str | None = None
+    cameras: str | None = None
     frames: str | None = None
     fps: float | None = None
     size: tuple[int, int] | None = None

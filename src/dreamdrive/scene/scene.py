@@ -53,6 +53,7 @@ class Provenance:
         lens: Distortion of its camera, as ``data.lens.Lens`` writes it.
         up: Unit vector away from the road, in the world.
         scale: What metres rest on, in words.
+        camera_height_m: Height of the first camera above the road.
     """
 
     input: str | None = None
@@ -60,6 +61,7 @@ class Provenance:
     lens: dict[str, Any] | None = None
     up: tuple[float, float, float] | None = None
     scale: str | None = None
+    camera_height_m: float | None = None
 
 
 @dataclass(frozen=True)

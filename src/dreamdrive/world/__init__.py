@@ -1,7 +1,8 @@
 """The procedural street world: layouts drawn at random or given, rendered by rays, with exact truth."""
 
 from dreamdrive.world.drive import MOUNTS, Drive, Mount, WorldBox, drive, front_from_mount, make_street
-from dreamdrive.world.files import MARK, read_world, write_world
+from dreamdrive.world.files import MARK, is_world, read_drives, read_world, write_world
+from dreamdrive.world.layout_picture import draw_layout
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright
 from dreamdrive.world.options import StreetKind, StreetOptions

@@ -23,7 +23,7 @@ from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.layout import Layout, Size
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world.corruption import Corruption
-from dreamdrive.world.drive import Drive, Mount, WorldBox, front_from_mount, road_plane
+from dreamdrive.world.drive import MOUNTS, Drive, Mount, WorldBox, front_from_mount, road_plane
 from dreamdrive.world.layout_picture import draw_layout
 from dreamdrive.world.materials import Semantic
 
@@ -88,6 +88,20 @@ def write_world(
             place = folder if len(drives) == 1 else folder / name
             place.mkdir(exist_ok=True)
             _write_camera(drive, place, corruption)
+
+
+def is_world(path: Path) -> bool:
+    """Whether a path is a world folder."""
+    return (path / MARK).is_file() and any(
+        (path / each / "cameras.json").is_file() for each in (".", *MOUNTS)
+    )
+
+
+def read_drives(path: Path) -> dict[Mount, Drive]:
+    """The drives of all cameras of a world folder, the front one first."""
+    if (path / "frames").is_dir():
+        return {"front": read_world(path)}
+    return {mount: read_world(path, mount) for mount in MOUNTS if (path / mount).is_dir()}
 
 
 def read_world(path: Path, camera: str = "front") -> Drive:

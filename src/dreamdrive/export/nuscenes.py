@@ -1,0 +1,46 @@
+"""Drawn streets and generated scenes as data sets in the format of nuScenes."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from dreamdrive.data.lidar_file import read_points
+from dreamdrive.data.nuscenes import write_nuscenes
+from dreamdrive.export.log import Taken, take
+from dreamdrive.export.scene_log import taken_of_scene
+from dreamdrive.export.world_log import taken_of_world
+from dreamdrive.progress import Progress, silent
+from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive, Mount
+
+
+def export_scene(scene: Scene, folder: Path, *, replace: bool = False, progress: Progress = silent) -> None:
+    """Write a scene as its own cameras would have recorded it, as a data set of one drive.
+
+    Every half second a time is labelled. Boxes are those of actors of which the scene knows kind and size, as
+    far as it knows them: no labels of people. There is no map. Raises ``InputError`` where the scene does not
+    know the height of its camera.
+    """
+    _write(taken_of_scene(scene, folder.stem), folder, replace, progress)
+
+
+def export_world(
+    drives: Mapping[Mount, Drive],
+    name: str,
+    folder: Path,
+    *,
+    replace: bool = False,
+    progress: Progress = silent,
+) -> None:
+    """Write a drawn street as a data set of one drive.
+
+    Every half second a time is labelled. Boxes, map and poses are true; lidar points are those that the
+    cameras' depth shows along the beams of a lidar.
+    """
+    _write(taken_of_world(drives, name), folder, replace, progress)
+
+
+def _write(drive: Taken, folder: Path, replace: bool, progress: Progress) -> None:
+    with tempfile.TemporaryDirectory() as scratch:
+        log = take(drive, Path(scratch), progress)
+        write_nuscenes([log], folder, read_points, replace=replace)

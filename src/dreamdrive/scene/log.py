@@ -1,0 +1,164 @@
+"""A drive of a data set: what its cameras saw from where, and what was labelled, measured and mapped.
+
+World of a log: that of the data set, z up, in metres. The ego frame is x ahead, y left, z up, on the ground.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import Camera, check_rigid
+
+
+@dataclass(frozen=True)
+class LogCamera:
+    """The pictures of one camera, which are rectified, in the order of time.
+
+    Attributes:
+        name: As the data set calls it, such as ``CAM_FRONT``.
+        files: The pictures.
+        times_s: On the clock of the log.
+        world_from_camera: Axes of the camera are x right, y down, z ahead.
+        ego_from_camera: Its mounting.
+        pinhole: At the size of the pictures.
+        key: Which pictures are of a time that is labelled.
+    """
+
+    name: str
+    files: tuple[Path, ...]
+    times_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    ego_from_camera: Float[np.ndarray, "4 4"]
+    pinhole: Camera
+    key: Bool[np.ndarray, " n"]
+
+    def __post_init__(self) -> None:
+        check_rigid(self.world_from_camera, f"poses of {self.name}")
+        check_rigid(self.ego_from_camera, f"mounting of {self.name}")
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+
+@dataclass(frozen=True)
+class BoxTrack:
+    """A labelled thing at the times it was labelled.
+
+    Attributes:
+        id: Unique in the log.
+        category: In the words of nuScenes, such as ``vehicle.car``.
+        times_s: On the clock of the log.
+        world_from_box: The origin is the middle of the box; x ahead, y left, z up.
+        size_lwh_m: Length, width and height.
+        visibility: Share that all cameras together see: 1 below 40 %, 2 to 60, 3 to 80, 4 above; 0 unknown.
+        moves: 1 moving, 0 at rest, -1 unknown.
+        lidar_points: How many points of lidar lie in it; -1 unknown.
+        attributes: All that is told of it in words, such as ``vehicle.parked``.
+    """
+
+    id: str
+    category: str
+    times_s: Float[np.ndarray, " n"]
+    world_from_box: Float[np.ndarray, "n 4 4"]
+    size_lwh_m: Float[np.ndarray, "n 3"]
+    visibility: Int[np.ndarray, " n"]
+    moves: Int[np.ndarray, " n"]
+    lidar_points: Int[np.ndarray, " n"]
+    attributes: tuple[tuple[str, ...], ...]
+
+    def __post_init__(self) -> None:
+        check_rigid(self.world_from_box, f"boxes of {self.id}")
+
+    def corners(self, row: int) -> Float[np.ndarray, "8 3"]:
+        """Corners in the world: ahead left, ahead right, behind right, behind left; above, then below."""
+        x, y, z = self.size_lwh_m[row] / 2
+        flat = np.array([[x, y], [x, -y], [-x, -y], [-x, y]])
+        box = np.vstack([np.column_stack([flat, np.full(4, height)]) for height in (z, -z)])
+        pose = self.world_from_box[row]
+        return box @ pose[:3, :3].T + pose[:3, 3]
+
+
+@dataclass(frozen=True)
+class LidarSweep:
+    """One turn of a lidar, brought to one time.
+
+    Attributes:
+        file: Its points.
+        time_s: On the clock of the log.
+        world_from_points: From the frame of the file's points to the world.
+    """
+
+    file: Path
+    time_s: float
+    world_from_points: Float[np.ndarray, "4 4"]
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """An area of a map in the plane of the world, in metres; rings are not repeated at their end."""
+
+    outline: Float[np.ndarray, "n 2"]
+    holes: tuple[Float[np.ndarray, "_ 2"], ...] = ()
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """A map by layers, which have the names of nuScenes' map expansion, such as ``drivable_area``."""
+
+    areas: Mapping[str, tuple[Polygon, ...]] = field(default_factory=dict)
+    lines: Mapping[str, tuple[Float[np.ndarray, "_ 2"], ...]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return any(self.areas.values()) or any(self.lines.values())
+
+
+@dataclass(frozen=True)
+class Log:
+    """One drive of a data set.
+
+    Attributes:
+        name: Of the drive, such as ``scene-0061``.
+        about: What happens, in words of the data set.
+        location: Which map it is on.
+        root: Folder of the data set.
+        cameras: The front camera first.
+        times_s: Times that are labelled, on the clock of the log: seconds since ``start_us``.
+        start_us: The first of them in microseconds since 1970.
+        world_from_ego: Where the car was at those times.
+        boxes: What was labelled.
+        sweeps: What the lidar measured; empty where there is none.
+        map: Of the surroundings; empty where there is none.
+        notes: What was taken in place of something else, in sentences.
+        problems: What is missing or broken, in sentences.
+    """
+
+    name: str
+    about: str
+    location: str
+    root: Path
+    cameras: tuple[LogCamera, ...]
+    times_s: Float[np.ndarray, " t"]
+    start_us: int
+    world_from_ego: Float[np.ndarray, "t 4 4"]
+    boxes: tuple[BoxTrack, ...] = ()
+    sweeps: tuple[LidarSweep, ...] = ()
+    map: LogMap = field(default_factory=LogMap)
+    notes: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    def camera(self, name: str) -> LogCamera:
+        """The camera of that name, however it is written: ``CAM_FRONT`` is ``front``, too."""
+        wanted = _plain(name)
+        found = next((each for each in self.cameras if _plain(each.name) == wanted), None)
+        if found is None:
+            known = ", ".join(_plain(each.name) for each in self.cameras)
+            raise InputError(f"{self.name} has no camera {name}; it has {known}")
+        return found
+
+
+def _plain(name: str) -> str:
+    return name.lower().removeprefix("cam_").removesuffix("_camera")

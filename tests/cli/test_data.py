@@ -1,0 +1,109 @@
+"""``dreamdrive data``, and drives of a data set through ``generate``."""
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+from tests.cli.conftest import Run
+from tests.logs import log
+from tests.test_pipeline import shorten
+
+from dreamdrive.data.lidar_file import read_points
+from dreamdrive.data.nuscenes import read_nuscenes, write_nuscenes
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    logs = [log(tmp_path / name, name) for name in ("scene-0001", "scene-0002")]
+    write_nuscenes(logs, tmp_path / "set", read_points)
+    return tmp_path / "set"
+
+
+def test_data_sets_are_listed(run: Run) -> None:
+    result = run("data", "list")
+    assert result.code == 0
+    assert "nuscenes a folder of nuScenes" in result.out
+
+
+def test_scenes_are_listed(run: Run, folder: Path) -> None:
+    assert run("data", "list", folder).out == "0 scene-0001 1 scene-0002"
+
+
+def test_a_whole_data_set_is_told(run: Run, folder: Path) -> None:
+    result = run("data", "check", folder)
+    assert result.code == 0
+    assert "scene-0001 1.0 2 26 3 3 13 yes 5 scene-0002 1.0 2 26 3 3 13 yes 5 all is there" in result.out
+
+
+def test_what_is_missing_is_told_and_the_rest_works(run: Run, folder: Path) -> None:
+    for file in read_nuscenes(folder, "scene-0002").cameras[1].files:
+        file.unlink()
+    (folder / "v1.0-mini/log.json").touch()
+    result = run("data", "check", folder)
+    assert result.code == 2
+    assert "scene-0001 1.0 2 26 3 3 13 yes 5 scene-0002 1.0 1 13 3 3 13 yes 5" in result.out
+    assert "scene-0002: CAM_BACK_LEFT: none of its 13 pictures is there; the camera is left out" in result.out
+    assert run("data", "check", folder, "--scene", "scene-0001").code == 0
+
+
+def test_a_recording_has_no_scenes(run: Run, tmp_path: Path) -> None:
+    result = run("data", "check", tmp_path)
+    assert result.code == 2
+    assert (
+        "is a video or a folder of images, without scenes and labels; expected a folder of nuScenes"
+        in result.err
+    )
+
+
+def test_nothing_is_no_data_set(run: Run, tmp_path: Path) -> None:
+    assert "does not exist; expected a folder of a data set" in run("data", "list", tmp_path / "no").err
+
+
+def test_a_scene_is_drawn(run: Run, folder: Path, tmp_path: Path) -> None:
+    result = run("data", "show", folder, "--scene", 1, "-o", tmp_path / "seen.png")
+    assert result.code == 0, result
+    image = cv2.imread(str(tmp_path / "seen.png"))
+    assert image.shape == (480, 2 * 640 + 625, 3)
+    assert (
+        "labelled times 0 to 2"
+        in run("data", "show", folder, "--scene", 1, "--step", 9, "-o", tmp_path / "seen.png").err
+    )
+
+
+def test_which_scene_has_to_be_said(run: Run, folder: Path, tmp_path: Path) -> None:
+    result = run("generate", folder, "-o", tmp_path / "out")
+    assert result.code == 2
+    assert "holds 2 scenes, scene-0001, scene-0002, and no --scene is given" in result.err
+
+
+def test_fields_of_recordings_are_refused(run: Run, folder: Path, tmp_path: Path) -> None:
+    result = run("generate", folder, "--scene", 0, "--fps", 3, "-o", tmp_path / "out")
+    assert result.code == 2
+    assert "takes no fps; it takes cameras, dataset, frames, hold_out, path, scene, size" in result.err
+
+
+def test_a_scene_is_made_of_a_drive(
+    run: Run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The street is drawn, and comes through the format of nuScenes with two cameras."""
+    shorten(monkeypatch)
+    world, written, out = tmp_path / "world", tmp_path / "street", tmp_path / "out"
+    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x64", "--one-ray", "-o", world)
+    assert run("export", world, "--to", "nuscenes", "-o", written).code == 0
+    chosen = ("--cameras", "front,front_left", "--knowledge", "none", "--quality", "draft", "--hold-out", 4)
+    result = run("generate", written, *chosen, "-o", out)
+    assert result.code == 0, result
+    report = json.loads((out / "report.json").read_text())
+    assert set(report["held_out"]) == {"2", "2_camera1"}
+    assert "already finished" in run("generate", written, *chosen, "-o", out).out
+    back = run("export", out, "--to", "nuscenes", "-o", tmp_path / "back")
+    assert back.code == 0, back
+    assert run("data", "check", tmp_path / "back").code == 0
+    assert [c.name for c in read_nuscenes(tmp_path / "back", "back").cameras] == [
+        "CAM_FRONT",
+        "CAM_FRONT_LEFT",
+    ]
+    camera = read_nuscenes(written, "world").cameras[0]
+    camera.files[0].write_bytes(camera.files[1].read_bytes())
+    assert "other" in run("generate", written, *chosen, "-o", out).err  # the pictures decide
