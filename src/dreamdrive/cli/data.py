@@ -115,7 +115,7 @@ def show(
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")],
     dataset: Annotated[DataSetName | None, arg(help_behavior_hint="")] = None,
     scene: Annotated[str | None, arg(metavar="NAME|N", help_behavior_hint="")] = None,
-    step: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the middle)")] = None,
+    step: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
 ) -> None:
     """Draw a scene of a data set: its cameras with boxes and lidar, and its layout from above.
 
@@ -124,7 +124,7 @@ def show(
         output: Picture to write, NAME.png.
         dataset: Which data set it is of; without it the one that recognises the path.
         scene: Which scene, by its name or number.
-        step: Which of its labelled times, counted from 0.
+        step: Which of its labelled times, counted from 0; without it the middle.
     """
     from dreamdrive.data.log_layout import layout_of_log
     from dreamdrive.show import draw_log, write_png
