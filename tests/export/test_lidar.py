@@ -1,9 +1,8 @@
 """What a lidar would have seen."""
 
 import numpy as np
-import pytest
 
-from dreamdrive.export.lidar import EGO_FROM_LIDAR, level_of, share_seen, turned
+from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
 from dreamdrive.scene.camera import Camera
 
 AHEAD = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.5], [0, 0, 0, 1]])
@@ -12,11 +11,6 @@ CAMERA = Camera(100.0, 100.0, 80.0, 60.0, 160, 120, AHEAD)
 
 def wall(depth_m: float) -> np.ndarray:
     return np.full((120, 160), depth_m)
-
-
-def box(x: float, y: float, z: float, size: float = 2.0) -> np.ndarray:
-    signs = np.array([[a, b, c] for a in (1, -1) for b in (1, -1) for c in (1, -1)])
-    return np.array([x, y, z]) + signs * size / 2
 
 
 def test_points_lie_on_what_is_seen_and_on_beams():
@@ -35,22 +29,3 @@ def test_nothing_is_measured_in_the_sky_and_far_away():
     assert len(turned([(CAMERA, wall(0.0))], EGO_FROM_LIDAR)) == 0
     assert len(turned([(CAMERA, wall(200.0))], EGO_FROM_LIDAR)) == 0
     assert turned([], EGO_FROM_LIDAR).shape == (0, 3)
-
-
-@pytest.mark.parametrize(("depth_m", "share"), [(30.0, 1.0), (5.0, 0.0), (0.0, 1.0)])
-def test_what_stands_before_a_box_hides_it(depth_m, share):
-    assert share_seen(box(15, 0, 1.5), [(CAMERA, wall(depth_m))]) == share
-
-
-def test_half_a_box_is_half_seen():
-    depth = wall(30.0)
-    depth[:, :80] = 5.0
-    assert share_seen(box(15, 0, 1.5), [(CAMERA, depth)]) == pytest.approx(0.5, abs=0.05)
-
-
-def test_a_box_behind_the_camera_is_not_seen():
-    assert share_seen(box(-15, 0, 1.5), [(CAMERA, wall(30.0))]) == 0.0
-
-
-def test_levels():
-    assert [level_of(share) for share in (0.0, 0.39, 0.4, 0.6, 0.79, 0.8, 1.0)] == [1, 1, 2, 3, 3, 4, 4]

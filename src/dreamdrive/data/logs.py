@@ -18,7 +18,7 @@ from dreamdrive.data.sampler import Sampler, check_pictures, most_frames, too_ma
 from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip, Known, Recorded
-from dreamdrive.scene.log import Log, LogCamera
+from dreamdrive.scene.log import Log, LogCamera, OfLog
 
 CAR_FROM_EGO = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 """From x ahead, y left, z up to the axes of a camera that looks ahead."""
@@ -122,7 +122,9 @@ def clip_of_log(
         source_index=np.concatenate([each.rows for each in shots])[order],
         known=Known(world_from_camera=to_first(poses), intrinsics=True),
         cuts=cuts,
-        recorded=Recorded(str(log.root), False, sizing.source, sizing.scaled, sizing.offset),
+        recorded=Recorded(
+            str(log.root), False, sizing.source, sizing.scaled, sizing.offset, log=_place_of(log, lead)
+        ),
         provenance={
             "notes": [*_missing(shots), *said, *(note for each in samplers for note in each.notes)],
             "log": log.name,
@@ -141,6 +143,12 @@ def files_of(shots: Sequence[Shots]) -> tuple[tuple[Path, ...], list[Any]]:
         poses = camera.world_from_camera[each.rows].tolist()
         told.append([camera.name, seen, poses, camera.times_s[each.rows].tolist(), each.steps.tolist()])
     return tuple(files), told
+
+
+def _place_of(log: Log, lead: Shots) -> OfLog:
+    first = lead.camera.world_from_camera[lead.rows[0]]
+    rows = tuple(tuple(map(float, row)) for row in first)
+    return OfLog(log.name, rows, float(lead.camera.times_s[lead.rows[0]]))
 
 
 def _chosen(log: Log, cameras: str | None) -> Sequence[LogCamera]:

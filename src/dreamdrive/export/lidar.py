@@ -1,12 +1,12 @@
-"""What a lidar on the car would have measured and how much of a box is seen, both from depth."""
+"""What a lidar on the car would have measured, from the depth of cameras."""
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.scene.camera import NEAR_M, Camera
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.visibility import View
 
 BEAMS = np.linspace(-30.67, 10.67, 32)
 """Elevations in degrees: those of the Velodyne HDL-32E of nuScenes."""
@@ -15,14 +15,8 @@ _BEAM_DEG = 0.35
 """How far from its beam a pixel may lie: less than half the distance of two beams."""
 _REACH_M = 70.0
 _STRIDE_PX = 2
-_MARGIN_M = 0.3
-"""How much nearer than a box something must be to stand before it."""
-
 EGO_FROM_LIDAR = np.array([[0.0, 1, 0, 0.94], [-1, 0, 0, 0], [0, 0, 1, 1.84], [0, 0, 0, 1]])
 """Mounting of the lidar of nuScenes: x right, y ahead, z up."""
-
-View = tuple[Camera, Float[np.ndarray, "h w"]]
-"""A camera with its pose, and depth along z in metres, 0 where there is none."""
 
 
 def turned(views: Sequence[View], world_from_lidar: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "n 3"]:
@@ -44,30 +38,6 @@ def turned(views: Sequence[View], world_from_lidar: Float[np.ndarray, "4 4"]) ->
     order = np.argsort(away_m)
     _, first = np.unique((beam * bins + turn)[order], return_index=True)
     return local[np.sort(order[first])]
-
-
-def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View]) -> float:
-    """Of the pixels that a box covers in all pictures, the share before which nothing stands; 0 for none."""
-    covered = seen = 0
-    for camera, depth_m in views:
-        local = (corners - camera.world_from_camera[:3, 3]) @ camera.world_from_camera[:3, :3]
-        if local[:, 2].min() < NEAR_M:
-            continue
-        at = local[:, :2] / local[:, 2:] * (camera.fx_px, camera.fy_px) + (camera.cx_px, camera.cy_px)
-        if np.abs(at).max() > 1e5:
-            continue
-        mask = np.zeros(depth_m.shape, np.uint8)
-        cv2.fillConvexPoly(mask, cv2.convexHull(np.floor(at).astype(np.int32)), 1)
-        inside = mask > 0
-        before = (depth_m > 0) & (depth_m < local[:, 2].min() - _MARGIN_M)
-        covered += int(inside.sum())
-        seen += int((inside & ~before).sum())
-    return seen / covered if covered else 0.0
-
-
-def level_of(share: float) -> int:
-    """The level of visibility in nuScenes' words: 1 below 40 %, 2 to 60, 3 to 80, 4 above."""
-    return 1 + int(np.searchsorted([0.4, 0.6, 0.8], share, side="right"))
 
 
 def _points(camera: Camera, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "n 3"]:

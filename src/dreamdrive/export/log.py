@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.data.nuscenes import write_points
-from dreamdrive.export.lidar import EGO_FROM_LIDAR, View, level_of, share_seen, turned
+from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap
+from dreamdrive.scene.visibility import View, level_of, share_seen
 
 KEY_S = 0.5
 """Time between labelled frames, as in nuScenes."""

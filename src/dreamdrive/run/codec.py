@@ -25,6 +25,7 @@ from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
+from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.street_class import StreetClass
@@ -45,6 +46,7 @@ NOUNS: dict[str, type] = {
         Known,
         Look,
         Measured,
+        OfLog,
         Posed,
         Recorded,
         RoadUser,

@@ -139,4 +139,5 @@ def _about(path: Path | None, clip: Clip, geometry: Geometry) -> Provenance:
         up=None if geometry.ground is None else tuple(geometry.ground.normal_world.tolist()),
         scale=geometry.scale.source,
         camera_height_m=None if geometry.ground is None else geometry.ground.offset_m,
+        log=None if clip.recorded is None else clip.recorded.log,
     )

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry, Ground
+from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.look import Look
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -66,6 +67,7 @@ class Recorded:
         scaled: To which these were scaled.
         offset: Columns and rows that were then cut away at the left and the top.
         lens: What was taken out of the frames, as ``data.Lens.from_json`` reads it.
+        log: The drive of a data set that they are of; its world is that of the clip's known poses, moved.
     """
 
     path: str
@@ -74,6 +76,7 @@ class Recorded:
     scaled: tuple[int, int]
     offset: tuple[int, int]
     lens: dict[str, Any] | None = None
+    log: OfLog | None = None
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,10 @@ from jaxtyping import Bool, Float, Int
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera, check_rigid
+from dreamdrive.scene.trajectory import Trajectory
+
+_NEAR_S = 0.05
+"""How far from a label its time still is."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,16 @@ class BoxTrack:
 
     def __post_init__(self) -> None:
         check_rigid(self.world_from_box, f"boxes of {self.id}")
+
+    def pose_at(self, time_s: float) -> Float[np.ndarray, "4 4"] | None:
+        """Where it is at a time, in between its labels; None before the first and after the last."""
+        if not self.times_s[0] - _NEAR_S <= time_s <= self.times_s[-1] + _NEAR_S:
+            return None
+        return Trajectory(self.world_from_box, self.times_s).at(np.array([time_s]))[0]
+
+    def row_at(self, time_s: float) -> int:
+        """The label that is nearest in time."""
+        return int(np.abs(self.times_s - time_s).argmin())
 
     def corners(self, row: int) -> Float[np.ndarray, "8 3"]:
         """Corners in the world: ahead left, ahead right, behind right, behind left; above, then below."""
@@ -158,6 +172,21 @@ class Log:
             known = ", ".join(_plain(each.name) for each in self.cameras)
             raise InputError(f"{self.name} has no camera {name}; it has {known}")
         return found
+
+
+@dataclass(frozen=True)
+class OfLog:
+    """Where what was made of a log lies in it.
+
+    Attributes:
+        name: Of the log.
+        log_from_world: From the world of a clip or a scene to that of the log (4 rows of 4).
+        start_s: Their time 0 on the clock of the log.
+    """
+
+    name: str
+    log_from_world: tuple[tuple[float, ...], ...]
+    start_s: float
 
 
 def _plain(name: str) -> str:

@@ -12,6 +12,7 @@ from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.sky import Sky
 from dreamdrive.scene.trajectory import Trajectory
 
@@ -54,6 +55,7 @@ class Provenance:
         up: Unit vector away from the road, in the world.
         scale: What metres rest on, in words.
         camera_height_m: Height of the first camera above the road.
+        log: The drive of a data set, where it was made of one.
     """
 
     input: str | None = None
@@ -62,6 +64,7 @@ class Provenance:
     up: tuple[float, float, float] | None = None
     scale: str | None = None
     camera_height_m: float | None = None
+    log: OfLog | None = None
 
 
 @dataclass(frozen=True)

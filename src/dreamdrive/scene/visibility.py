@@ -1,0 +1,40 @@
+"""How much of a box cameras see, from depth."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.scene.camera import NEAR_M, Camera
+
+_MARGIN_M = 0.3
+"""How much nearer than a box something must be to stand before it."""
+_FARTHEST_PX = 1e5
+
+View = tuple[Camera, Float[np.ndarray, "h w"]]
+"""A camera with its pose, and depth along z in metres, 0 where there is none."""
+
+
+def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View]) -> float:
+    """Of the pixels that a box covers in all pictures, the share before which nothing stands; 0 for none."""
+    covered = seen = 0
+    for camera, depth_m in views:
+        local = (corners - camera.world_from_camera[:3, 3]) @ camera.world_from_camera[:3, :3]
+        if local[:, 2].min() < NEAR_M:
+            continue
+        at = local[:, :2] / local[:, 2:] * (camera.fx_px, camera.fy_px) + (camera.cx_px, camera.cy_px)
+        if np.abs(at).max() > _FARTHEST_PX:
+            continue
+        mask = np.zeros(depth_m.shape, np.uint8)
+        cv2.fillConvexPoly(mask, cv2.convexHull(np.floor(at).astype(np.int32)), 1)
+        inside = mask > 0
+        before = (depth_m > 0) & (depth_m < local[:, 2].min() - _MARGIN_M)
+        covered += int(inside.sum())
+        seen += int((inside & ~before).sum())
+    return seen / covered if covered else 0.0
+
+
+def level_of(share: float) -> int:
+    """The level of visibility in nuScenes' words: 1 below 40 %, 2 to 60, 3 to 80, 4 above."""
+    return 1 + int(np.searchsorted([0.4, 0.6, 0.8], share, side="right"))
