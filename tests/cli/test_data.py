@@ -107,3 +107,39 @@ def test_a_scene_is_made_of_a_drive(
     camera = read_nuscenes(written, "world").cameras[0]
     camera.files[0].write_bytes(camera.files[1].read_bytes())
     assert "other" in run("generate", written, *chosen, "-o", out).err  # the pictures decide
+
+
+def test_samples_are_made_of_drives_and_of_scenes(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten(monkeypatch)
+    world, written, out = tmp_path / "world", tmp_path / "street", tmp_path / "out"
+    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x54", "--one-ray", "-o", world)
+    run("export", world, "--to", "nuscenes", "-o", written)
+    chosen = ("--cameras", "all", "--knowledge", "none", "--quality", "draft")
+    assert run("generate", written, *chosen, "-o", out).code == 0
+    small = ("--size", "64x32", "--cells", 16)
+    result = run("dataset", "make", written, *small, "-o", tmp_path / "real")
+    assert result.code == 0, result
+    assert "2 samples in" in result.out
+    made = ("dataset", "make", out, *small, "--per-scene", 4, "--seed", 1)
+    assert "expected one that was made of a drive" in run(*made, "-o", tmp_path / "none").err
+    result = run(*made, "--labels", written, "-o", tmp_path / "made")
+    assert result.code == 0, result
+    manifest = json.loads((tmp_path / "made" / "manifest.json").read_text())
+    assert len(manifest["samples"]) + sum(manifest["left_out"].values()) == 4
+    assert len(manifest["samples"][0]["cameras"]) == 6
+    sets = ("--real", tmp_path / "real", "--synthetic", tmp_path / "made", "--validation", tmp_path / "real")
+    refused = run("evaluate", "perception", "--mode", "augment", *sets, "--batch", 2, "-o", tmp_path / "n")
+    assert refused.code == 2
+    assert "has pictures of 64x32 and 16 cells, and the network takes pictures of 480x224" in refused.err
+
+
+def test_sizes_of_samples_are_checked(run: Run, folder: Path, tmp_path: Path) -> None:
+    made = ("dataset", "make", folder, "-o", tmp_path / "samples")
+    assert "cut away; at most 270" in run(*made, "--size", "480x300").err
+    assert "--cells 2: expected 8 or more" in run(*made, "--cells", 2).err
+    assert (
+        "is neither a scene nor a data set with labels"
+        in run("dataset", "make", tmp_path, "-o", tmp_path / "set").err
+    )

@@ -8,6 +8,7 @@ from dreamdrive.cli.arguments import commands_of
 from dreamdrive.cli.evaluate_consistency import consistency
 from dreamdrive.cli.evaluate_decomposition import decomposition
 from dreamdrive.cli.evaluate_geometry import geometry
+from dreamdrive.cli.evaluate_perception import perception
 from dreamdrive.cli.evaluate_video import evaluate_video
 
 _Evaluation = commands_of(
@@ -16,6 +17,7 @@ _Evaluation = commands_of(
         "consistency": consistency,
         "decomposition": decomposition,
         "geometry": geometry,
+        "perception": perception,
     }
 )
 

@@ -12,6 +12,7 @@ import dreamdrive
 from dreamdrive.cli.arguments import REGISTRY
 from dreamdrive.cli.clean import clean
 from dreamdrive.cli.data import data
+from dreamdrive.cli.dataset import dataset
 from dreamdrive.cli.doctor import doctor
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
@@ -32,6 +33,7 @@ COMMANDS = {
     "clean": clean,
     "evaluate": evaluate,
     "data": data,
+    "dataset": dataset,
     "world": world,
     "prior": prior,
     "train": train,

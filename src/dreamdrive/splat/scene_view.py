@@ -14,6 +14,8 @@ from dreamdrive.splat.torch_threads import one_torch_thread
 from dreamdrive.splat.view import render
 
 Part = Literal["all", "static", "dynamic"]
+Moment = tuple[Gaussians, Tensor]
+"""Gaussians at a time, and which of them are dynamic."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ def render_scene(
     channels: Float[Tensor, "n c"] | None = None,
     part: Part = "all",
     of_rig: int = 0,
+    moment: Moment | None = None,
 ) -> SceneView:
     """Render a scene at ``t_s`` from any camera; no gradients.
 
@@ -62,8 +65,9 @@ def render_scene(
         channels: Further values of each Gaussian of the part, in the order of ``Scene.at``.
         part: All Gaussians, or the static or the dynamic ones alone; the dynamic ones stand before black.
         of_rig: Whose exposure it is, of several cameras.
+        moment: What ``moment_of`` says of this time and part, for whoever renders several cameras at once.
     """
-    gaussians, is_dynamic = _select(scene, t_s, part)
+    gaussians, is_dynamic = moment_of(scene, t_s, part) if moment is None else moment
     marked = is_dynamic[:, None] if channels is None else torch.cat([is_dynamic[:, None], channels], dim=-1)
     drawn = render(gaussians, camera, channels=marked)
     colour = drawn.colour
@@ -83,8 +87,9 @@ def render_scene(
     )
 
 
-def _select(scene: Scene, t_s: float, part: Part) -> tuple[Gaussians, Tensor]:
-    """The Gaussians of a part and 1 for each dynamic one, 0 for each static one."""
+@torch.no_grad()
+def moment_of(scene: Scene, t_s: float, part: Part = "all") -> Moment:
+    """The Gaussians of a part at a time, and 1 for each dynamic one, 0 for each static one."""
     if part == "dynamic":
         gaussians, static = scene.dynamic_at(t_s), 0
     else:

@@ -1,0 +1,78 @@
+"""Figures of the experiment: IoU of all arms, and paired differences with intervals."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from common.markdown import table
+from perception.protocol import Protocol
+
+CLASSES = ("vehicle", "road")
+_RESAMPLES = 2000
+Counts = np.ndarray
+"""Hits, false alarms and misses (seeds, streets, 3)."""
+
+
+def counts_of(rows: Sequence[Mapping[str, Any]], arm: str, tested: str, what: str) -> Counts:
+    """Counts of an arm by seed and street."""
+    own = sorted((row for row in rows if row["arm"] == arm and tested in row), key=lambda row: row["seed"])
+    streets = sorted(own[0][tested]) if own else []
+    return np.array(
+        [
+            [[row[tested][s][what][k][0] for k in ("hits", "false_alarms", "misses")] for s in streets]
+            for row in own
+        ],
+        dtype=np.float64,
+    )
+
+
+def iou(counts: Counts) -> float:
+    """Mean over seeds of intersection over union of all streets together, in percent."""
+    pooled = counts.sum(axis=1)
+    return float(100 * (pooled[:, 0] / (pooled.sum(axis=1) + 1e-7)).mean())
+
+
+def difference(one: Counts, other: Counts, seed: int = 0) -> tuple[float, float, float]:
+    """How much better ``other`` is in points, and its 95 % interval over resampled seeds and streets."""
+    rng = np.random.default_rng(seed)
+    seeds, streets = one.shape[:2]
+    drawn = []
+    for _ in range(_RESAMPLES):
+        rows, columns = rng.integers(0, seeds, seeds), rng.integers(0, streets, streets)
+        drawn.append(iou(other[rows][:, columns]) - iou(one[rows][:, columns]))
+    low, high = np.percentile(drawn, [2.5, 97.5])
+    return iou(other) - iou(one), float(low), float(high)
+
+
+def tables(rows: Sequence[Mapping[str, Any]], protocol: Protocol) -> str:
+    """All arms, and how they differ."""
+    lines: list[list[str]] = []
+    for arm in protocol.arms:
+        counts = {what: counts_of(rows, arm, "validation", what) for what in CLASSES}
+        samples = next((str(row["samples"]) for row in rows if row["arm"] == arm), "-")
+        lines.append([arm, samples, *(f"{iou(c):.2f}" if c.size else "-" for c in counts.values())])
+    text = table(["arm", "samples", "vehicle IoU", "road IoU"], lines)
+    pairs = (("real", "generated"), ("real", "warped"), ("warped", "generated"), ("oracle", "only"))
+    changed: list[list[str]] = []
+    for one, other in pairs:
+        row = [f"{other} over {one}"]
+        for what in CLASSES:
+            first, second = (counts_of(rows, arm, "validation", what) for arm in (one, other))
+            if first.size and first.shape == second.shape:
+                mean, low, high = difference(first, second)
+                row.append(f"{mean:+.2f} ({low:+.2f} to {high:+.2f})")
+            else:
+                row.append("-")
+        changed.append(row)
+    text += "\n\n" + table(["points, with the 95 % interval over seeds and streets", *CLASSES], changed)
+    return text + "\n\n" + _realism(rows, protocol)
+
+
+def _realism(rows: Sequence[Mapping[str, Any]], protocol: Protocol) -> str:
+    """A network of recorded samples, on recorded and on generated ones."""
+    lines: list[list[str]] = []
+    for tested in ("validation", protocol.realism.tested):
+        counts = [counts_of(rows, protocol.realism.trained, tested, what) for what in CLASSES]
+        lines.append([tested, *(f"{iou(c):.2f}" if c.size else "-" for c in counts)])
+    return table([f"trained on {protocol.realism.trained}, tested on", *CLASSES], lines)

@@ -1,0 +1,227 @@
+"""Samples of generated scenes: pictures along new paths, labels of the drive that a scene was made of.
+
+What is labelled stays where it is at a time; the car is somewhere else, and so are the labels around it. How
+much of a box is seen is told by the depth of the pictures themselves.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from dreamdrive.errors import InputError
+from dreamdrive.perception.bev_set import SampleNote, cameras_of, note_of
+from dreamdrive.perception.grid import BevGrid
+from dreamdrive.perception.inputs import BevSample, camera_from_level_ego
+from dreamdrive.perception.of_log import annotations_at, in_order, road_map
+from dreamdrive.perception.options import ImageSize
+from dreamdrive.perception.raster import bev_labels
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.log import Log, LogCamera, LogMap, OfLog
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.scene.visibility import View, level_of, share_seen
+from dreamdrive.splat import moment_of, render_scene
+
+NEAR_M = 70.0
+"""Boxes that are farther from the car are outside of all labels."""
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """Where new samples of a scene are.
+
+    Attributes:
+        aside_m: Most to the left or right of the recorded path: about half a lane.
+        turned_deg: Most to the left or right of the recorded direction.
+        apart_m: Samples of a scene that are nearer in place than this ...
+        apart_deg: ... and in direction than this ...
+        apart_s: ... and in time than this are the same to a network: one of them is left out.
+        least_covered: Share of the pixels below the horizon, of all pictures, that the scene has to cover.
+    """
+
+    aside_m: float = 1.5
+    turned_deg: float = 6.0
+    apart_m: float = 0.3
+    apart_deg: float = 1.0
+    apart_s: float = 0.2
+    least_covered: float = 0.6
+
+
+_TRIES = 8
+"""Draws of a place before it is left out."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the car is at a time, in the world of a log, and how that differs from the recorded path."""
+
+    time_s: float
+    world_from_ego: Float[np.ndarray, "4 4"]
+    aside_m: float
+    turned_rad: float
+
+
+def draw_places(
+    log: Log, span_s: tuple[float, float], count: int, options: PathOptions, seed: int
+) -> tuple[list[Place], int]:
+    """Places along the recorded path and beside it, at times that are spread evenly, and how many were near.
+
+    A place that is as good as an earlier one is drawn again some times, and then left out.
+    """
+    rng = np.random.default_rng(seed)
+    path = Trajectory(log.world_from_ego, log.times_s)
+    places: list[Place] = []
+    near = 0
+    edges = np.linspace(*span_s, count + 1)
+    for start, end in pairwise(edges.tolist()):
+        for _ in range(_TRIES):
+            place = _drawn(path, float(rng.uniform(start, end)), options, rng)
+            if all(_apart(place, other, options) for other in places):
+                places.append(place)
+                break
+        else:
+            near += 1
+    return places, near
+
+
+def span_of(scene: Scene, log: Log) -> tuple[float, float]:
+    """Times that both the scene and the labels of its log know, on the clock of the log."""
+    start = _link(scene, log).start_s
+    first = max(float(log.times_s[0]), start + float(scene.times_s.min()))
+    last = min(float(log.times_s[-1]), start + float(scene.times_s.max()))
+    if last <= first:
+        raise InputError(f"{log.name}: its labels and the scene have no time in common")
+    return first, last
+
+
+def samples_of_scene(
+    scene: Scene, log: Log, places: list[Place], image: ImageSize, grid: BevGrid, options: PathOptions
+) -> Iterator[tuple[SampleNote, BevSample] | None]:
+    """Render the cameras of the log at each place; None where too little is covered.
+
+    Raises:
+        InputError: The scene was made of another drive, or the drive has no map.
+    """
+    link = _link(scene, log)
+    map = road_map(log)
+    scene_from_log = np.linalg.inv(np.array(link.log_from_world))
+    cameras = in_order(log)
+    pinholes = [_pinhole(camera, image) for camera in cameras]
+    for number, place in enumerate(places):
+        yield _sample(scene, log, map, link, scene_from_log, cameras, pinholes, place, number, grid, options)
+
+
+def _sample(
+    scene: Scene,
+    log: Log,
+    map: LogMap,
+    link: OfLog,
+    scene_from_log: Float[np.ndarray, "4 4"],
+    cameras: list[LogCamera],
+    pinholes: list[Camera],
+    place: Place,
+    number: int,
+    grid: BevGrid,
+    options: PathOptions,
+) -> tuple[SampleNote, BevSample] | None:
+    pictures: list[UInt8[np.ndarray, "3 h w"]] = []
+    views: list[View] = []
+    covered: list[float] = []
+    time_s = place.time_s - link.start_s
+    moment = moment_of(scene, time_s)
+    for camera, pinhole in zip(cameras, pinholes, strict=True):
+        pose = place.world_from_ego @ camera.ego_from_camera
+        view = render_scene(scene, pinhole.at(scene_from_log @ pose), time_s, moment=moment)
+        alpha = view.alpha.numpy()
+        covered.append(float(alpha[_below_horizon(pinhole.at(camera.ego_from_camera))].mean()))
+        pictures.append(np.rint(view.colour.numpy() * 255).astype(np.uint8).transpose(2, 0, 1))
+        views.append((pinhole.at(pose), np.where(alpha > 0.5, view.depth_m.numpy(), 0.0)))
+    if np.mean(covered) < options.least_covered:
+        return None
+    boxes = annotations_at(log, place.time_s, _seen(log, place, views))
+    extrinsics = [
+        camera_from_level_ego(place.world_from_ego @ camera.ego_from_camera, place.world_from_ego)
+        for camera in cameras
+    ]
+    k = np.stack([each.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]] for each in pinholes])
+    sample = BevSample(
+        np.stack(pictures),
+        k.astype(np.float32),
+        np.stack(extrinsics),
+        bev_labels(grid, place.world_from_ego, boxes, map),
+    )
+    note = note_of(
+        f"{log.name}-rendered-{number:04d}",
+        log.name,
+        place.time_s,
+        place.world_from_ego,
+        kind="rendered",
+        aside_m=place.aside_m,
+        turned_rad=place.turned_rad,
+        covered=float(np.mean(covered)),
+        boxes=len(boxes),
+        cameras=cameras_of([each.name for each in cameras], sample.pixel_from_camera, sample.camera_from_ego),
+    )
+    return note, sample
+
+
+def _link(scene: Scene, log: Log) -> OfLog:
+    link = scene.provenance.log
+    if link is None or link.name != log.name:
+        of = "no drive of a data set" if link is None else link.name
+        raise InputError(f"the scene was made of {of}, the labels are of {log.name}; give those of its drive")
+    return link
+
+
+def _drawn(path: Trajectory, time_s: float, options: PathOptions, rng: np.random.Generator) -> Place:
+    aside_m = float(rng.uniform(-options.aside_m, options.aside_m))
+    turned_rad = float(np.deg2rad(rng.uniform(-options.turned_deg, options.turned_deg)))
+    moved = np.eye(4)
+    c, s = np.cos(turned_rad), np.sin(turned_rad)
+    moved[:2, :2] = [[c, -s], [s, c]]
+    moved[1, 3] = aside_m
+    return Place(time_s, path.at(np.array([time_s]))[0] @ moved, aside_m, turned_rad)
+
+
+def _apart(one: Place, other: Place, options: PathOptions) -> bool:
+    """Whether two places differ enough in place, direction or time."""
+    away_m = np.linalg.norm(one.world_from_ego[:3, 3] - other.world_from_ego[:3, 3])
+    cosine = one.world_from_ego[:3, 0] @ other.world_from_ego[:3, 0]
+    turned_deg = np.rad2deg(np.arccos(np.clip(cosine, -1, 1)))
+    away_s = abs(one.time_s - other.time_s)
+    return bool(away_m >= options.apart_m or turned_deg >= options.apart_deg or away_s >= options.apart_s)
+
+
+def _pinhole(camera: LogCamera, image: ImageSize) -> Camera:
+    """A camera whose pictures are as ``prepare_picture`` would make them."""
+    height = image.height_px + image.cropped_px
+    k = camera.pinhole.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    k[0] *= image.width_px / camera.pinhole.width_px
+    k[1] *= height / camera.pinhole.height_px
+    cx, cy = k[0, 2] + 0.5, k[1, 2] + 0.5 - image.cropped_px
+    return Camera(k[0, 0], k[1, 1], cx, cy, image.width_px, image.height_px)
+
+
+def _below_horizon(camera: Camera) -> Bool[np.ndarray, "h w"]:
+    """Pixels that look down, of a camera in the ego frame; all of them where none does."""
+    below = camera.rays() @ camera.world_from_camera[2, :3] < 0
+    return below if below.any() else np.ones_like(below)
+
+
+def _seen(log: Log, place: Place, views: list[View]) -> dict[str, int]:
+    """How visible boxes near the car are, by their ids."""
+    levels: dict[str, int] = {}
+    for track in log.boxes:
+        pose = track.pose_at(place.time_s)
+        if pose is not None and np.linalg.norm(pose[:2, 3] - place.world_from_ego[:2, 3]) < NEAR_M:
+            corners = _corners(pose, track.size_lwh_m[track.row_at(place.time_s)])
+            levels[track.id] = level_of(share_seen(corners, views))
+    return levels
+
+
+def _corners(pose: Float[np.ndarray, "4 4"], size: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "8 3"]:
+    signs = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
+    return (signs * size / 2) @ pose[:3, :3].T + pose[:3, 3]

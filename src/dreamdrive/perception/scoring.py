@@ -1,0 +1,45 @@
+"""How well a network segments a set of samples, all of it and drive by drive."""
+
+from collections import defaultdict
+
+import torch
+
+from dreamdrive.device import CPU
+from dreamdrive.perception.inputs import as_batch
+from dreamdrive.perception.metric import IouCounts, bev_counts
+from dreamdrive.perception.network import CrossViewTransformer
+from dreamdrive.perception.sampling import Samples
+from dreamdrive.progress import Progress, silent
+
+Counts = dict[str, IouCounts]
+"""By ``vehicle``, ``vehicle_all`` and ``road``, see ``metric.bev_counts``."""
+
+
+@torch.no_grad()
+def score(
+    network: CrossViewTransformer,
+    samples: Samples,
+    *,
+    device: torch.device = CPU,
+    progress: Progress = silent,
+) -> dict[str, Counts]:
+    """Counts of cells by drive; added up they are those of the whole set, as published figures are."""
+    network.to(device).eval()
+    found: dict[str, Counts] = defaultdict(dict)
+    for index in range(len(samples)):
+        batch = as_batch([samples[index]]).to(device)
+        said = network(batch.pictures, batch.pixel_from_camera, batch.camera_from_ego)
+        drive = found[samples.scene(index)]
+        for name, counts in bev_counts(said, batch.truth).items():
+            drive[name] = drive[name] + counts if name in drive else counts
+        progress(index + 1, len(samples))
+    return dict(found)
+
+
+def pooled(by_drive: dict[str, Counts]) -> Counts:
+    """Counts of all drives together."""
+    total: Counts = {}
+    for counts in by_drive.values():
+        for name, each in counts.items():
+            total[name] = total[name] + each if name in total else each
+    return total
