@@ -17,10 +17,10 @@ from tests.prior.vista.test_sampler import TINY_STEPS, mask_of, tiny_velocity
 from tests.prior.vista.test_unet import look, place_of
 from torch import Tensor
 
+from dreamdrive.prior.early_features import watch
 from dreamdrive.prior.vista.condition import NUMBERS, clip_pixels, embed_action
 from dreamdrive.prior.vista.keys import PARTS, UNET, recipes_of
 from dreamdrive.prior.vista.kinds import VISTA
-from dreamdrive.prior.vista.networks import watch
 from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out
 from dreamdrive.prior.vista.sampler import Branches, denoise, guidance, sample, sigmas
 

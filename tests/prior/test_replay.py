@@ -34,7 +34,8 @@ def test_replay_is_the_recording_with_features(folder):
 
 def test_every_control_reaches_the_reader():
     """What it says it takes must be handed on: both have the same names."""
-    assert choose_prior("replay").takes == {"dataset", *inspect.signature(read_clip).parameters}
+    of_data_sets = {"dataset", "scene", "cameras"}
+    assert choose_prior("replay").takes == of_data_sets | set(inspect.signature(read_clip).parameters)
 
 
 def test_replay_needs_an_input():

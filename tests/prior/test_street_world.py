@@ -42,7 +42,7 @@ def test_a_layout_is_drawn_and_said_to_be_simulated(tmp_path: Path) -> None:
 
 
 def test_what_it_cannot_use_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="street-world takes no poses; it takes fps, frames"):
+    with pytest.raises(InputError, match="street-world takes no poses; it takes cameras, dataset, fps, "):
         STREET_WORLD(Control(poses=Path("poses.json")))
     with pytest.raises(InputError, match="expected a layout as JSON"):
         street_world(Control(path=tmp_path / "video.mp4"))

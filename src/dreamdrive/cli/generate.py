@@ -85,10 +85,11 @@ def generate(
         out: Output folder. The same command goes on where it stopped.
         dataset: How the recording lies on disk; without it that of dreamdrive's own that recognises INPUT.
         scene: Which drive of a data set, by its name or its number from 0: dreamdrive data list INPUT.
-        cameras: Which of its cameras, such as front,front_left; without it the one that looks ahead.
-        prior: replay takes a recording as it is; street-world draws a layout, or a street of its own; photo
-            drives into a photo; the others are video models, see docs/guides/priors.md. Without it the input
-            decides.
+        cameras: Which of its cameras, such as front,front_left; without it the one that looks ahead, and of
+            magicdrive all.
+        prior: replay takes a recording as it is; street-world draws a layout, a scene of a data set, or a
+            street of its own; photo drives into a photo; the others are video models, see
+            docs/guides/priors.md. Without it the input decides.
         geometry: How cameras and depth are found. All but classical are networks and take --weights, some of
             them a package as well, which dreamdrive doctor names.
         weights: Weights of the network, the prior's or the geometry's: a file, a folder, or the name of a

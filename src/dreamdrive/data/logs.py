@@ -37,6 +37,19 @@ class Shots:
     steps: Int[np.ndarray, " n"]
 
 
+def choose_cameras(log: Log, cameras: str | None = None) -> Sequence[LogCamera]:
+    """Cameras by their names with commas, or ``all``; without it the first, which looks ahead."""
+    if cameras is None:
+        return log.cameras[:1]
+    if cameras == ALL:
+        return log.cameras
+    names = [name.strip() for name in cameras.split(",")]
+    chosen = [log.camera(name) for name in names]
+    if len({each.name for each in chosen}) < len(chosen):
+        raise InputError(f"--cameras {cameras}: a camera is named twice; expected each once")
+    return chosen
+
+
 def choose_shots(log: Log, cameras: str | None = None, frames: str | None = None) -> list[Shots]:
     """The wanted pictures by camera.
 
@@ -46,8 +59,7 @@ def choose_shots(log: Log, cameras: str | None = None, frames: str | None = None
         frames: ``START:STOP:STEP`` over the pictures of the first of them. The others give the picture that
             is nearest in time, where one is at most ``REACH`` steps away.
     """
-    chosen = _chosen(log, cameras)
-    lead, *others = chosen
+    lead, *others = choose_cameras(log, cameras)
     rows = np.array(Selection.parse(frames).resolve(len(lead), f"{lead.name} of {log.name}"))
     if len(rows) < 2:
         raise InputError(f"{lead.name} of {log.name}: a single picture is chosen; expected at least two")
@@ -66,6 +78,17 @@ def choose_shots(log: Log, cameras: str | None = None, frames: str | None = None
             )
         shots.append(Shots(camera, picked[taken], taken))
     return shots
+
+
+def samplers_of(cameras: Sequence[LogCamera], size: tuple[int, int] | None) -> list[Sampler]:
+    """How the pictures of each camera become frames of one size, which the first camera tells."""
+    made: list[Sampler] = []
+    for camera in cameras:
+        pinhole = camera.pinhole
+        known = Calibration(pinhole, None, True, ())
+        made.append(Sampler.create((pinhole.width_px, pinhole.height_px), size, known))
+        size = made[0].sizing.target
+    return made
 
 
 def clip_of_log(
@@ -92,7 +115,7 @@ def clip_of_log(
         InputError: The choice cannot be met, or pictures cannot be read.
     """
     shots = choose_shots(log, cameras, frames)
-    samplers = _samplers(shots, size)
+    samplers = samplers_of([one.camera for one in shots], size)
     target = samplers[0].sizing.target
     if sum(len(each.rows) for each in shots) > most_frames(target):
         raise too_many(most_frames(target), target, log.root)
@@ -149,29 +172,6 @@ def _place_of(log: Log, lead: Shots) -> OfLog:
     first = lead.camera.world_from_camera[lead.rows[0]]
     rows = tuple(tuple(map(float, row)) for row in first)
     return OfLog(log.name, rows, float(lead.camera.times_s[lead.rows[0]]))
-
-
-def _chosen(log: Log, cameras: str | None) -> Sequence[LogCamera]:
-    if cameras is None:
-        return log.cameras[:1]
-    if cameras == ALL:
-        return log.cameras
-    names = [name.strip() for name in cameras.split(",")]
-    chosen = [log.camera(name) for name in names]
-    if len({each.name for each in chosen}) < len(chosen):
-        raise InputError(f"--cameras {cameras}: a camera is named twice; expected each once")
-    return chosen
-
-
-def _samplers(shots: Sequence[Shots], size: tuple[int, int] | None) -> list[Sampler]:
-    """How the pictures of each camera become frames of one size, which the first camera tells."""
-    made: list[Sampler] = []
-    for one in shots:
-        pinhole = one.camera.pinhole
-        known = Calibration(pinhole, None, True, ())
-        made.append(Sampler.create((pinhole.width_px, pinhole.height_px), size, known))
-        size = made[0].sizing.target
-    return made
 
 
 def _read(log: Log, shots: Shots, sampler: Sampler) -> tuple[Any, Any]:

@@ -25,11 +25,14 @@ class Prior(Backend):
         make: The way itself.
         takes: Names of the fields of ``Control`` that it honours; ``seed`` and ``weights`` go without saying.
         gives: What its clips hold beside the frames, in words.
+        of_street: Whether it is conditioned on a map: its input is a layout, or a scene of a data set, of
+            which boxes, map, path and calibration count, and pictures do not.
     """
 
     make: Make
     takes: frozenset[str]
     gives: str
+    of_street: bool = False
 
     def check(self, control: Control) -> None:
         """Whether it could start and honour all that is asked.

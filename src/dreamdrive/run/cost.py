@@ -7,7 +7,7 @@ import numpy as np
 
 from dreamdrive.choices import DATASETS
 from dreamdrive.data import log_of
-from dreamdrive.data.logs import choose_shots
+from dreamdrive.data.logs import choose_shots, samplers_of
 from dreamdrive.data.sampler import MAX_FRAMES
 from dreamdrive.data.select import Selection
 from dreamdrive.data.size import MIN_SIDE_PX, choose_size
@@ -16,7 +16,7 @@ from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options
-from dreamdrive.prior import FRAMES, SIZE
+from dreamdrive.prior import FRAMES, RATE_HZ, SIZE, read_street, wanted_frames
 from dreamdrive.run.judge import ENOUGH_FRAMES
 from dreamdrive.run.outcome import duration
 from dreamdrive.scene.control import Control
@@ -79,13 +79,19 @@ def plan(control: Control, prior: str) -> Planned | None:
     """What a run will work on, as far as its input tells before it is read; None where that is unknown."""
     selection = Selection.parse(control.frames)
     if prior == "street-world":
-        stop = selection.stop or max(FRAMES, selection.start + FRAMES)
-        count = len(range(max(0, stop))[selection.start :: selection.step])
-        return Planned(count, 1, control.size or SIZE, None, selection.start, selection.step, True)
+        return _of_street(control)
     if prior != "replay" or control.path is None or DATASETS.package(control.dataset):
         return None
     log = log_of(control)
     return _of_recording(control, selection) if log is None else _of_log(control, log)
+
+
+def _of_street(control: Control) -> Planned:
+    street = None if control.path is None else read_street(control, control.path)
+    rows = wanted_frames(control, FRAMES, RATE_HZ if control.fps is None else control.fps, street)
+    cameras = () if street is None else street.cameras
+    size = samplers_of(cameras, control.size)[0].sizing.target if cameras else control.size or SIZE
+    return Planned(len(rows), max(1, len(cameras)), size, None, rows.start, rows.step, True)
 
 
 def _of_log(control: Control, log: Log) -> Planned:

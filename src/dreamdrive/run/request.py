@@ -12,7 +12,7 @@ from dreamdrive.geometry import EXPECTED, GeometryOptions, attach, backend_of, b
 from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, weights_of
 from dreamdrive.models import find_weights
 from dreamdrive.options import QUALITIES, Options, with_method
-from dreamdrive.prior import Choice, auto_prior, choose_prior
+from dreamdrive.prior import Choice, auto_prior, choose_prior, told_of_street
 from dreamdrive.progress import Work
 from dreamdrive.run.stages import digest, file_digest
 from dreamdrive.scene.clip import Clip
@@ -97,7 +97,7 @@ def request_of(
     quality = _quality_of(whole)
     options = replace(whole, geometry=geometry, seed=control.seed)
     knowledge = None if options.knowledge == NO_KNOWLEDGE else weights_of(options.knowledge)
-    digests = _digests(control, geometry_files, network, knowledge)
+    digests = _digests(control, geometry_files, network, knowledge, prior=prior)
     return Request(control, choice, geometry_files, options, quality, digests)
 
 
@@ -149,7 +149,12 @@ def _with_lens(control: Control, geometry_files: Path | None) -> Control:
 
 
 def _digests(
-    control: Control, geometry_files: Path | None, weights: Path | None, knowledge: Path | None = None
+    control: Control,
+    geometry_files: Path | None,
+    weights: Path | None,
+    knowledge: Path | None = None,
+    *,
+    prior: str = "replay",
 ) -> dict[str, str]:
     asked = control.trajectory
     fill = None if control.fill in (None, FILL_NETWORK, FILL_INPAINT) else Path(control.fill)
@@ -176,7 +181,7 @@ def _digests(
             flag = "" if name == "input" else f"--{name} "
             raise InputError(f"{flag}{path} does not exist; expected {expected}")
         deep = name in ("geometry-files", "prior-weights")
-        if name == "input" and (taken := _of_log(control)) is not None:
+        if name == "input" and (taken := digest_of_log(control, prior)) is not None:
             digests[name] = taken
             continue
         if name == "input" and not (deep := dataset_of(control.dataset, path).deep):
@@ -188,10 +193,16 @@ def _digests(
     return digests
 
 
-def _of_log(control: Control) -> str | None:
-    """The digest of the pictures of a drive and what is known of them; None where the input is none."""
+def digest_of_log(control: Control, prior: str) -> str | None:
+    """The digest of what a prior sees of a drive; None where the input is none.
+
+    Those are its pictures and what is known of them, or, for priors that are conditioned on a map, its boxes,
+    map, path and calibration.
+    """
     log = log_of(control)
     if log is None:
         return None
+    if choose_prior(prior).of_street:
+        return digest(told_of_street(log))
     files, told = files_of(choose_shots(log, control.cameras, control.frames))
     return digest([told, [file_digest(file) for file in files]])

@@ -14,6 +14,7 @@ from dreamdrive.files.atomic import check_free
 from dreamdrive.models import find_weights
 from dreamdrive.prior import Choice, auto_prior, choose_prior
 from dreamdrive.progress import Progress, silent
+from dreamdrive.run.request import digest_of_log
 from dreamdrive.run.stages import file_digest
 from dreamdrive.scene.action import Action
 from dreamdrive.scene.clip import Clip
@@ -58,17 +59,19 @@ def sample(
 def _about(prior: str, control: Control) -> dict[str, Any]:
     """What it takes to make the same again: files by name and content, all else by value."""
     given = {name: path for name in FILES if isinstance(path := getattr(control, name), Path)}
+    drive = digest_of_log(control, prior)
     return {
         "dreamdrive": __version__,
         "prior": prior,
         "seed": control.seed,
         "options": {name: value for name, value in control.settings.items() if value is not None},
-        "files": {name: _named(path) for name, path in given.items()},
+        "files": {name: _named(path, drive if name == "path" else None) for name, path in given.items()},
     }
 
 
-def _named(path: Path) -> dict[str, str]:
-    return {"name": path.name, "sha256": file_digest(path, deep=True)}
+def _named(path: Path, known: str | None = None) -> dict[str, str]:
+    """A file or folder, with its digest unless that of what is used of it is known."""
+    return {"name": path.name, "sha256": file_digest(path, deep=True) if known is None else known}
 
 
 def detailed_size(path: Path) -> tuple[int, int]:

@@ -1,6 +1,15 @@
 """The procedural street world: layouts drawn at random or given, rendered by rays, with exact truth."""
 
-from dreamdrive.world.drive import MOUNTS, Drive, Mount, WorldBox, drive, front_from_mount, make_street
+from dreamdrive.world.drive import (
+    MOUNTS,
+    Drive,
+    Mount,
+    WorldBox,
+    drive,
+    front_from_mount,
+    make_street,
+    pictures,
+)
 from dreamdrive.world.files import MARK, is_world, read_drives, read_world, write_world
 from dreamdrive.world.layout_picture import draw_layout
 from dreamdrive.world.materials import Semantic

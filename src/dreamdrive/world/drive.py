@@ -97,7 +97,7 @@ class Drive:
         map_from_world = np.linalg.inv(self.world_from_map)
         placed = [camera.at(map_from_world @ camera.world_from_camera) for camera in cameras]
         later = [t + 0.1 for t in times_s]
-        return list(_looks(self.world, placed, list(times_s), placed, later, antialiased=True))
+        return list(pictures(self.world, placed, list(times_s), placed, later, antialiased=True))
 
 
 def ego_poses(
@@ -174,7 +174,7 @@ def drive(
     camera = pinhole_of(layout, size)
     placed = [camera.at(pose) for pose in poses]
     seen: list[WorldView] = []
-    for view in _looks(world, placed[:-1], times[:-1], placed[1:], times[1:], antialiased=antialiased):
+    for view in pictures(world, placed[:-1], times[:-1], placed[1:], times[1:], antialiased=antialiased):
         seen.append(view)
         progress(len(seen), frames)
     world_from_map = np.linalg.inv(poses[0])
@@ -227,16 +227,19 @@ def road_plane(world_from_map: Float[np.ndarray, "4 4"], layout: Layout) -> Grou
     return Ground(world_from_map[:3, :3] @ touched[:3, 2], float(touched[:3, 2] @ (eye - touched[:3, 3])))
 
 
-def _looks(
+def pictures(
     world: World,
     cameras: Sequence[Camera],
     times_s: Sequence[float] | np.ndarray,
     next_cameras: Sequence[Camera],
     next_times_s: Sequence[float] | np.ndarray,
     *,
-    antialiased: bool,
+    antialiased: bool = True,
 ) -> Iterator[WorldView]:
-    """Pictures of cameras in the map frame, two at a time: NumPy and Embree leave Python's lock alone."""
+    """Pictures of any cameras in the map frame, each at its time, with the flow to a next camera and time.
+
+    Two at a time: NumPy and Embree leave Python's lock alone.
+    """
 
     def one(k: int) -> WorldView:
         following = float(next_times_s[k]), next_cameras[k]

@@ -15,7 +15,7 @@ from dreamdrive.prior.magicdrive.cameras import (
     car_from_lidar,
     crop,
     map_from_car,
-    rig,
+    typical_ring,
 )
 from dreamdrive.prior.magicdrive.condition import (
     AREAS,
@@ -23,6 +23,7 @@ from dreamdrive.prior.magicdrive.condition import (
     CLASSES,
     KINDS,
     LINES,
+    OfLayout,
     as_published,
     box_corners,
     draw_map,
@@ -164,7 +165,7 @@ def standing(kind: str, x: float, y: float) -> Box:
 
 
 def listed_by(box: Box) -> set[str]:
-    present = see(Layout(EAST, boxes=[box]), NOW, 20, WORDS).present[0].any(axis=-1)
+    present = see(OfLayout(Layout(EAST, boxes=[box])), NOW, 20, WORDS).present[0].any(axis=-1)
     return {camera.name for camera, there in zip(NUSCENES, present, strict=True) if there}
 
 
@@ -176,7 +177,7 @@ def test_a_camera_lists_the_boxes_before_it() -> None:
 
 def test_lists_are_filled_up_to_the_longest() -> None:
     boxes = [standing("van", 30, 0), standing("pedestrian", 25, 3), standing("truck", -30, 0)]
-    seen = see(Layout(EAST, boxes=boxes), np.array([0.0, 1.0]), 20, WORDS)
+    seen = see(OfLayout(Layout(EAST, boxes=boxes)), np.array([0.0, 1.0]), 20, WORDS)
     assert seen.present.shape == (2, 6, 2)
     assert seen.present[0].sum(axis=-1).tolist() == [2, 2, 1, 1, 1, 2]
     assert [CLASSES[kind] for kind in seen.classes[0, 0]] == ["car", "pedestrian"]
@@ -185,11 +186,11 @@ def test_lists_are_filled_up_to_the_longest() -> None:
     # Half a metre a sample: 10 m driven, so the van is 10 m nearer.
     moved = seen.corners_m[0, 0, 0] - seen.corners_m[1, 0, 0]
     np.testing.assert_allclose(moved, np.tile([0.0, 10.0, 0.0], (8, 1)), atol=0.05)
-    assert see(Layout(EAST), NOW, 20, WORDS).present.shape == (1, 6, 0)
+    assert see(OfLayout(Layout(EAST)), NOW, 20, WORDS).present.shape == (1, 6, 0)
 
 
 def test_cameras_are_told_for_the_full_picture_in_half_precision() -> None:
-    cameras = see(Layout(EAST), NOW, 20, WORDS).cameras[0]
+    cameras = see(OfLayout(Layout(EAST)), NOW, 20, WORDS).cameras[0]
     np.testing.assert_array_equal(cameras[0, :, :3], [[1266, 0, 816], [0, 1266, 491], [0, 0, 1]])
     np.testing.assert_allclose(
         cameras[0, :, 3:], [[1, 0, 0, 0], [0, 0, 1, 0.76], [0, -1, 0, -0.33]], atol=1e-3
@@ -208,7 +209,7 @@ def test_cameras_are_told_for_the_full_picture_in_half_precision() -> None:
 def test_intrinsics_of_the_published_sizes(
     size: tuple[int, int], focal: float, centre: tuple[float, float]
 ) -> None:
-    front = rig(size)[0]
+    front = typical_ring().rig(size)[0]
     assert (front.fx_px, front.fy_px) == (focal, focal)
     assert (front.cx_px, front.cy_px) == pytest.approx(centre)
     assert (front.width_px, front.height_px) == size
@@ -220,7 +221,7 @@ def test_a_picture_taller_than_the_full_one_is_refused() -> None:
 
 
 def test_the_rig_is_a_ring_to_the_right_from_the_front() -> None:
-    cameras = rig((400, 224))
+    cameras = typical_ring().rig((400, 224))
     assert (cameras[0].world_from_camera == np.eye(4)).all()
     ahead = np.stack([camera.world_from_camera[:3, 2] for camera in cameras])
     turns = np.rad2deg(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2])))

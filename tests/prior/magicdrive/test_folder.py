@@ -80,7 +80,7 @@ def test_plain_stable_diffusion_is_told_apart(folder: Written) -> None:
     """By its table; and by its tensors, where only these were put in."""
     plain = UNet2DConditionModel(**plain_settings(UNet2DConditionModel, folder.unet))
     save_file(plain.state_dict(), folder.weights("unet"))
-    refused(folder, r"unet/.* does not fit \(36 missing: .*attn4.*; expected a folder with unet/")
+    refused(folder, r"unet/.* does not fit \(99 missing: .*attn4.*; expected a folder with unet/")
     folder.rewrite("unet", neighboring_view_pair="gone")
     refused(folder, "has no neighboring_view_pair: this is plain Stable Diffusion")
 
@@ -136,6 +136,7 @@ def test_the_variant_has_to_be_the_one_asked_for(folder: Written, tmp_path: Path
             "not one of MagicDrive .KeyError: 'cam_embedder_param'",
         ),
         ("unet", {"down_block_types": ["Other"] * 2}, "unet/config.json builds no network"),
+        ("unet", {"layers_per_block": 1}, r"builds no block down_blocks\.1\.attentions\.1, whose activ"),
         ("controlnet", {"use_uncond_map": "learnable"}, "use_uncond_map is 'learnable'"),
         ("controlnet", {"map_embedder_cls": "mine.Own"}, "map_embedder_cls mine.Own is not built"),
         ("text_encoder", {"hidden_size": 32}, "text_encoder/ is 32 wide, unet/ and controlnet/ take 48"),

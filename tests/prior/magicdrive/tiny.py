@@ -66,17 +66,20 @@ def _control(width: int, hidden: int, map_widths: list[int], map_size: list[int]
 
 
 def tiny_configs(temporal: bool = False) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Tables of tiny networks for pictures of 44x24, whose map encoder averages as that of 272x736 does."""
+    """Tables of tiny networks for pictures of 44x24, whose map encoder averages as that of 272x736 does.
+
+    They have no more layers than the block needs that the features come from.
+    """
     small = {
         "block_out_channels": [8, 16],
         "cross_attention_dim": WIDTH,
         "attention_head_dim": 2,
-        "down_block_types": ["CrossAttnDownBlock2D", "DownBlock2D"],
+        "down_block_types": ["CrossAttnDownBlock2D"] * 2,
         "in_channels": 4,
-        "layers_per_block": 1,
+        "layers_per_block": 2,
         "norm_num_groups": 4,
     }
-    unet = small | NEW | {"up_block_types": ["UpBlock2D", "CrossAttnUpBlock2D"]}
+    unet = small | NEW | {"up_block_types": ["CrossAttnUpBlock2D"] * 2}
     unet |= {"img_size": [SIZE[1], SIZE[0]]} | (TEMPORAL if temporal else {})
     controlnet = small | _control(WIDTH, 16, [8, 8, 8, 8], [8, 200, 200])
     controlnet["map_size"] = None

@@ -10,8 +10,9 @@ from tests.prior.vista.networks import Given, golden_unet, unet_config
 from tests.prior.vista.tiny import configs
 from torch import Tensor
 
+from dreamdrive.prior.early_features import watch
 from dreamdrive.prior.vista.kinds import SVD, VISTA
-from dreamdrive.prior.vista.networks import VideoUNet, make_empty, watch
+from dreamdrive.prior.vista.networks import VideoUNet, make_empty
 
 LIMIT = 3e-5
 """Of the largest value; float32 differs by 2e-6 through all layers, and more where they are more."""

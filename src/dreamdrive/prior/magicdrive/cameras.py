@@ -1,7 +1,8 @@
-"""The six cameras and the LiDAR of the cars MagicDrive learned from, as typical values.
+"""The six cameras and the LiDAR of a car, as MagicDrive is told of them.
 
-A layout has no rig, and the network knows no other than that of nuScenes. The numbers are those of its
-calibrations, rounded: they differ a little from car to car, and their tilts of a degree or less are left out.
+A layout has no rig, and the network knows no other than that of nuScenes: typical values stand for it. They
+are those of its calibrations, rounded: they differ a little from car to car, and their tilts of a degree or
+less are left out. A scene of a data set has cameras of its own, see ``of_scene``.
 """
 
 from dataclasses import dataclass
@@ -71,30 +72,59 @@ def map_from_car(ego: Ego, times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray
     return poses
 
 
-def full_intrinsics(camera: Mounted) -> Float[np.ndarray, "3 3"]:
-    """Intrinsics of the full picture, which is what the network is told whatever its own size is."""
-    return np.array(
-        [[camera.focal_px, 0, camera.centre_px[0]], [0, camera.focal_px, camera.centre_px[1]], [0, 0, 1]]
+@dataclass(frozen=True)
+class Ring:
+    """Cameras of a car, clockwise from one that looks ahead, and its LiDAR.
+
+    Attributes:
+        names: Of the cameras.
+        told: Their intrinsics as the network is told them, those of the full picture whatever its own size
+            is; the first pixel has its centre at 0.
+        full: Their pinholes of the full picture; the first pixel has its centre at 0.5.
+        car_from_camera: Their mountings.
+        car_from_lidar: That of the LiDAR, whose axes are x right, y ahead, z up.
+    """
+
+    names: tuple[str, ...]
+    told: Float[np.ndarray, "n 3 3"]
+    full: tuple[Camera, ...]
+    car_from_camera: Float[np.ndarray, "n 4 4"]
+    car_from_lidar: Float[np.ndarray, "4 4"]
+
+    @property
+    def lidar_from_camera(self) -> Float[np.ndarray, "n 4 4"]:
+        """Poses of the cameras, from the LiDAR."""
+        return np.linalg.inv(self.car_from_lidar) @ self.car_from_camera
+
+    def rig(self, size: tuple[int, int]) -> tuple[Camera, ...]:
+        """Pinholes of the pictures that the network makes, their poses relative to the first camera."""
+        scale, left, top = crop(size)
+        mounted = np.linalg.inv(self.car_from_camera[0]) @ self.car_from_camera
+        cameras = [
+            Camera(
+                each.fx_px * scale,
+                each.fy_px * scale,
+                each.cx_px * scale - left,
+                each.cy_px * scale - top,
+                *size,
+                pose,
+            )
+            for each, pose in zip(self.full, mounted, strict=True)
+        ]
+        # The product of a pose with its inverse is the identity only up to rounding; say it exactly.
+        return cameras[0].at(np.eye(4)), *cameras[1:]
+
+
+def typical_ring() -> Ring:
+    """The one that stands for the cars of nuScenes; half a pixel is less than what is rounded."""
+    full = tuple(Camera(c.focal_px, c.focal_px, *c.centre_px, *FULL_SIZE) for c in NUSCENES)
+    return Ring(
+        names=tuple(each.name for each in NUSCENES),
+        told=np.stack([each.matrix for each in full]),
+        full=full,
+        car_from_camera=np.stack([car_from_camera(each) for each in NUSCENES]),
+        car_from_lidar=car_from_lidar(),
     )
-
-
-def rig(size: tuple[int, int]) -> tuple[Camera, ...]:
-    """Pinholes of the pictures that the network makes, their poses relative to the front camera."""
-    scale, left, top = crop(size)
-    front_from_car = np.linalg.inv(car_from_camera(NUSCENES[0]))
-    cameras = [
-        Camera(
-            each.focal_px * scale,
-            each.focal_px * scale,
-            each.centre_px[0] * scale - left,
-            each.centre_px[1] * scale - top,
-            *size,
-            front_from_car @ car_from_camera(each),
-        )
-        for each in NUSCENES
-    ]
-    # The product of a pose with its inverse is the identity only up to rounding; say it exactly.
-    return cameras[0].at(np.eye(4)), *cameras[1:]
 
 
 def crop(size: tuple[int, int]) -> tuple[float, float, float]:

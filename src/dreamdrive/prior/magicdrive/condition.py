@@ -1,6 +1,7 @@
-"""From a layout to what MagicDrive's networks read: its map as a raster, its road users as corners, words."""
+"""From a street to what MagicDrive's networks read: its map as a raster, its road users as corners, words."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -9,13 +10,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.magicdrive.cameras import (
-    NUSCENES,
-    car_from_camera,
-    car_from_lidar,
-    full_intrinsics,
-    map_from_car,
-)
+from dreamdrive.prior.magicdrive.cameras import Ring, map_from_car, typical_ring
 from dreamdrive.scene.layout import AreaKind, BoxKind, Layout, LineKind, track_function
 from dreamdrive.world import upright
 
@@ -77,8 +72,54 @@ LINES: dict[LineKind, str | None] = {
     "road_edge": None,
 }
 """Which channel a line is drawn in; nuScenes has none along the edge of the road."""
-_LINE_CELLS = 2
+LINE_CELLS = 2
 """Width of a line, as the devkit of nuScenes draws it."""
+
+
+@runtime_checkable
+class Surroundings(Protocol):
+    """A street and the car in it, as the networks are told of them."""
+
+    @property
+    def ring(self) -> Ring:
+        """The cameras of the car and its LiDAR."""
+        ...
+
+    def world_from_car(self, times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t 4 4"]:
+        """Where the car is."""
+        ...
+
+    def boxes(
+        self, lidar_from_world: Float[np.ndarray, "4 4"], time_s: float
+    ) -> tuple[Float[np.ndarray, "b 8 3"], Int[np.ndarray, " b"]]:
+        """True corners of all boxes at a time, and their classes."""
+        ...
+
+    def raster(self, lidar_from_world: Float[np.ndarray, "4 4"], cells: int) -> Float32[np.ndarray, "8 x y"]:
+        """The map around the LiDAR, 0 or 1; rows go from left to right of the car, columns to the front."""
+        ...
+
+
+@dataclass(frozen=True)
+class OfLayout:
+    """The street of a layout, with typical cameras of nuScenes on its path."""
+
+    layout: Layout
+    ring: Ring = field(default_factory=typical_ring)
+
+    def world_from_car(self, times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t 4 4"]:
+        """Where the car is in the layout."""
+        return map_from_car(self.layout.ego, times_s)
+
+    def boxes(
+        self, lidar_from_world: Float[np.ndarray, "4 4"], time_s: float
+    ) -> tuple[Float[np.ndarray, "b 8 3"], Int[np.ndarray, " b"]]:
+        """See ``layout_boxes``."""
+        return layout_boxes(self.layout, lidar_from_world, time_s)
+
+    def raster(self, lidar_from_world: Float[np.ndarray, "4 4"], cells: int) -> Float32[np.ndarray, "8 x y"]:
+        """See ``draw_map``."""
+        return draw_map(self.layout, lidar_from_world, cells)
 
 
 @dataclass(frozen=True)
@@ -113,40 +154,51 @@ class Conditions:
 
 
 def see(
-    layout: Layout, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
+    street: Surroundings, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
 ) -> Conditions:
-    """What the cameras are told at given times of the layout, on the device of the words' tokens.
+    """What the cameras are told at given times of the street, on the device of the words' tokens.
 
     Each camera has its list of boxes, filled up to the longest list of all; all numbers are rounded to half
     precision, in which the networks were taught: sine of 8 times a focal length tells the difference. The
     raster has ``cells`` along each side.
     """
-    lidar_from_car = np.linalg.inv(car_from_lidar())
-    lidar_from_camera = np.stack([lidar_from_car @ car_from_camera(each) for each in NUSCENES])
-    count = len(times_s)
-    shape = (count, len(NUSCENES), len(layout.boxes))
-    corners, classes = np.zeros((*shape, 8, 3)), np.zeros(shape, dtype=np.int64)
-    present, rasters = np.zeros(shape, dtype=bool), list[np.ndarray]()
-    for step, (time_s, car) in enumerate(zip(times_s, map_from_car(layout.ego, times_s), strict=True)):
-        lidar_from_map = lidar_from_car @ np.linalg.inv(car)
-        rasters.append(draw_map(layout, lidar_from_map, cells))
-        places, kinds = layout_boxes(layout, lidar_from_map, float(time_s))
+    ring = street.ring
+    lidar_from_camera, lidar_from_car = ring.lidar_from_camera, np.linalg.inv(ring.car_from_lidar)
+    camera_from_lidar = np.linalg.inv(lidar_from_camera)
+    rasters = list[np.ndarray]()
+    lists = list[list[tuple[np.ndarray, np.ndarray]]]()
+    for time_s, car in zip(times_s, street.world_from_car(times_s), strict=True):
+        lidar_from_world = lidar_from_car @ np.linalg.inv(car)
+        rasters.append(street.raster(lidar_from_world, cells))
+        places, kinds = street.boxes(lidar_from_world, float(time_s))
         told = as_published(places)
-        for camera, mask in enumerate(listed(places, np.linalg.inv(lidar_from_camera))):
-            own = (step, camera, slice(mask.sum()))
-            corners[own], classes[own], present[own] = told[mask], kinds[mask], True
-    longest = present.sum(axis=-1).max(initial=0)
-    intrinsics = np.stack([full_intrinsics(each) for each in NUSCENES])
-    matrices = np.concatenate([intrinsics, lidar_from_camera[:, :3]], axis=-1)
+        lists.append([(told[mask], kinds[mask]) for mask in listed(places, camera_from_lidar)])
+    matrices = np.concatenate([ring.told, lidar_from_camera[:, :3]], axis=-1)
+    corners, classes, present = _filled_up(lists)
     given = (
         np.stack(rasters),
-        _rounded(np.repeat(matrices[None], count, axis=0)),
-        _rounded(corners[:, :, :longest]),
-        classes[:, :, :longest],
-        present[:, :, :longest],
+        _rounded(np.repeat(matrices[None], len(times_s), axis=0)),
+        _rounded(corners),
+        classes,
+        present,
     )
     tensors = [torch.from_numpy(np.ascontiguousarray(each)).to(words.device) for each in given]
-    return Conditions(*tensors, text=words.expand(count, -1, -1))
+    return Conditions(*tensors, text=words.expand(len(times_s), -1, -1))
+
+
+def _filled_up(
+    lists: list[list[tuple[np.ndarray, np.ndarray]]],
+) -> tuple[Float[np.ndarray, "b n k 8 3"], Int[np.ndarray, "b n k"], Bool[np.ndarray, "b n k"]]:
+    """Corners and classes of lists of one length, and where there are any."""
+    longest = max(len(kinds) for cameras in lists for _, kinds in cameras)
+    shape = len(lists), len(lists[0]), longest
+    corners, classes = np.zeros((*shape, 8, 3)), np.zeros(shape, dtype=np.int64)
+    present = np.zeros(shape, dtype=bool)
+    for step, cameras in enumerate(lists):
+        for camera, (places, kinds) in enumerate(cameras):
+            own = (step, camera, slice(len(kinds)))
+            corners[own], classes[own], present[own] = places, kinds, True
+    return corners, classes, present
 
 
 def _rounded(values: np.ndarray) -> Float32[np.ndarray, "..."]:
@@ -218,11 +270,11 @@ def draw_map(
     for line in layout.lines:
         channel = LINES[line.kind]
         if channel is not None:
-            cv2.polylines(layers[channel], [placed(line.points)], False, 1, _LINE_CELLS)
+            cv2.polylines(layers[channel], [placed(line.points)], False, 1, LINE_CELLS)
     return np.stack([layers[name] for name in CHANNELS]).astype(np.float32)
 
 
-def prompt_of(description: str | None) -> str:
+def prompt_of(description: str | None, location: str = LOCATION) -> str:
     """The sentence that the networks were taught with."""
     words = (DESCRIPTION if description is None else description).strip().rstrip(".")
-    return f"A driving scene image at {LOCATION}. {words}."
+    return f"A driving scene image at {location}. {words}."

@@ -18,6 +18,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.machine import free_bytes
 from dreamdrive.models import check_sizes, fill, read_state, sha256
+from dreamdrive.prior.early_features import BLOCK
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
 from dreamdrive.prior.magicdrive.networks import BevControlNet, multiview_unet, plain_settings
 
@@ -116,6 +117,7 @@ def read_parts(folder: Path, *, temporal: bool) -> Parts:
     # Not on the meta device: it has a buffer that no file holds.
     encoder = _built("text_encoder", lambda: CLIPTextModel(CLIPTextConfig.from_dict(configs["text_encoder"])))
     _check_fit(settings, controlnet, vae, encoder)
+    _check_block(unet)
     width = configs["unet"]["block_out_channels"][0]
     check_memory(needed_bytes([unet, controlnet, vae, encoder], settings, width, dtype.itemsize), device)
 
@@ -188,6 +190,15 @@ def _check_fit(
             f"unet/config.json says pictures of {width}x{height}, whose latents are {latents[1]:g}x"
             f"{latents[0]:g}, but controlnet/ brings the map to {encoded.shape[3]}x{encoded.shape[2]}; "
             f"expected two folders of one model"
+        )
+
+
+def _check_block(unet: UNet2DConditionModel) -> None:
+    """The UNet has the block that the features come from."""
+    if BLOCK not in dict(unet.named_modules()):
+        raise InputError(
+            f"unet/config.json builds no block {BLOCK}, whose activations are the features; expected the "
+            "levels and layers of Stable Diffusion 1.5"
         )
 
 

@@ -1,4 +1,4 @@
-"""From a layout and loaded networks to pictures and their latents: UniPC with guidance, then the decoder."""
+"""From a street and networks to pictures, latents and features: UniPC with guidance, then the decoder."""
 
 import warnings
 from collections.abc import Callable
@@ -10,15 +10,17 @@ import torch
 from diffusers.models.autoencoders.autoencoder_kl import AutoencoderKL
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from diffusers.schedulers.scheduling_unipc_multistep import UniPCMultistepScheduler
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Float16, Int, UInt8
 from torch import Tensor
 
-from dreamdrive.prior.magicdrive.condition import Conditions, see
+from dreamdrive.prior.early_features import onto_frames
+from dreamdrive.prior.magicdrive.condition import Conditions, Surroundings, see
+from dreamdrive.prior.magicdrive.features import activations
 from dreamdrive.prior.magicdrive.folder import DECODE_PICTURES, Parts
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised
+from dreamdrive.prior.pca import reduce
 from dreamdrive.prior.running import check_finite, counted
 from dreamdrive.progress import Progress
-from dreamdrive.scene.layout import Layout
 
 GUIDANCE = 2.0
 _SCHEDULE = (
@@ -35,7 +37,7 @@ _SCHEDULE = (
 class Run:
     """What one run samples: time steps at ``rate_hz``, from start noise of the seed."""
 
-    layout: Layout
+    street: Surroundings
     parts: Parts
     prompt: str
     steps: int
@@ -54,39 +56,60 @@ class Run:
         }
 
 
-def generate(
-    run: Run, wanted: np.ndarray, progress: Progress
-) -> tuple[UInt8[np.ndarray, "f h w 3"], Float[np.ndarray, "f _ _ _"]]:
-    """Frames and latents of time steps, by time, then camera.
+@dataclass(frozen=True)
+class Generated:
+    """What is made at time steps, by time, then camera: frames, latents and features.
+
+    The features are principal components over all that was sampled; ``notes`` are for the report.
+    """
+
+    frames: UInt8[np.ndarray, "f h w 3"]
+    latents: Float[np.ndarray, "f _ _ _"]
+    features: Float16[np.ndarray, "f _ _ _"]
+    notes: tuple[str, ...]
+
+
+def generate(run: Run, wanted: Int[np.ndarray, " t"], progress: Progress) -> Generated:
+    """Make time steps.
 
     The temporal variant samples all time steps of its length, others each wanted one by itself.
     """
-    together = run.parts.settings.frames
-    sampled = wanted if together == 1 else np.arange(together)
-    tell = counted(progress, len(sampled) // together * run.steps + len(wanted))
     parts = run.parts
-    clips = [_sampled(run, steps / run.rate_hz, tell) for steps in sampled.reshape(-1, together)]
-    by_time = torch.cat(clips).unflatten(0, (-1, parts.settings.views))
-    check_finite(by_time, "latents")
-    kept = by_time[np.searchsorted(sampled, wanted).tolist()]
+    together, views = parts.settings.frames, parts.settings.views
+    sampled = wanted if together == 1 else np.arange(together)
+    tell = counted(progress, len(sampled) // together * (run.steps + 1) + len(wanted))
+    clips, seen = list[Tensor](), list[Float16[np.ndarray, "h w c"]]()
+    for steps in sampled.reshape(-1, together):
+        latents, values = _sampled(run, steps / run.rate_hz, tell)
+        clips.append(latents)
+        seen += list(values)
+    kept = np.searchsorted(sampled, wanted)
+    by_time = torch.cat(clips).unflatten(0, (-1, views))[kept.tolist()]
     pictures: list[np.ndarray] = []
-    for latents in kept:
+    for latents in by_time:
         pictures.append(decode(parts.vae, latents))
         tell()
-    return np.concatenate(pictures), kept.flatten(0, 1).permute(0, 2, 3, 1).cpu().numpy()
+    rows = (kept[:, None] * views + np.arange(views)).ravel()
+    features, said = onto_frames(reduce(seen)[rows], parts.settings.size)
+    latents = by_time.flatten(0, 1).permute(0, 2, 3, 1).cpu().numpy()
+    return Generated(np.concatenate(pictures), latents, features, tuple(said))
 
 
 def _sampled(
     run: Run, times_s: Float[np.ndarray, " t"], tell: Callable[[], None]
-) -> Float[Tensor, "bn c h w"]:
-    """Latents of time steps that are sampled together."""
+) -> tuple[Float[Tensor, "bn c h w"], Float16[np.ndarray, "bn h2 w2 d"]]:
+    """Latents of time steps that are sampled together, and what the UNet sees in them."""
     parts = run.parts
-    conditions = see(run.layout, times_s, parts.settings.map_shape[1], parts.words(run.prompt))
+    conditions = see(run.street, times_s, parts.settings.map_shape[1], parts.words(run.prompt))
     no_words = parts.words("").expand_as(conditions.text)
     branches = conditions, conditions.without(parts.controlnet.null_camera, no_words)
     scheduler = unipc(parts.scheduler, run.steps, parts.device)
     noise = start_noise(run).to(parts.device)
-    return sample(parts.unet, parts.controlnet, branches, noise, scheduler, done=tell)
+    latents = sample(parts.unet, parts.controlnet, branches, noise, scheduler, done=tell)
+    check_finite(latents, "latents")
+    values = activations(parts, conditions, latents, scheduler.alphas_cumprod, run.seed)
+    tell()
+    return latents, values
 
 
 def start_noise(run: Run) -> Float[Tensor, "bn c h w"]:

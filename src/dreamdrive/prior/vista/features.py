@@ -18,13 +18,13 @@ from torch import Tensor
 
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
+from dreamdrive.prior.early_features import BLOCK, SIGMA, onto_frames, watch
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
 from dreamdrive.prior.vista.engine import Engine, Seen
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
-from dreamdrive.prior.vista.networks import watch
 from dreamdrive.prior.vista.picture import NATIVE, check_size, nearest_side, to_images
 from dreamdrive.prior.vista.rollout import SCALE
 from dreamdrive.prior.vista.sampler import time_of
@@ -32,8 +32,6 @@ from dreamdrive.prior.vista.stored import open_weights
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.action import Action, check_action
 
-BLOCK = "down_blocks.1.attentions.1"
-"""The second level, behind its last transformer over time: 1/16 of the frame's size, mixed over time."""
 _BLOCKS = re.compile(r"conv_in|(mid_block|(down|up)_blocks\.\d+)(\.(attentions|resnets)\.\d+)?")
 """What gives activations (B T, C, h, w)."""
 
@@ -43,13 +41,13 @@ class FeatureOptions:
     """Which features.
 
     Attributes:
-        block: Name of a block in the UNet.
+        block: Name of a block in the UNet; what comes out of ``BLOCK`` is mixed over time.
         sigma: Standard deviation of the noise on the latents, whose own is about 1.
         channels: Principal components that are kept.
     """
 
     block: str = BLOCK
-    sigma: float = 0.3
+    sigma: float = SIGMA
     channels: int = CHANNELS
 
 
@@ -126,7 +124,7 @@ def video_features(
         tell = counted(progress, len(windows))
         values = extract(engine, SCALE * torch.cat(coded), resized, windows, chosen, seed=seed, tell=tell)
     engine.free()
-    values, said = _onto_clip(values, (width, height))
+    values, said = onto_frames(values, (width, height))
     if seen_size != (width, height):
         shown = f"{seen_size[0]}x{seen_size[1]} instead of {width}x{height}"
         said = (f"The video model saw the frames at {shown}.", *said)
@@ -208,25 +206,3 @@ def _nearest(size: tuple[int, int]) -> tuple[int, int]:
 def _resize(frame: UInt8[np.ndarray, "h w 3"], size: tuple[int, int]) -> UInt8[np.ndarray, "h2 w2 3"]:
     rule = cv2.INTER_AREA if frame.shape[1] > size[0] else cv2.INTER_CUBIC
     return np.asarray(cv2.resize(frame, size, interpolation=rule), dtype=np.uint8)
-
-
-def _onto_clip(
-    values: Float16[np.ndarray, "f h w c"], size: tuple[int, int]
-) -> tuple[Float16[np.ndarray, "f h2 w2 c"], Sequence[str]]:
-    """The features on a grid that divides the frames, and what to say about it."""
-    height, width = (_divisor(side, own) for side, own in zip(size[::-1], values.shape[1:3], strict=True))
-    if (height, width) == values.shape[1:3]:
-        return values, ()
-    resized = [
-        np.asarray(cv2.resize(one.astype(np.float32), (width, height)), dtype=np.float16) for one in values
-    ]
-    note = (
-        f"The features of the video model are resized from {values.shape[2]}x{values.shape[1]} to "
-        f"{width}x{height}, which divides the frames."
-    )
-    return np.stack(resized).reshape(len(values), height, width, -1), (note,)
-
-
-def _divisor(side: int, wanted: int) -> int:
-    """The divisor of a side that is nearest to the wanted number."""
-    return min((n for n in range(1, side + 1) if side % n == 0), key=lambda n: (abs(n - wanted), -n))

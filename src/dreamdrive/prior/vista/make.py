@@ -13,11 +13,12 @@ from dreamdrive.data.select import Selection, held_out_mask
 from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
+from dreamdrive.prior.early_features import BLOCK
 from dreamdrive.prior.path import STEERING_RATIO, asked_path, path_by_rounds, wanted_path, waypoints_by_round
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.engine import Engine
-from dreamdrive.prior.vista.features import BLOCK, Window, extract
+from dreamdrive.prior.vista.features import Window, extract
 from dreamdrive.prior.vista.kinds import SVD, Kind
 from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images

@@ -1,6 +1,6 @@
 """The networks of SVD and Vista: diffusers' own, with what Vista adds. Importing this loads diffusers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import torch
@@ -94,15 +94,3 @@ def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
         if part == "vae":
             return AutoencoderKLTemporalDecoder(**known)
         return CLIPVisionModelWithProjection(CLIPVisionConfig(**known))
-
-
-def watch(unet: VideoUNet, name: str, keep: Callable[[Tensor], None]) -> Any:
-    """Hand over what a block such as ``down_blocks.1.attentions.1`` makes each time it runs (B T, C, h, w).
-
-    What comes back is to be removed afterwards by its ``remove()``.
-    """
-
-    def hand_over(module: nn.Module, args: object, output: Any) -> None:
-        keep(output if isinstance(output, Tensor) else output[0])
-
-    return unet.get_submodule(name).register_forward_hook(hand_over)

@@ -1,0 +1,167 @@
+"""Scenes of data sets as streets: what map-conditioned priors are given."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.logs import ego, log
+
+from dreamdrive.data import log_of, read_dataset
+from dreamdrive.data.layout_file import write_layout
+from dreamdrive.data.lidar_file import read_points
+from dreamdrive.data.log_layout import layout_of_log
+from dreamdrive.data.nuscenes import write_nuscenes
+from dreamdrive.errors import InputError
+from dreamdrive.prior.street import map_from_cameras, read_street, told_of_street, wanted_frames
+from dreamdrive.prior.street_world import street_world
+from dreamdrive.run import digest
+from dreamdrive.run.cost import Planned, plan
+from dreamdrive.run.request import digest_of_log, request_of
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.layout import track_function
+from dreamdrive.scene.log import LogMap
+from dreamdrive.world import draw_street
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set, to be read only."""
+    folder = tmp_path_factory.mktemp("streets")
+    write_nuscenes([log(folder / "made")], folder / "set", read_points)
+    return folder / "set"
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A data set that may be changed."""
+    write_nuscenes([log(tmp_path / "made")], tmp_path / "set", read_points)
+    return tmp_path / "set"
+
+
+def test_a_scene_is_a_street_with_the_cameras_that_are_asked_for(shared: Path) -> None:
+    street = read_street(Control(), shared)
+    drive = log_of(Control(shared))
+    assert drive is not None
+    assert street.layout == layout_of_log(drive)
+    assert street.name == "the scene scene-0001 of set"
+    assert [camera.name for camera in street.cameras] == ["CAM_FRONT"]
+    both = read_street(Control(), shared, without="all")
+    assert [camera.name for camera in both.cameras] == ["CAM_FRONT", "CAM_BACK_LEFT"]
+    back = read_street(Control(cameras="back_left"), shared, without="all")
+    assert [camera.name for camera in back.cameras] == ["CAM_BACK_LEFT"]
+
+
+def test_a_layout_has_no_scenes_and_a_folder_without_any_is_none(tmp_path: Path) -> None:
+    write_layout(draw_street(3), tmp_path / "street.json")
+    assert read_street(Control(), tmp_path / "street.json").log is None
+    with pytest.raises(InputError, match=r"^--scene and --cameras choose of a data set, and .*street\.json"):
+        read_street(Control(scene="0", cameras="all"), tmp_path / "street.json")
+    with pytest.raises(InputError, match="is a folder that holds no scenes with maps and boxes; expected a"):
+        read_street(Control(), tmp_path)
+    with pytest.raises(InputError, match="--cameras choose of a data set, and there is no input"):
+        street_world(Control(cameras="all"))
+
+
+def test_a_scene_ends_with_its_last_label(shared: Path) -> None:
+    street = read_street(Control(), shared)
+    assert wanted_frames(Control(), 24, 10.0, street) == range(11)
+    assert wanted_frames(Control(frames="2:"), 4, 10.0, street) == range(2, 6)
+    assert wanted_frames(Control(frames="-3:"), 24, 10.0, street) == range(8, 11)
+    with pytest.raises(InputError, match=r"asks for frame 11, but the scene .* has only 11 frames"):
+        wanted_frames(Control(frames="0:12"), 24, 10.0, street)
+    with pytest.raises(InputError, match="selects no frame: the scene scene-0001 of set has 11 frames at 10"):
+        wanted_frames(Control(frames="11:"), 24, 10.0, street)
+    with pytest.raises(InputError, match="--fps 0: expected more than 0"):
+        wanted_frames(Control(), 24, 0.0, street)
+
+
+def test_cameras_stand_where_they_are_mounted(shared: Path) -> None:
+    street = read_street(Control(), shared, without="all")
+    times_s = np.array([0.0, 0.5])
+    poses = map_from_cameras(street, times_s)
+    assert poses.shape == (2, 2, 4, 4)
+    mounted = [camera.ego_from_camera for camera in street.cameras]
+    for pose in poses:
+        np.testing.assert_allclose(
+            np.linalg.inv(pose[0]) @ pose[1], np.linalg.inv(mounted[0]) @ mounted[1], atol=1e-9
+        )
+    path = track_function(street.layout.ego.track)(times_s)
+    np.testing.assert_allclose(poses[:, 0, :2, 3], path[:, :2], atol=1e-9)
+    np.testing.assert_allclose(poses[:, 0, 2, 3], 1.4)
+    whole = np.stack([ego(t) @ mounted[0] for t in times_s])  # its car is level, too
+    np.testing.assert_allclose(poses[:, 0, :3, :3], whole[:, :3, :3], atol=1e-6)
+
+
+def test_frames_have_the_pinholes_of_the_recording(shared: Path) -> None:
+    """And its mountings and poses, up to the tilt of a car that is level here as well."""
+    asked = Control(shared, cameras="all", frames="0:3", size=(32, 24))
+    clip = street_world(asked)
+    read = read_dataset(asked)
+    assert [camera.matrix.tolist() for camera in clip.rig] == [camera.matrix.tolist() for camera in read.rig]
+    for made, real in zip(clip.rig, read.rig, strict=True):
+        np.testing.assert_allclose(made.world_from_camera, real.world_from_camera)
+    assert clip.frames.shape == (6, 24, 32, 3)
+    assert clip.camera.tolist() == [0, 1] * 3
+    np.testing.assert_allclose(clip.times_s, np.repeat([0.0, 0.1, 0.2], 2))
+    assert clip.known.intrinsics
+    assert clip.known.world_from_camera is not None
+    assert read.known.world_from_camera is not None
+    later = read_dataset(replace(asked, frames="1:4"))  # the recording starts 0.1 s before time 0
+    assert later.known.world_from_camera is not None
+    front, real = (each.known.world_from_camera[::2] for each in (clip, later))  # the others are late
+    np.testing.assert_allclose(front, real, atol=2e-3)
+    assert clip.provenance["cameras"] == ["CAM_FRONT", "CAM_BACK_LEFT"]
+    one = street_world(replace(asked, cameras=None))
+    assert (one.rig[0].world_from_camera == np.eye(4)).all()
+    np.testing.assert_array_equal(one.frames, clip.frames[::2])
+
+
+def test_what_a_scene_does_not_tell_is_said(shared: Path) -> None:
+    notes = " ".join(street_world(Control(shared, frames="0:1", size=(32, 24))).provenance["notes"])
+    assert (
+        "simulated: frames of the scene scene-0001 of set, handed over with exact intrinsics and poses"
+        in notes
+    )
+    assert "has no carpark_area, ped_crossing, road_divider: they are not drawn" in notes
+    assert "of these kinds are not drawn: movable_object.trafficcone" in notes
+
+
+def test_without_a_map_all_is_grass(own: Path) -> None:
+    for name in ("map", "log"):
+        (own / "v1.0-mini" / f"{name}.json").unlink()
+    notes = street_world(Control(own, frames="0:1", size=(32, 24))).provenance["notes"]
+    assert any("walkway" in note and "all ground is grass" in note for note in notes)
+
+
+def test_boxes_map_and_calibration_count_and_pictures_do_not(own: Path) -> None:
+    control = Control(own)
+    before = digest_of_log(control, "street-world"), digest_of_log(control, "replay")
+    assert request_of(control, prior="street-world").digests["input"] == before[0]
+    drive = log_of(control)
+    assert drive is not None
+    drive.cameras[0].files[0].write_bytes(drive.cameras[0].files[1].read_bytes())
+    after = digest_of_log(control, "street-world"), digest_of_log(control, "replay")
+    assert after[0] == before[0]
+    assert after[1] != before[1]
+    seen = {before[0], digest(told_of_street(replace(drive, map=LogMap())))}
+    for table, key in (("calibrated_sensor", "translation"), ("sample_annotation", "size")):
+        file = own / "v1.0-mini" / f"{table}.json"
+        rows = json.loads(file.read_text())
+        for row in rows:
+            row[key] = [value + 0.1 for value in row[key]]
+        file.write_text(json.dumps(rows))
+        seen.add(digest_of_log(control, "street-world"))
+    assert len(seen) == 4
+
+
+def test_a_layout_has_the_digest_of_its_file(tmp_path: Path) -> None:
+    write_layout(draw_street(3), tmp_path / "street.json")
+    assert digest_of_log(Control(tmp_path / "street.json"), "street-world") is None
+
+
+def test_the_cost_is_that_of_the_scene(shared: Path) -> None:
+    planned = plan(Control(shared, cameras="all", frames="0:10:3"), "street-world")
+    assert planned == Planned(4, 2, (64, 48), None, 0, 3, chosen=True)
+    assert plan(Control(shared), "street-world") == Planned(11, 1, (64, 48), None, 0, 1, chosen=True)
