@@ -62,8 +62,7 @@ def _compared(ours: dict[str, Log], theirs: dict[str, Any]) -> dict[str, Any]:
         frames += 1
         if Path(shot["file"]).resolve() != camera.files[row].resolve():
             wrong.append(shot["file"])
-        k = camera.pinhole.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
-        worst_px = max(worst_px, float(np.abs(k - shot["k"]).max()))
+        worst_px = max(worst_px, float(np.abs(camera.pinhole.index_matrix - shot["k"]).max()))
         step = int(np.abs(log.times_s - camera.times_s[row]).argmin())
         pose = camera.world_from_camera[row]
         for track in log.boxes:

@@ -48,7 +48,7 @@ def warped_samples(
             pose = ego @ camera.ego_from_camera
             source = camera.pinhole.at(camera.world_from_camera[row])
             picture = warp(read_image(camera.files[row]).rgb, source, camera.pinhole.at(pose), ego[2, 3])
-            k = camera.pinhole.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+            k = camera.pinhole.index_matrix
             picture, k = prepare_picture(picture, k, image)
             pictures.append(picture)
             intrinsics.append(k)

@@ -12,7 +12,7 @@ from dreamdrive.data.nuscenes import write_points
 from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap
+from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, box_corners
 from dreamdrive.scene.visibility import View, level_of, share_seen
 
 KEY_S = 0.5
@@ -140,8 +140,7 @@ def _camera(
 def _label(box: Moved, step: int, views: Sequence[View], points: Float[np.ndarray, "n 3"]) -> tuple[int, int]:
     """The level of visibility of a box, and how many points lie in it."""
     pose, half = box.world_from_box[step], box.size_lwh_m / 2
-    signs = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
-    corners = (signs * half) @ pose[:3, :3].T + pose[:3, 3]
+    corners = box_corners(pose, box.size_lwh_m)
     inside = (np.abs((points - pose[:3, 3]) @ pose[:3, :3]) <= half).all(axis=1)
     return level_of(share_seen(corners, views)), int(inside.sum())
 

@@ -87,7 +87,7 @@ def _sample(
         row = int(np.abs(camera.times_s - time_s).argmin())
         if abs(camera.times_s[row] - time_s) > _NEAR_S:
             raise InputError(f"{log.name}: {camera.name} has no picture at {time_s:g} s")
-        k = camera.pinhole.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+        k = camera.pinhole.index_matrix
         picture, k = prepare_picture(read_image(camera.files[row]).rgb, k, image)
         pictures.append(picture)
         intrinsics.append(k)

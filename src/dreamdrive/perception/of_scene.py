@@ -19,7 +19,7 @@ from dreamdrive.perception.of_log import annotations_at, in_order, road_map
 from dreamdrive.perception.options import ImageSize
 from dreamdrive.perception.raster import bev_labels
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import Log, LogCamera, LogMap, OfLog
+from dreamdrive.scene.log import Log, LogCamera, LogMap, OfLog, box_corners
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.scene.visibility import View, level_of, share_seen
@@ -146,7 +146,7 @@ def _sample(
         camera_from_level_ego(place.world_from_ego @ camera.ego_from_camera, place.world_from_ego)
         for camera in cameras
     ]
-    k = np.stack([each.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]] for each in pinholes])
+    k = np.stack([each.index_matrix for each in pinholes])
     sample = BevSample(
         np.stack(pictures),
         k.astype(np.float32),
@@ -198,7 +198,7 @@ def _apart(one: Place, other: Place, options: PathOptions) -> bool:
 def _pinhole(camera: LogCamera, image: ImageSize) -> Camera:
     """A camera whose pictures are as ``prepare_picture`` would make them."""
     height = image.height_px + image.cropped_px
-    k = camera.pinhole.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    k = camera.pinhole.index_matrix
     k[0] *= image.width_px / camera.pinhole.width_px
     k[1] *= height / camera.pinhole.height_px
     cx, cy = k[0, 2] + 0.5, k[1, 2] + 0.5 - image.cropped_px
@@ -217,11 +217,6 @@ def _seen(log: Log, place: Place, views: list[View]) -> dict[str, int]:
     for track in log.boxes:
         pose = track.pose_at(place.time_s)
         if pose is not None and np.linalg.norm(pose[:2, 3] - place.world_from_ego[:2, 3]) < NEAR_M:
-            corners = _corners(pose, track.size_lwh_m[track.row_at(place.time_s)])
+            corners = box_corners(pose, track.size_lwh_m[track.row_at(place.time_s)])
             levels[track.id] = level_of(share_seen(corners, views))
     return levels
-
-
-def _corners(pose: Float[np.ndarray, "4 4"], size: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "8 3"]:
-    signs = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
-    return (signs * size / 2) @ pose[:3, :3].T + pose[:3, 3]

@@ -81,6 +81,11 @@ class Camera:
         )
 
     @property
+    def index_matrix(self) -> Float[np.ndarray, "3 3"]:
+        """Intrinsic matrix (3, 3) where the centre of the top-left pixel is at 0, as OpenCV counts."""
+        return self.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+
+    @property
     def camera_from_world(self) -> Float[np.ndarray, "4 4"]:
         """Inverse of the pose (4, 4)."""
         rotation = self.world_from_camera[:3, :3]

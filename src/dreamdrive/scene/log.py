@@ -88,12 +88,18 @@ class BoxTrack:
         return int(np.abs(self.times_s - time_s).argmin())
 
     def corners(self, row: int) -> Float[np.ndarray, "8 3"]:
-        """Corners in the world: ahead left, ahead right, behind right, behind left; above, then below."""
-        x, y, z = self.size_lwh_m[row] / 2
-        flat = np.array([[x, y], [x, -y], [-x, -y], [-x, y]])
-        box = np.vstack([np.column_stack([flat, np.full(4, height)]) for height in (z, -z)])
-        pose = self.world_from_box[row]
-        return box @ pose[:3, :3].T + pose[:3, 3]
+        """Its corners at a label, see ``box_corners``."""
+        return box_corners(self.world_from_box[row], self.size_lwh_m[row])
+
+
+def box_corners(
+    world_from_box: Float[np.ndarray, "4 4"], size_lwh_m: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "8 3"]:
+    """Corners in the world: ahead left, ahead right, behind right, behind left; above, then below."""
+    x, y, z = size_lwh_m / 2
+    flat = np.array([[x, y], [x, -y], [-x, -y], [-x, y]])
+    box = np.vstack([np.column_stack([flat, np.full(4, height)]) for height in (z, -z)])
+    return box @ world_from_box[:3, :3].T + world_from_box[:3, 3]
 
 
 @dataclass(frozen=True)

@@ -123,9 +123,8 @@ class _Writer:
         return self.log.start_us + round(float(time_s) * 1e6)
 
     def _camera(self, camera: LogCamera) -> None:
-        k, pinhole = np.eye(3), camera.pinhole
-        k[0], k[1] = (pinhole.fx_px, 0, pinhole.cx_px - 0.5), (0, pinhole.fy_px, pinhole.cy_px - 0.5)
-        mounted = self._mounted(camera.name, "camera", camera.ego_from_camera, k.tolist())
+        pinhole = camera.pinhole
+        mounted = self._mounted(camera.name, "camera", camera.ego_from_camera, pinhole.index_matrix.tolist())
         ego = camera.world_from_camera @ np.linalg.inv(camera.ego_from_camera)
         shots = [
             self._shot(camera.name, mounted, t, pose, bool(key), file.suffix.lstrip("."))
