@@ -8,7 +8,8 @@
 For each scene of a data set ``generate`` makes a scene of Gaussians per representation. All of a scene share
 frames, looks, geometry, seeds and static fit, and take the same steps. Each is rendered along the novel
 trajectories at the recorded times, at the size of the clip, as PNG. ``shift`` stands for two of them,
-``--shift-m`` to the left and to the right; underscores may stand for hyphens.
+``--shift-m`` to the left and to the right; underscores may stand for hyphens. ``hybrid-standing`` is hybrid
+whose street always stands, as the paper's does; that of hybrid drifts where single frames explain it better.
 
 What is compared: the real set is the recorded pictures of the first camera, those of ``--frames``, brought to
 the size of the clip, held-out ones too. The fake set is the renders of one representation, all novel

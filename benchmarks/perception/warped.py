@@ -13,14 +13,13 @@ from dreamdrive.perception import (
     ImageSize,
     PathOptions,
     SampleNote,
-    annotations_at,
     bev_labels,
     draw_places,
     prepare_picture,
 )
 from dreamdrive.perception.bev_set import cameras_of, note_of
 from dreamdrive.perception.inputs import camera_from_level_ego
-from dreamdrive.perception.of_log import in_order, road_map
+from dreamdrive.perception.of_log import annotation_of, boxes_at, in_order, road_map
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import Log
 
@@ -53,7 +52,7 @@ def warped_samples(
             pictures.append(picture)
             intrinsics.append(k)
             extrinsics.append(camera_from_level_ego(pose, ego))
-        boxes = annotations_at(log, time_s)
+        boxes = [annotation_of(track, pose, time_s) for track, pose in boxes_at(log, time_s)]
         labels = bev_labels(grid, ego, boxes, map)
         sample = BevSample(np.stack(pictures), np.stack(intrinsics), np.stack(extrinsics), labels)
         note = note_of(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast, get_args
 
 import numpy as np
 from jaxtyping import UInt8
@@ -9,6 +10,7 @@ from jaxtyping import UInt8
 from dreamdrive.choices import RepresentationName
 from dreamdrive.data import dataset_of, log_of, read_dataset
 from dreamdrive.data.logs import choose_shots
+from dreamdrive.decompose import DriftOptions
 from dreamdrive.errors import InputError
 from dreamdrive.options import Options
 from dreamdrive.prior import choose_prior
@@ -16,6 +18,10 @@ from dreamdrive.run import Request, request_of
 from dreamdrive.scene.control import Control
 
 ALL = "all"
+STANDING = "hybrid-standing"
+"""Hybrid whose street always stands, as the paper's does; that of hybrid drifts where frames ask for it."""
+ROWS: tuple[str, ...] = (*get_args(RepresentationName), STANDING)
+"""What has a row in the table."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +59,12 @@ class Case:
         kept = {name: getattr(self.recorded, name) for name in ("size", "hold_out")}
         return Control(**{k: v for k, v in (told | kept).items() if k in prior.takes})
 
-    def request(self, representation: RepresentationName) -> Request:
+    def request(self, row: str) -> Request:
         """All that a scene follows from but the program."""
-        options = replace(self.options, representation=representation)
+        if row == STANDING:
+            options = replace(self.options, representation="hybrid", drift=DriftOptions(allowed=False))
+        else:
+            options = replace(self.options, representation=cast(RepresentationName, row))
         return request_of(self.control(), prior=self.prior, weights=self.weights, options=options)
 
     def real(self, size: tuple[int, int]) -> UInt8[np.ndarray, "f h w 3"]:

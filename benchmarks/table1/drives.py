@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import UInt8
 
 from common.keep import is_current, save
-from dreamdrive.choices import RepresentationName
 from dreamdrive.data.source import open_source
 from dreamdrive.drive import MANOEUVRES, Drive, drives_of
 from dreamdrive.errors import InputError
@@ -61,9 +60,7 @@ def trajectory(scene: Scene, name: str, shift_m: float) -> Trajectory:
     return Trajectory(drive.path.at(times_s), times_s)
 
 
-def rendered(
-    made: Made, representation: RepresentationName, name: str, shift_m: float, runs: Path
-) -> Pictures:
+def rendered(made: Made, representation: str, name: str, shift_m: float, runs: Path) -> Pictures:
     """The pictures of a drive, from the disk if they are there."""
     key = digest([made.key, name, shift_m if name in SHIFTS else None])
     folder = runs / "rendered" / representation / f"{made.folder.parent.name}-{name}"

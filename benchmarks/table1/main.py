@@ -12,20 +12,20 @@ from common.keep import Features
 from common.machine import describe_machine
 from common.options import parser_of
 from common.report import publish
-from dreamdrive.choices import DeviceName, RepresentationName
+from dreamdrive.choices import DeviceName
 from dreamdrive.cli.arguments import parse_size
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate import WeightFiles
 from dreamdrive.evaluate.extractors import Toolbox, open_toolbox
 from dreamdrive.options import QUALITIES
+from dreamdrive.run import program_digest
 from dreamdrive.scene.control import Control
-from table1.case import Case, scene_names
+from table1.case import ROWS, Case, scene_names
 from table1.drives import RECORDED, chosen, kept_real, rendered
 from table1.measure import Ruler, row_of
 from table1.scenes import made
 from table1.tables import IMAGE, VIDEO, network_of, tables
 
-REPRESENTATIONS: tuple[RepresentationName, ...] = get_args(RepresentationName)
 LEAST_WINDOW = 9
 """Pictures that I3D needs."""
 
@@ -51,7 +51,7 @@ def options_of(doc: str | None = None) -> argparse.ArgumentParser:
     add("--hold-out", type=int, metavar="N", help="withhold every N-th picture")
     add("--prior", default="replay", metavar="NAME", help="what makes the frames (default: the recording)")
     add("--weights", metavar="W", help="of the prior")
-    add("--representations", nargs="+", choices=REPRESENTATIONS, default=REPRESENTATIONS, metavar="NAME")
+    add("--representations", nargs="+", choices=ROWS, default=ROWS, metavar="NAME")
     add("--trajectories", nargs="+", default=["shift", "lane-left"], metavar="NAME")
     add("--shift-m", type=float, default=2.0, metavar="M", help="of shift, to either side")
     add("--inception", type=Path, metavar="FILE", help="weights of FID")
@@ -139,7 +139,7 @@ def _measured(
 
 def measure(
     case: Case,
-    representation: RepresentationName,
+    representation: str,
     names: Sequence[str],
     ruler: Ruler,
     args: argparse.Namespace,
@@ -147,7 +147,8 @@ def measure(
     """Make a scene, render its drives and take the features of all pictures; each is kept."""
     runs = args.runs
     scene = made(case, representation, runs)
-    width, height = scene.record["size"]
+    record = scene.record | {"drifts": scene.load().drifts}
+    width, height = record["size"]
     real = kept_real(case.real((width, height)), runs / "real" / case.name)
     features = runs / "features"
     fake: dict[str, Features] = {}
@@ -155,7 +156,7 @@ def measure(
         pictures = rendered(scene, representation, name, args.shift_m, runs)
         file = features / representation / f"{case.name}-{name}.json"
         fake[name] = ruler.features(pictures, file)
-    return Measured(ruler.features(real, features / "real" / f"{case.name}.json"), fake, scene.record)
+    return Measured(ruler.features(real, features / "real" / f"{case.name}.json"), fake, record)
 
 
 def report_of(
@@ -169,12 +170,15 @@ def report_of(
         drives = {drive: [each.fake[drive] for each in chosen_scenes] for drive in (*novel, RECORDED)}
         real = [each.real for each in chosen_scenes]
         row = row_of(real, drives, novel, ruler.toolbox, args.resamples)
-        rows[name] = row | {"held_out": held_out([each.record for each in chosen_scenes])}
+        records = [each.record for each in chosen_scenes]
+        drifting = sum(each["drifts"] for each in records)
+        rows[name] = row | {"held_out": held_out(records), "drifting": drifting}
     made_of = {rep: {name: one.record for name, one in each.items()} for rep, each in found.items()}
     sizes = [each["size"] for scenes in made_of.values() for each in scenes.values()]
     networks = {each.frechet: ruler.toolbox.weights[each.frechet] for each in ruler.toolbox.extractors}
     return {
         "machine": describe_machine(),
+        "program": program_digest(),
         "dataset": args.dataset.name,
         "scenes": common,
         "asked": asked(args, novel),
@@ -188,7 +192,17 @@ def report_of(
 
 def asked(args: argparse.Namespace, novel: Sequence[str]) -> dict[str, Any]:
     """The options that figures follow from."""
-    names = ("cameras", "frames", "size", "hold_out", "prior", "quality", "shift_m", "window", "stride")
+    names = (
+        "cameras",
+        "frames",
+        "size",
+        "hold_out",
+        "prior",
+        "quality",
+        "shift_m",
+        "window",
+        "stride",
+    )
     chosen_options = {name: getattr(args, name) for name in names}
     weights = None if args.weights is None else Path(args.weights).name
     return {**chosen_options, "weights": weights, "resamples": args.resamples, "trajectories": list(novel)}

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from common.keep import is_current, load, save
-from dreamdrive.choices import RepresentationName
 from dreamdrive.files.json_file import read_json
 from dreamdrive.pipeline import generate
 from dreamdrive.run import REPORT, digest, program_digest
@@ -37,7 +36,7 @@ class Made:
         return load_scene(self.folder)
 
 
-def made(case: Case, representation: RepresentationName, runs: Path) -> Made:
+def made(case: Case, representation: str, runs: Path) -> Made:
     """The scene of a representation, from the disk if it is there.
 
     All of a case are made in one folder, so that the stages of ``SHARED`` are computed once; a copy of each

@@ -12,6 +12,7 @@ PAPER = {
     "deformable": ("Deformable Gaussians", 65.29, 450.43),
     "hexplane": ("Street Gaussians (S3)", 61.19, 456.56),
     "hybrid": ("DreamDrive", 45.59, 374.02),
+    "hybrid-standing": ("DreamDrive", 45.59, 374.02),
 }
 """Name, FID and FVD of Table I; vibration has no row there."""
 
@@ -86,8 +87,8 @@ def _compared(report: Report, networks: Sequence[Network]) -> str:
     of = f"the scene {scenes[0]}" if len(scenes) == 1 else f"{len(scenes)} scenes"
     lines = [
         f"Of {report['dataset']} {of}, prior {asked['prior']}, {asked['quality']}, {width}x{height}. Each "
-        f"row compares {counts}, a window every {asked['stride']}; novel trajectories are "
-        f"{', '.join(asked['trajectories'])}, shifts by {asked['shift_m']:g} m.",
+        f"row compares {counts}, one every {asked['stride']}; novel trajectories are "
+        f"{', '.join(asked['trajectories'])}; a shift is {asked['shift_m']:g} m.",
         *(_said_of(network, report["weights"][network.frechet]["file"]) for network in networks),
     ]
     return " ".join(lines)
@@ -111,7 +112,7 @@ def _main(report: Report, networks: Sequence[Network]) -> str:
     head += ["the paper's FID / FVD"]
     lines: list[list[str]] = []
     for name, row in report["rows"].items():
-        cells = [name]
+        cells = [f"{name}{_drifting(row['drifting'], len(report['scenes']))}"]
         for n in networks:
             novel = row["novel"][n.frechet]
             cells.append(_figure(novel["value"]) + span(novel["low"], novel["high"], ".4g"))
@@ -122,6 +123,12 @@ def _main(report: Report, networks: Sequence[Network]) -> str:
             cells.append(NONE if found is None else f"{found['psnr']:.2f} / {found['ssim']:.3f}")
         lines.append([*cells, _of_paper(name)])
     return table(head, lines)
+
+
+def _drifting(count: int, scenes: int) -> str:
+    """What is said of scenes whose street is no street that stands."""
+    of = "" if scenes == 1 else f" in {count} of {scenes}"
+    return f" (street drifts{of})" if count else ""
 
 
 def _of_paper(name: str) -> str:

@@ -141,5 +141,5 @@ def test_sizes_of_samples_are_checked(run: Run, folder: Path, tmp_path: Path) ->
     assert "--cells 2: expected 8 or more" in run(*made, "--cells", 2).err
     assert (
         "is neither a scene nor a data set with labels"
-        in run("dataset", "make", tmp_path, "-o", tmp_path / "set").err
+        in run("dataset", "make", tmp_path, "-o", tmp_path / "samples").err
     )

@@ -31,13 +31,14 @@ def export(
     console = Console(highlight=False, markup=False, soft_wrap=True)
     if to == "nuscenes":
         _export_nuscenes(out, output, force)
-    else:
-        from dreamdrive.export import export_ply, left_out_of_ply
+        console.print(str(output))
+        return
+    from dreamdrive.export import export_ply, left_out_of_ply
 
-        scene = open_scene(out)
-        export_ply(scene, output)
-        console.print(left_out_of_ply(scene, output))
+    scene = open_scene(out)
+    export_ply(scene, output)
     console.print(str(output))
+    console.print(left_out_of_ply(scene, output))
 
 
 def _export_nuscenes(out: Path, output: Path, force: bool) -> None:

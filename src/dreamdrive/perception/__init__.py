@@ -8,7 +8,7 @@ from dreamdrive.perception.inputs import BevSample, as_batch, camera_from_level_
 from dreamdrive.perception.losses import LossOptions, bev_losses, focal_loss
 from dreamdrive.perception.metric import THRESHOLDS, IouCounts, bev_counts, iou_counts
 from dreamdrive.perception.network import Backbone, BevPrediction, CrossViewTransformer
-from dreamdrive.perception.of_log import annotations_at, samples_of_log
+from dreamdrive.perception.of_log import samples_of_log
 from dreamdrive.perception.of_scene import PathOptions, draw_places, samples_of_scene, span_of
 from dreamdrive.perception.options import QUICK, SMALL, BevClass, CvtOptions, ImageSize, Trunk
 from dreamdrive.perception.raster import LAYERS, NO_VEHICLE, Annotation, BevLabels, bev_labels, flat_pose

@@ -1,9 +1,10 @@
 """Samples of recorded drives: pictures as they are, labels from boxes and map."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from dreamdrive.data.images import read_image
 from dreamdrive.errors import InputError
@@ -12,7 +13,7 @@ from dreamdrive.perception.grid import BevGrid
 from dreamdrive.perception.inputs import BevSample, camera_from_level_ego, prepare_picture
 from dreamdrive.perception.options import ImageSize
 from dreamdrive.perception.raster import Annotation, bev_labels
-from dreamdrive.scene.log import Log, LogCamera, LogMap
+from dreamdrive.scene.log import BoxTrack, Log, LogCamera, LogMap
 
 ORDER = ("CAM_FRONT_LEFT", "CAM_FRONT", "CAM_FRONT_RIGHT", "CAM_BACK_LEFT", "CAM_BACK", "CAM_BACK_RIGHT")
 """Of the cameras of nuScenes, as published networks take them."""
@@ -31,20 +32,19 @@ def in_order(log: Log) -> list[LogCamera]:
     return first + [camera for camera in log.cameras if camera.name not in ORDER]
 
 
-def annotations_at(log: Log, time_s: float, seen: Mapping[str, int] | None = None) -> list[Annotation]:
-    """Boxes at a time, between their labels where it lies there.
+def boxes_at(log: Log, time_s: float) -> list[tuple[BoxTrack, Float[np.ndarray, "4 4"]]]:
+    """What is labelled around a time and where it is then, between its labels where the time lies there."""
+    placed = [(track, track.pose_at(time_s)) for track in log.boxes]
+    return [(track, pose) for track, pose in placed if pose is not None]
 
-    ``seen`` tells how visible they are by their ids, in place of the labels; what it lacks is left out.
-    """
-    found: list[Annotation] = []
-    for track in log.boxes:
-        pose = track.pose_at(time_s)
-        if pose is None or (seen is not None and track.id not in seen):
-            continue
-        row = track.row_at(time_s)
-        level = (int(track.visibility[row]) or _UNKNOWN) if seen is None else seen[track.id]
-        found.append(Annotation(track.category, pose, track.size_lwh_m[row], level))
-    return found
+
+def annotation_of(
+    track: BoxTrack, pose: Float[np.ndarray, "4 4"], time_s: float, level: int | None = None
+) -> Annotation:
+    """A box as labels take it; without ``level`` it is as visible as it was labelled."""
+    row = track.row_at(time_s)
+    visibility = (int(track.visibility[row]) or _UNKNOWN) if level is None else level
+    return Annotation(track.category, pose, track.size_lwh_m[row], visibility)
 
 
 def road_map(log: Log) -> LogMap:
@@ -92,7 +92,7 @@ def _sample(
         pictures.append(picture)
         intrinsics.append(k)
         extrinsics.append(camera_from_level_ego(camera.world_from_camera[row], ego))
-    boxes = annotations_at(log, time_s)
+    boxes = [annotation_of(track, pose, time_s) for track, pose in boxes_at(log, time_s)]
     sample = BevSample(
         np.stack(pictures), np.stack(intrinsics), np.stack(extrinsics), bev_labels(grid, ego, boxes, map)
     )

@@ -15,9 +15,9 @@ from dreamdrive.errors import InputError
 from dreamdrive.perception.bev_set import SampleNote, cameras_of, note_of
 from dreamdrive.perception.grid import BevGrid
 from dreamdrive.perception.inputs import BevSample, camera_from_level_ego
-from dreamdrive.perception.of_log import annotations_at, in_order, road_map
+from dreamdrive.perception.of_log import annotation_of, boxes_at, in_order, road_map
 from dreamdrive.perception.options import ImageSize
-from dreamdrive.perception.raster import bev_labels
+from dreamdrive.perception.raster import Annotation, bev_labels
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import Log, LogCamera, LogMap, OfLog, box_corners
 from dreamdrive.scene.scene import Scene
@@ -141,7 +141,7 @@ def _sample(
         views.append((pinhole.at(pose), np.where(alpha > 0.5, view.depth_m.numpy(), 0.0)))
     if np.mean(covered) < options.least_covered:
         return None
-    boxes = annotations_at(log, place.time_s, _seen(log, place, views))
+    boxes = _boxes(log, place, views)
     extrinsics = [
         camera_from_level_ego(place.world_from_ego @ camera.ego_from_camera, place.world_from_ego)
         for camera in cameras
@@ -211,12 +211,11 @@ def _below_horizon(camera: Camera) -> Bool[np.ndarray, "h w"]:
     return below if below.any() else np.ones_like(below)
 
 
-def _seen(log: Log, place: Place, views: list[View]) -> dict[str, int]:
-    """How visible boxes near the car are, by their ids."""
-    levels: dict[str, int] = {}
-    for track in log.boxes:
-        pose = track.pose_at(place.time_s)
-        if pose is not None and np.linalg.norm(pose[:2, 3] - place.world_from_ego[:2, 3]) < NEAR_M:
+def _boxes(log: Log, place: Place, views: list[View]) -> list[Annotation]:
+    """Boxes near the car, as visible as the views show them."""
+    found: list[Annotation] = []
+    for track, pose in boxes_at(log, place.time_s):
+        if np.linalg.norm(pose[:2, 3] - place.world_from_ego[:2, 3]) < NEAR_M:
             corners = box_corners(pose, track.size_lwh_m[track.row_at(place.time_s)])
-            levels[track.id] = level_of(share_seen(corners, views))
-    return levels
+            found.append(annotation_of(track, pose, place.time_s, level_of(share_seen(corners, views))))
+    return found

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera, check_rigid
-from dreamdrive.scene.trajectory import Trajectory
 
 _NEAR_S = 0.05
 """How far from a label its time still is."""
@@ -79,9 +79,19 @@ class BoxTrack:
 
     def pose_at(self, time_s: float) -> Float[np.ndarray, "4 4"] | None:
         """Where it is at a time, in between its labels; None before the first and after the last."""
-        if not self.times_s[0] - _NEAR_S <= time_s <= self.times_s[-1] + _NEAR_S:
+        times_s = self.times_s
+        if not times_s[0] - _NEAR_S <= time_s <= times_s[-1] + _NEAR_S:
             return None
-        return Trajectory(self.world_from_box, self.times_s).at(np.array([time_s]))[0]
+        after = int(np.searchsorted(times_s, time_s))
+        if after in (0, len(times_s)):
+            return self.world_from_box[min(after, len(times_s) - 1)]
+        one, other = self.world_from_box[after - 1 : after + 1]
+        share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1])
+        turned = Rotation.from_matrix(one[:3, :3].T @ other[:3, :3]).as_rotvec()
+        pose = one.copy()
+        pose[:3, :3] = one[:3, :3] @ Rotation.from_rotvec(share * turned).as_matrix()
+        pose[:3, 3] = one[:3, 3] + share * (other[:3, 3] - one[:3, 3])
+        return pose
 
     def row_at(self, time_s: float) -> int:
         """The label that is nearest in time."""

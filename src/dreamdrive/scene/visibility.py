@@ -26,10 +26,15 @@ def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View]) -> floa
         at = local[:, :2] / local[:, 2:] * (camera.fx_px, camera.fy_px) + (camera.cx_px, camera.cy_px)
         if np.abs(at).max() > _FARTHEST_PX:
             continue
-        mask = np.zeros(depth_m.shape, np.uint8)
-        cv2.fillConvexPoly(mask, cv2.convexHull(np.floor(at).astype(np.int32)), 1)
+        cells = np.floor(at).astype(np.int32)
+        low = np.maximum(cells.min(axis=0), 0)
+        part = depth_m[low[1] : max(0, cells[:, 1].max() + 1), low[0] : max(0, cells[:, 0].max() + 1)]
+        if not part.size:
+            continue
+        mask = np.zeros(part.shape, np.uint8)
+        cv2.fillConvexPoly(mask, cv2.convexHull(cells - low), 1)
         inside = mask > 0
-        before = (depth_m > 0) & (depth_m < local[:, 2].min() - _MARGIN_M)
+        before = (part > 0) & (part < local[:, 2].min() - _MARGIN_M)
         covered += int(inside.sum())
         seen += int((inside & ~before).sum())
     return seen / covered if covered else 0.0
