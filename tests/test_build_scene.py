@@ -80,3 +80,10 @@ def test_each_of_several_drives_gets_the_steps_of_one() -> None:
     build_scene(two, replace(TINY, representation="static", knowledge="none"), given=given, run=noted)
     assert asked["static"][0].steps == 2 * TINY.static.steps
     assert asked["fit"][1].steps == 2 * TINY.fit.steps
+
+
+def test_longer_clips_take_more_steps() -> None:
+    chosen = replace(DRAFT, static=replace(DRAFT.static, steps=75, least_visits=3.0))
+    assert chosen.for_frames(24).static.steps == 75
+    assert chosen.for_frames(40).static.steps == 120
+    assert chosen.for_frames(24, drives=2).static.steps == 150

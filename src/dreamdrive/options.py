@@ -1,6 +1,7 @@
 """What ``--quality`` means: one row of numbers a name."""
 
 from dataclasses import dataclass, field, replace
+from math import ceil
 
 from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName
 from dreamdrive.decompose import ActorOptions, DriftOptions, GroupOptions, ScoreOptions
@@ -8,6 +9,7 @@ from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.knowledge import SHIPPED
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
+from dreamdrive.scene.clip import Clip
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,24 @@ class Options:
             return self.network
         return motion.config_type.sized(self.network.width)
 
+    def for_frames(self, frames: int, drives: int = 1) -> "Options":
+        """The options with the steps that a clip takes.
+
+        Args:
+            frames: How many of its frames a fit may see.
+            drives: How many drives from one frame they are of; each gets the steps of one.
+        """
+        fits = {
+            name: replace(each, steps=max(drives * each.steps, ceil(each.least_visits * frames)))
+            for name, each in (("static", self.static), ("fit", self.fit))
+        }
+        return replace(self, **fits)
+
+    def for_clip(self, clip: Clip) -> "Options":
+        """The options with the steps that a clip takes."""
+        drives = len(clip.rig) if clip.known.shared_first else 1
+        return self.for_frames(int((~clip.held_out).sum()), drives)
+
     @property
     def steps(self) -> dict[str, int]:
         """Optimisation steps of each stage: those on Gaussians are the same for all representations.
@@ -95,9 +115,22 @@ def with_method(options: Options, method: MethodName) -> Options:
     )
 
 
+_VISITS = 3.0  # see ``FitOptions.least_visits``
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
 QUALITIES: dict[QualityName, Options] = {
-    "draft": Options(FitOptions(steps=75), ScoreOptions(), FitOptions(steps=150, plane_rate=5e-2)),
-    "standard": Options(FitOptions(steps=150), ScoreOptions(), FitOptions(steps=500)),
-    "high": Options(FitOptions(steps=500), ScoreOptions(steps=300), FitOptions(steps=2500)),
+    "draft": Options(
+        FitOptions(steps=75, least_visits=_VISITS),
+        ScoreOptions(),
+        FitOptions(steps=150, least_visits=_VISITS, plane_rate=5e-2),
+    ),
+    "standard": Options(
+        FitOptions(steps=150, least_visits=_VISITS),
+        ScoreOptions(),
+        FitOptions(steps=500, least_visits=_VISITS),
+    ),
+    "high": Options(
+        FitOptions(steps=500, least_visits=_VISITS),
+        ScoreOptions(steps=300),
+        FitOptions(steps=2500, least_visits=_VISITS),
+    ),
 }

@@ -143,7 +143,7 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     Raises:
         InputError: The clip cannot be used.
     """
-    o = _with_steps(options, len(clip.rig) if clip.known.shared_first else 1)
+    o = options.for_clip(clip)
     seed = {name: stage_seed(o.seed, name) for name in ("geometry", "static", "fit")}
     device = torch.device(o.device)
     weights = None if o.knowledge == NO_KNOWLEDGE else file_digest(weights_of(o.knowledge))
@@ -185,12 +185,6 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
         ),
         check=partial(check.scene, clip),
     )
-
-
-def _with_steps(options: Options, drives: int) -> Options:
-    """Options by which each of several drives gets the steps of one."""
-    fits = {name: getattr(options, name) for name in ("static", "fit")}
-    return replace(options, **{name: replace(each, steps=drives * each.steps) for name, each in fits.items()})
 
 
 def _completed(clip: Clip, scene: Scene) -> Scene:

@@ -51,7 +51,7 @@ def test_a_short_clip_gets_one_line() -> None:
 def test_a_long_clip_that_nobody_shortened_gets_a_cheaper_choice() -> None:
     long = replace(CLIP, frames=160, rate_hz=25.0, size=(480, 270), chosen=False)
     first, second = announcement(long, QUALITIES["standard"], 1)
-    assert first == "160 frames at 480x270 take about 8 min on 1 core, and 4.8 GB of memory"
+    assert first == "160 frames at 480x270 take about 9 min on 1 core, and 4.8 GB of memory"
     assert second == ("That is a long clip: --frames 0:142:3 takes 48 of its frames, in about 2 min 30 s")
     assert len(announcement(replace(long, chosen=True), QUALITIES["standard"], 1)) == 1
     assert len(announcement(replace(long, frames=60), QUALITIES["standard"], 1)) == 1

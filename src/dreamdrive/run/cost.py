@@ -130,7 +130,8 @@ def seconds_of(planned: Planned, options: Options, cores: int) -> float:
     more = frames / m.usual_frames
     geometry = frames * (m.frame + m.frame_megapixel * pixels) * more**m.frame_growth
     step = m.step + m.step_megapixel * pixels * more**m.step_growth
-    fits = step * (options.static.steps + options.fit.steps * REPRESENTATIONS[options.representation].step)
+    o = options.for_frames(frames)
+    fits = step * (o.static.steps + o.fit.steps * REPRESENTATIONS[o.representation].step)
     videos = frames * (m.video + m.video_megapixel * pixels)
     work = m.start + geometry + fits + m.score_megapixel * frames * pixels + videos
     return work * (m.serial + (1 - m.serial) / max(1, cores))

@@ -86,7 +86,7 @@ class Production(Stages):
                 "prior": {"name": request.prior, "why": request.choice.why},
             },
             self.records,
-            request.options.steps,
+            request.options.for_clip(clip).steps,
             score_scene(clip, geometry, scene),
             score_baselines(clip, geometry),
             found_again(clip, scene),
