@@ -18,8 +18,8 @@ def export_scene(scene: Scene, folder: Path, *, replace: bool = False, progress:
     """Write a scene as its own cameras would have recorded it, as a data set of one drive.
 
     Every half second a time is labelled. Boxes are those of actors of which the scene knows kind and size, as
-    far as it knows them: no labels of people. There is no map. Raises ``InputError`` where the scene does not
-    know the height of its camera.
+    it believes them to be: nobody has labelled them, and what never moved has none. There is no map. Raises
+    ``InputError`` where the scene does not know the height of its camera.
     """
     _write(taken_of_scene(scene, folder.stem), folder, replace, progress)
 
