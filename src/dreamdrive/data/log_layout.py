@@ -17,7 +17,7 @@ from dreamdrive.scene.layout import (
     LineKind,
     TrackPoint,
 )
-from dreamdrive.scene.log import BoxTrack, Log, LogCamera, Polygon
+from dreamdrive.scene.log import BoxTrack, Log, LogCamera, Polygon, word_of
 
 REACH_M = 120.0
 """How far from the drive a layout goes: beyond the end of sight of a map-conditioned prior."""
@@ -80,7 +80,7 @@ def layout_of_log(log: Log) -> Layout:
 
 def kind_of(category: str) -> BoxKind | None:
     """What a thing of a category is in a layout; None for what is no road user."""
-    return next((kind for name, kind in KINDS.items() if f"{category}.".startswith(f"{name}.")), None)
+    return word_of(category, KINDS)
 
 
 def clipped(ring: Float[np.ndarray, "n 2"], within: Float[np.ndarray, "2 2"]) -> Float[np.ndarray, "_ 2"]:

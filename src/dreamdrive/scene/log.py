@@ -6,6 +6,7 @@ World of a log: that of the data set, z up, in metres. The ego frame is x ahead,
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -14,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera, check_rigid
 
+Word = TypeVar("Word", bound=str)
 _NEAR_S = 0.05
 """How far from a label its time still is."""
 
@@ -110,6 +112,14 @@ def box_corners(
     flat = np.array([[x, y], [x, -y], [-x, -y], [-x, y]])
     box = np.vstack([np.column_stack([flat, np.full(4, height)]) for height in (z, -z)])
     return box @ world_from_box[:3, :3].T + world_from_box[:3, 3]
+
+
+def word_of(category: str, words: Mapping[str, Word]) -> Word | None:
+    """What a table says of a category, by the beginning of its name; None where it says nothing.
+
+    ``vehicle.bus`` begins ``vehicle.bus.rigid``; ``vehicle.car`` does not begin ``vehicle.carriage``.
+    """
+    return next((word for begins, word in words.items() if f"{category}.".startswith(f"{begins}.")), None)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from dreamdrive.prior.magicdrive.condition import (
 )
 from dreamdrive.prior.street import Street
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, Log, LogCamera
+from dreamdrive.scene.log import BoxTrack, Log, LogCamera, word_of
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world import upright
 
@@ -158,8 +158,7 @@ def of_street(street: Street) -> OfScene:
 def ring_of(cameras: Sequence[LogCamera], car_from_lidar: Float[np.ndarray, "4 4"]) -> Ring:
     """Cameras as calibrated, their pictures scaled to the width of the full picture."""
     full = tuple(map(_full, cameras))
-    told = np.stack([camera.matrix for camera in full])
-    told[:, :2, 2] -= 0.5
+    told = np.stack([camera.index_matrix for camera in full])
     mounted = np.stack([camera.ego_from_camera for camera in cameras])
     return Ring(tuple(camera.name for camera in cameras), told, full, mounted, car_from_lidar)
 
@@ -173,8 +172,7 @@ def clockwise(cameras: Sequence[LogCamera]) -> tuple[LogCamera, ...]:
 
 def class_of(category: str) -> str | None:
     """The network's class of a category of nuScenes; None for what it was never told of."""
-    found = (name for begins, name in CATEGORIES.items() if f"{category}.".startswith(f"{begins}."))
-    return next(found, None)
+    return word_of(category, CATEGORIES)
 
 
 def typical_lidar(front: LogCamera) -> Float[np.ndarray, "4 4"]:
