@@ -8,6 +8,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.contradiction import check, explain
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.clip import Clip, Known
+from dreamdrive.scene.geometry import Ground
 
 PATH = turning(8, 0.4, 2.0)
 
@@ -84,3 +85,23 @@ def test_poses_that_stand_are_refused_where_the_camera_moves(clip: Clip) -> None
     )
     still = replace(given, frames=np.repeat(clip.frames[:1], len(clip), axis=0))
     check(still, observe(still))
+
+
+def test_beside_a_camera_that_is_borne_out_one_pair_that_agrees_is_enough(clip: Clip) -> None:
+    road = Ground(np.array([0.0, -1.0, 0.0]), 1.5)
+    wrong = PATH.copy()
+    wrong[: len(wrong) - 4] = np.linalg.inv(PATH)[: len(wrong) - 4]  # only the last pair is right
+    alone = replace(clip, known=Known(wrong, intrinsics=True))
+    with pytest.raises(InputError, match="contradict the frames"):
+        check(alone, observe(alone))
+    check(replace(clip, known=replace(alone.known, ground=road)), observe(alone))
+    inverted = replace(clip, known=Known(np.linalg.inv(PATH), intrinsics=True, ground=road))
+    with pytest.raises(InputError, match="contradict the frames"):
+        check(inverted, observe(inverted))
+
+
+def test_traffic_before_a_standing_side_camera_contradicts_nothing(clip: Clip) -> None:
+    road = Ground(np.array([0.0, -1.0, 0.0]), 1.5)
+    standing = np.tile(np.eye(4), (len(clip), 1, 1))
+    given = replace(clip, known=Known(standing, intrinsics=True, ground=road))
+    check(given, observe(given))
