@@ -111,13 +111,26 @@ def kitti_camera(path: Path, name: str, picture: tuple[int, int]) -> tuple[Camer
     if matrix.shape != (12,) or not np.isfinite(matrix).all():
         got = ", ".join(rows) or "nothing"
         raise InputError(f"{path}: expected a line {name}: with 12 numbers, got {got}")
-    matrix = matrix.reshape(3, 4)
+    try:
+        return parts_of_projection(matrix.reshape(3, 4), picture)
+    except ValueError as error:
+        raise InputError(f"{path}: {name} is no projection of a camera: {error}") from error
+
+
+def parts_of_projection(
+    matrix: Float[np.ndarray, "3 4"], picture: tuple[int, int]
+) -> tuple[Camera, Float[np.ndarray, "4 4"]]:
+    """The pinhole of a rectified projection of KITTI, and camera_0_from_camera.
+
+    Raises:
+        ValueError: It is none of a camera.
+    """
     beside = np.eye(4)
     try:
         camera = Camera(matrix[0, 0], matrix[1, 1], matrix[0, 2] + 0.5, matrix[1, 2] + 0.5, *picture)
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused below
             beside[:3, 3] = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
-        check_rigid(beside, "its place beside camera 0")
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise InputError(f"{path}: {name} is no projection of a camera: {error}") from error
+    except np.linalg.LinAlgError as error:
+        raise ValueError(str(error)) from error
+    check_rigid(beside, "its place beside camera 0")
     return camera, beside

@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.data.formats.pose_lists import parts_of_projection
 from dreamdrive.data.kitti.files import (
     Mounted,
     Pose,
+    check_mounting,
     entry,
     log_camera,
     missing,
@@ -28,7 +30,6 @@ from dreamdrive.data.kitti.files import (
 from dreamdrive.data.kitti.tracklets import TRACKLETS, read_tracklets
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_text
-from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera
 
 IMU_HEIGHT_M = 0.93
@@ -225,14 +226,11 @@ def _mounted(drive: Path, problems: list[str]) -> list[Mounted]:
             problems.append(f"{name}: no pictures such as 0000000000.png; the camera is left out")
             continue
         try:
-            size = entry(rows, f"S_rect_{name[-2:]}", 2, file)
+            width, height = (int(side) for side in entry(rows, f"S_rect_{name[-2:]}", 2, file))
             p = entry(rows, f"P_rect_{name[-2:]}", 12, file).reshape(3, 4)
-            width, height = (int(side) for side in size)
-            camera = Camera(p[0, 0], p[1, 1], p[0, 2] + 0.5, p[1, 2] + 0.5, width, height)
-            with np.errstate(all="ignore"):  # what is too large is refused
-                place = -np.linalg.solve(p[:, :3], p[:, 3])
-            beside = rigid(np.eye(3), place, f"{file}: P_rect_{name[-2:]}")
-        except (ValueError, np.linalg.LinAlgError) as error:
+            camera, beside = parts_of_projection(p, (width, height))
+            check_mounting(beside, f"{file}: P_rect_{name[-2:]}")
+        except ValueError as error:
             problems.append(f"{name}: no usable calibration ({error}); the camera is left out")
             continue
         found.append(Mounted(name, files, camera, beside))
