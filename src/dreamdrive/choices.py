@@ -24,7 +24,7 @@ DeviceName = Literal["cpu", "cuda"]
 Stage = Literal["prior", "look", "geometry", "initialise", "static", "score", "group", "fit"]
 Show = Literal["colour", "depth", "dynamic", "static"]
 Format = Literal["mp4", "png", "npz"]
-ExportKind = Literal["ply", "nuscenes"]
+ExportKind = Literal["ply", "nuscenes", "ncore"]
 DtypeName = Literal["float16", "float32"]
 Resize = Literal["tf1", "torch", "antialias", "clean"]
 """tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);

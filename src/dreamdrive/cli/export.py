@@ -2,7 +2,7 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, arg
@@ -10,6 +10,13 @@ from tyro.conf import Positional, arg
 from dreamdrive.choices import ExportKind
 from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.errors import InputError
+from dreamdrive.files.paths import inside
+
+if TYPE_CHECKING:
+    from dreamdrive.scene.clip import Clip
+    from dreamdrive.scene.geometry import Geometry
+    from dreamdrive.scene.scene import Scene
 
 
 def export(
@@ -22,23 +29,27 @@ def export(
     """Write a scene or a drawn street in a format that other programs read.
 
     Args:
-        out: The folder that generate wrote; for nuscenes also one of world make.
-        to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar.
+        out: The folder that generate wrote; for nuscenes and ncore also one of world make.
+        to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
+            ncore the clip with its poses for NuRec, 3dgrut and gsplat.
         output: For ply NAME.ply for everything at the first recorded time; else a folder for static.ply and,
-            with everything at each recorded time, frames/NNNN.ply. For nuscenes a folder.
-        force: Replace a data set that is there already.
+            with everything at each recorded time, frames/NNNN.ply. For nuscenes and ncore a folder.
+        force: Replace a data set or sequence that is there already.
     """
     console = Console(highlight=False, markup=False, soft_wrap=True)
     if to == "nuscenes":
         _export_nuscenes(out, output, force)
         console.print(str(output))
-        return
-    from dreamdrive.export import export_ply, left_out_of_ply
+    elif to == "ncore":
+        said = _export_ncore(out, output, force)
+        console.print(f"{output}\n{said}")
+    else:
+        from dreamdrive.export import export_ply, left_out_of_ply
 
-    scene = open_scene(out)
-    export_ply(scene, output)
-    console.print(str(output))
-    console.print(left_out_of_ply(scene, output))
+        scene = open_scene(out)
+        export_ply(scene, output)
+        console.print(str(output))
+        console.print(left_out_of_ply(scene, output))
 
 
 def _export_nuscenes(out: Path, output: Path, force: bool) -> None:
@@ -54,3 +65,57 @@ def _export_nuscenes(out: Path, output: Path, force: bool) -> None:
             export_world(read_drives(out), out.resolve().name, output, replace=force, progress=said)
         else:
             export_scene(open_scene(out), output, replace=force, progress=said)
+
+
+def _export_ncore(out: Path, output: Path, force: bool) -> str:
+    """Write it, and say what its pictures are."""
+    from dreamdrive.export import NCORE_MARK, need_ncore, scene_to_ncore, world_to_ncore
+    from dreamdrive.files.atomic import check_free
+    from dreamdrive.world import is_world, read_drives
+
+    need_ncore()
+    check_free(output, force, NCORE_MARK)
+    with Bars(Console()) as bars:
+        said = partial(bars, "ncore")
+        if is_world(out):
+            world_to_ncore(read_drives(out), output, replace=force, progress=said)
+            return "Pictures, poses and boxes are those of the drawn street."
+        scene = open_scene(out)
+        stages = (out.parent if (out / "scene.json").is_file() else out) / "stages"
+        clip, geometry = _kept(stages, scene)
+        scene_to_ncore(scene, output, clip=clip, geometry=geometry, replace=force, progress=said)
+    if clip is None:
+        return f"Pictures are rendered from the scene: {stages} does not hold its frames."
+    return "Pictures are the frames that the scene was made of."
+
+
+def _kept(stages: Path, scene: "Scene") -> "tuple[Clip | None, Geometry | None]":
+    """What the run kept of clip and geometry; ``InputError`` where they are not those of the scene."""
+    import numpy as np
+
+    from dreamdrive.run import check, codec
+    from dreamdrive.scene.clip import Clip
+    from dreamdrive.scene.geometry import Geometry
+
+    prior, geometry = inside(stages, "prior"), inside(stages, "geometry")
+    if not (prior / codec.JSON_NAME).is_file():
+        return None, None
+    try:
+        clip = codec.read(prior, Clip)
+        check.clip(clip)
+        check.scene(clip, scene)
+        if scene.provenance.source_index not in (None, tuple(clip.source_index.tolist())):
+            raise ValueError("its frames are others")
+        if not (geometry / codec.JSON_NAME).is_file():
+            return clip, None
+        found = codec.read(geometry, Geometry)
+        check.geometry(clip, found)
+        pairs = zip(found.cameras, scene.cameras, strict=True)
+        if not all(np.allclose(a.world_from_camera, b.world_from_camera) for a, b in pairs):
+            raise ValueError("its cameras are elsewhere")
+    except ValueError as error:
+        raise InputError(
+            f"{stages} does not belong to the scene ({error}); run generate again, or let dreamdrive clean "
+            "remove it: pictures are then rendered from the scene"
+        ) from error
+    return clip, found

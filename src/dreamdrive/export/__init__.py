@@ -5,11 +5,19 @@ from pathlib import Path
 
 from dreamdrive.choices import ExportKind
 from dreamdrive.errors import InputError
+from dreamdrive.export.ncore import scene_to_ncore, world_to_ncore
+from dreamdrive.export.ncore_words import need_ncore
+from dreamdrive.export.ncore_writer import MARK as NCORE_MARK
+from dreamdrive.export.ncore_writer import write_ncore
 from dreamdrive.export.nuscenes import export_scene, export_world
 from dreamdrive.export.ply import export_ply, left_out_of_ply, write_ply
 from dreamdrive.scene.scene import Scene
 
-KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {"ply": export_ply, "nuscenes": export_scene}
+KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {
+    "ply": export_ply,
+    "nuscenes": export_scene,
+    "ncore": scene_to_ncore,
+}
 """What ``export --to`` takes."""
 
 

@@ -1,0 +1,82 @@
+"""Generated scenes and drawn streets in NVIDIA NCore V4, which NuRec, 3dgrut and gsplat read."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dreamdrive.errors import InputError
+from dreamdrive.export.ncore_words import need_ncore
+from dreamdrive.export.ncore_writer import NO_MASKS, Masks, write_ncore
+from dreamdrive.export.scene_log import level_frame, taken_of_scene
+from dreamdrive.export.shots import log_of, shots_of_scene, shots_of_world
+from dreamdrive.export.world_log import taken_of_world
+from dreamdrive.progress import Progress, silent
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive, Mount
+
+
+def scene_to_ncore(
+    scene: Scene,
+    folder: Path,
+    *,
+    clip: Clip | None = None,
+    geometry: Geometry | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
+) -> None:
+    """Write the recorded views of a scene, with the scene's poses, actors and depth.
+
+    The first picture of the first camera is the world of the scene. Boxes are those of actors of which kind
+    and size are known. Lidar points are those that the scene's depth shows.
+
+    Args:
+        scene: The scene.
+        folder: To write.
+        clip: What the scene was made of, whose frames are written; without it the scene is rendered. What
+            holds no picture is masked.
+        geometry: Of the clip; what is fixed to its cameras, such as the bonnet, is masked.
+        replace: Take the place of an older folder of this kind.
+        progress: Told of each picture.
+
+    Raises:
+        InputError: The package is missing, the scene does not know the height of its camera, or the clip is
+            of another scene.
+    """
+    need_ncore()
+    if clip is not None and clip.times_s.tolist() != scene.times_s.tolist():
+        raise InputError(f"the clip has {len(clip)} frames, which are not those of the scene; give its own")
+    world_from_scene, _ = level_frame(scene)
+    drive = taken_of_scene(scene, folder.name)
+    shots = shots_of_scene(scene, world_from_scene, clip)
+    names = [camera.name for camera in drive.cameras]
+    hidden = NO_MASKS if clip is None else _hidden(clip, geometry, names)
+    with tempfile.TemporaryDirectory() as scratch:
+        log = log_of(drive, shots, Path(scratch), progress)
+        write_ncore(log, folder, origin="AUTOLABEL", hidden=hidden, replace=replace)
+
+
+def world_to_ncore(
+    drives: Mapping[Mount, Drive], folder: Path, *, replace: bool = False, progress: Progress = silent
+) -> None:
+    """Write a drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
+    need_ncore()
+    drive = taken_of_world(drives, folder.name)
+    with tempfile.TemporaryDirectory() as scratch:
+        log = log_of(drive, shots_of_world(drive), Path(scratch), progress)
+        write_ncore(log, folder, origin="GT_SYNTHETIC", replace=replace)
+
+
+def _hidden(clip: Clip, geometry: Geometry | None, names: Sequence[str]) -> Masks:
+    """What of each camera's frames shows no street: where no picture is, and what is fixed to the camera."""
+    found: dict[str, np.ndarray] = {}
+    for camera, name in zip(dict.fromkeys(clip.camera.tolist()), names, strict=True):
+        hidden = np.asarray(~clip.valid[clip.of_camera(camera)].all(axis=0))
+        if geometry is not None:
+            hidden |= geometry.fixed_regions[camera] > 0
+        if hidden.any():
+            found[name] = hidden
+    return found

@@ -1,0 +1,121 @@
+"""What a log holds, in the words of NVIDIA NCore."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial.transform import Rotation
+
+from dreamdrive.data.picture_file import PICTURE_BYTES, parse_header
+from dreamdrive.errors import InputError
+from dreamdrive.files.paths import read_bytes
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.log import BoxTrack, Log
+
+if TYPE_CHECKING:
+    from ncore.data import CuboidTrackObservation, OpenCVPinholeCameraModelParameters
+
+WORLD, RIG = "world", "rig"
+"""Frames that readers ask for; those of sensors have the sensors' names."""
+Origin = Literal["GT_SYNTHETIC", "AUTOLABEL", "EXTERNAL"]
+"""Where boxes come from: drawn, found by a program, or of a data set."""
+
+
+def need_ncore() -> None:
+    """Raise ``InputError`` where the package of NCore is not installed."""
+    try:
+        import ncore.data.v4  # noqa: F401
+    except ImportError:
+        raise InputError(
+            "NCore is written by the package nvidia-ncore, which is not installed; "
+            "pip install 'dreamdrive[ncore]'"
+        ) from None
+
+
+def path_of(log: Log) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
+    """Where the car was at each picture and each labelled time: microseconds, and poses in the log's world.
+
+    Where several cameras have a picture of one time, the first of them tells.
+
+    Raises:
+        InputError: There is one time only.
+    """
+    places: dict[int, np.ndarray] = {}
+    for camera in log.cameras:
+        poses = camera.world_from_camera @ np.linalg.inv(camera.ego_from_camera)
+        for time_us, pose in zip(stamps(log, camera.times_s).tolist(), poses, strict=True):
+            places.setdefault(time_us, pose)
+    for time_us, pose in zip(stamps(log, log.times_s).tolist(), log.world_from_ego, strict=True):
+        places.setdefault(time_us, pose)
+    if len(places) < 2:
+        raise InputError(
+            f"{log.name} has pictures of one time only; NCore wants a path, of two times or more"
+        )
+    times_us = sorted(places)
+    return np.array(times_us), np.stack([places[each] for each in times_us])
+
+
+def stamps(log: Log, times_s: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Times in microseconds since 1970."""
+    return log.start_us + np.rint(times_s * 1e6).astype(np.int64)
+
+
+def rigid(poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 4 4"]:
+    """The same poses, with last rows that are exact, which NCore asks for."""
+    exact = poses.copy()
+    exact[:, 3] = 0, 0, 0, 1
+    return exact
+
+
+def model_of(pinhole: Camera) -> "OpenCVPinholeCameraModelParameters":
+    """The pinhole, as OpenCV's without distortion: gsplat takes no notice of NCore's ideal ones."""
+    from ncore.data import OpenCVPinholeCameraModelParameters, ShutterType
+
+    return OpenCVPinholeCameraModelParameters(
+        resolution=np.array([pinhole.width_px, pinhole.height_px], np.uint64),
+        shutter_type=ShutterType.GLOBAL,
+        principal_point=np.array([pinhole.cx_px, pinhole.cy_px], np.float32),
+        focal_length=np.array([pinhole.fx_px, pinhole.fy_px], np.float32),
+        radial_coeffs=np.zeros(6, np.float32),
+        tangential_coeffs=np.zeros(2, np.float32),
+        thin_prism_coeffs=np.zeros(4, np.float32),
+    )
+
+
+def picture_of(file: Path, pinhole: Camera) -> tuple[bytes, str]:
+    """The bytes of a picture and their format; ``InputError`` where it is not of the pinhole's size."""
+    data = read_bytes(file, at_most=PICTURE_BYTES)
+    header, wanted = parse_header(data), (pinhole.width_px, pinhole.height_px, 1)
+    if header is None or (header.width_px, header.height_px, header.orientation) != wanted:
+        raise InputError(f"{file}: expected an upright picture of {wanted[0]}x{wanted[1]} pixels")
+    return data, header.kind.lower()
+
+
+def cuboids_of(
+    log: Log, track: BoxTrack, world_from_log: Float[np.ndarray, "4 4"], origin: Origin
+) -> "list[CuboidTrackObservation]":
+    """A box at each of its times, in the world."""
+    from ncore.data import BBox3, CuboidTrackObservation, LabelSource
+
+    poses = world_from_log @ track.world_from_box
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_euler("xyz")
+    return [
+        CuboidTrackObservation(
+            track_id=track.id,
+            class_id=track.category,
+            timestamp_us=time_us,
+            reference_frame_id=WORLD,
+            reference_frame_timestamp_us=time_us,
+            bbox3=BBox3(_three(pose[:3, 3]), _three(size_m), _three(turn)),
+            source=LabelSource[origin],
+        )
+        for time_us, pose, size_m, turn in zip(
+            stamps(log, track.times_s).tolist(), poses, track.size_lwh_m, turns, strict=True
+        )
+    ]
+
+
+def _three(values: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
