@@ -4,6 +4,7 @@ import builtins
 import gzip
 import os
 import pickle
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 from tests.data.pandaset.pickles import table_bytes
 
 from dreamdrive.data.pandaset import restricted
-from dreamdrive.data.pandaset.restricted import Made, Name, read_pickle
+from dreamdrive.data.pandaset.restricted import read_pickle
 from dreamdrive.data.pandaset.tables import read_table
 from dreamdrive.errors import InputError
+from dreamdrive.files.pickles import Made, Name
 
 TABLE = {
     "uuid": ["a", "b", "c"],
@@ -126,7 +128,7 @@ def test_what_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(restricted, "MOST_BYTES", 100_000)
     with pytest.raises(InputError, match="unpacks to over"):
         read_pickle(written(tmp_path, gzip.compress(bytes(1_000_000))))
-    monkeypatch.setattr(restricted, "_MOST_STEPS", 50)
+    monkeypatch.setattr(restricted, "EXPECTED", replace(restricted.EXPECTED, steps=50))
     with pytest.raises(InputError, match="instructions"):
         read_pickle(written(tmp_path, pickle.dumps(list(range(100)))))
 

@@ -8,8 +8,9 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Shaped
 
-from dreamdrive.data.pandaset.restricted import Made, read_pickle
+from dreamdrive.data.pandaset.restricted import read_pickle
 from dreamdrive.errors import InputError
+from dreamdrive.files.pickles import Made
 
 _DTYPE = re.compile(r"[fiu][1248]|b1|O8")
 """Numbers, truth and objects; of all other types of numpy none is needed."""

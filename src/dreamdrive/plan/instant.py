@@ -1,0 +1,109 @@
+"""A scene as a planner meets it at one moment: where the car is, how fast, and what stands around it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.errors import InputError
+from dreamdrive.plan.footprint import CAR, Footprint
+from dreamdrive.plan.occupancy import OCCUPANCY, OccupancyOptions, obstacles_of
+from dreamdrive.plan.rectangles import inside
+from dreamdrive.plan.trajectory import AHEAD_RAD
+from dreamdrive.scene.scene import Scene
+
+CAMERA_AHEAD_M = 0.76
+"""How far the front camera of nuScenes' cars is ahead of the origin of the planning frame, its lidar."""
+_SPEED_OVER_S = 0.5
+_OWN_MARGIN_M = 0.3
+"""What is so near to the car now is the car: its bonnet, and what is wrong before the camera."""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Now, and what is in the way from now on.
+
+    Attributes:
+        level_from_planning: Where the planning frame is in the level frame of the scene, and how it points:
+            x, y, and the yaw of its axis ahead.
+        speed_m_s: Of the car, over the last half second.
+        yaw_rate_rad_s: The same of its direction, to the left.
+        times_s: From now on (T,).
+        obstacles_m: Middles of cells that are taken at these, in the planning frame.
+    """
+
+    level_from_planning: Float[np.ndarray, " 3"]
+    speed_m_s: float
+    yaw_rate_rad_s: float
+    times_s: Float[np.ndarray, " t"]
+    obstacles_m: tuple[Float[np.ndarray, "_ 2"], ...]
+
+
+def instant_of(
+    scene: Scene,
+    now_s: float,
+    ahead_s: Float[np.ndarray, " t"],
+    options: OccupancyOptions = OCCUPANCY,
+    footprint: Footprint = CAR,
+    camera_ahead_m: float = CAMERA_AHEAD_M,
+) -> Instant:
+    """What a planner has at a moment of the recorded drive.
+
+    Args:
+        scene: The scene. What it learned of later frames is used: for plans that know nothing of these it has
+            to be made of the frames up to now.
+        now_s: The moment, on the clock of the scene.
+        ahead_s: Times from now on (T,) at which what is taken is wanted.
+        options: What counts as taken.
+        footprint: The car; what lies in it now is left out.
+        camera_ahead_m: How far the first camera is ahead of the origin of plans.
+
+    Raises:
+        InputError: The scene does not know its road, drifts, or has no such moment.
+    """
+    path = scene.trajectory
+    first_s, last_s = float(path.times_s[0]), float(path.times_s[-1])
+    if not first_s <= now_s <= last_s:
+        raise InputError(f"the scene lasts from {first_s:g} to {last_s:g} s, and {now_s:g} s lies outside")
+    obstacles = obstacles_of(scene, [now_s + float(t_s) for t_s in ahead_s], options)
+    level = obstacles.level_from_world
+    x, y, yaw = _pose(level @ path.at(np.array([now_s]))[0], camera_ahead_m)
+    before_s = max(first_s, now_s - _SPEED_OVER_S)
+    since_s = now_s - before_s
+    if since_s <= 0:
+        raise InputError(
+            f"{now_s:g} s is the first moment of the scene, which tells no speed; ask for a later one"
+        )
+    was = _pose(level @ path.at(np.array([before_s]))[0], camera_ahead_m)
+    ahead = np.array([np.cos(yaw), np.sin(yaw)])
+    cells = tuple(
+        _outside(_seen_from(obstacles.at(step), np.array([x, y, yaw])), footprint)
+        for step in range(len(ahead_s))
+    )
+    return Instant(
+        np.array([x, y, yaw]),
+        float((np.array([x, y]) - was[:2]) @ ahead) / since_s,
+        float((yaw - was[2] + np.pi) % (2 * np.pi) - np.pi) / since_s,
+        np.asarray(ahead_s, dtype=np.float64),
+        cells,
+    )
+
+
+def _pose(level_from_camera: Float[np.ndarray, "4 4"], camera_ahead_m: float) -> Float[np.ndarray, " 3"]:
+    """Origin of plans and where it points, of a camera that looks ahead."""
+    ahead = level_from_camera[:2, 2]
+    yaw = float(np.arctan2(ahead[1], ahead[0]))
+    place = level_from_camera[:2, 3] - camera_ahead_m * np.array([np.cos(yaw), np.sin(yaw)])
+    return np.array([*place, yaw])
+
+
+def _seen_from(points_m: Float[np.ndarray, "n 2"], pose: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "n 2"]:
+    """Points of the level frame in the planning frame: x right, y ahead."""
+    away, (c, s) = points_m - pose[:2], (np.cos(pose[2]), np.sin(pose[2]))
+    return np.column_stack([away @ np.array([s, -c]), away @ np.array([c, s])])
+
+
+def _outside(points_m: Float[np.ndarray, "n 2"], car: Footprint) -> Float[np.ndarray, "k 2"]:
+    size = car.length_m + 2 * _OWN_MARGIN_M, car.width_m + 2 * _OWN_MARGIN_M
+    own = np.array([0.0, car.ahead_m, *size, AHEAD_RAD])
+    return points_m[~inside(points_m, own)]

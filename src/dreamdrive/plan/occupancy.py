@@ -1,0 +1,128 @@
+"""What stands in the way, read off the Gaussians of a scene.
+
+The paper optimises trajectories against "filtered 3D Gaussians as occupied points" and says no more of it.
+Here a cell of the plane is taken at a time where enough opaque and small Gaussians lie at the height of a
+car.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from scipy.spatial.transform import Rotation
+
+from dreamdrive.errors import InputError
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+
+CELL_M = 0.5
+"""Side of a cell, that of the planning metrics."""
+
+
+@dataclass(frozen=True)
+class OccupancyOptions:
+    """Which Gaussians count, and how many of them take a cell.
+
+    Attributes:
+        least_opacity: Fainter ones are fog and floaters.
+        largest_m: Standard deviation along the longest axis above which one is sky or far away.
+        lowest_m: Height above the road from which a car would hit it: kerbs are lower.
+        highest_m: Height up to which it would: a car, and a margin.
+        opacity: Sum that takes a cell, of Gaussians or parts of them.
+        spread: Where the parts of a Gaussian are, in its standard deviations along both ways of each axis:
+            those of far surfaces are few, and larger than a cell.
+    """
+
+    least_opacity: float = 0.5
+    largest_m: float = 1.0
+    lowest_m: float = 0.3
+    highest_m: float = 2.0
+    opacity: float = 2.5
+    spread: float = 0.7
+
+
+OCCUPANCY = OccupancyOptions()
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """Cells that are taken, by their middles in the level frame of a scene, see ``level_from_world``.
+
+    Attributes:
+        level_from_world: To x, y on the road and z up, the road at 0 below the first camera.
+        standing_m: Of what never moves.
+        times_s: At which the moving ones are known.
+        moving_m: Of what moves, at each of these times.
+    """
+
+    level_from_world: Float[np.ndarray, "4 4"]
+    standing_m: Float[np.ndarray, "n 2"]
+    times_s: Float[np.ndarray, " t"]
+    moving_m: tuple[Float[np.ndarray, "_ 2"], ...]
+
+    def at(self, step: int) -> Float[np.ndarray, "k 2"]:
+        """All that is taken at one of the times."""
+        return np.concatenate([self.standing_m, self.moving_m[step]])
+
+
+def obstacles_of(scene: Scene, times_s: Sequence[float], options: OccupancyOptions = OCCUPANCY) -> Obstacles:
+    """What stands in the way in a scene, at times that may lie beyond it.
+
+    After its last frame everything that moves goes on as it did: tracks continue at a constant rate.
+
+    Raises:
+        InputError: The scene does not know its road, or its street drifts.
+    """
+    if scene.drifts:
+        raise InputError("the street of this scene drifts: it has no place in which anything could be hit")
+    level = level_from_world(scene)
+    standing = _taken(scene.static_at(0.0), level, options)
+    moving = tuple(_taken(scene.dynamic_at(t_s), level, options) for t_s in times_s)
+    return Obstacles(level, standing, np.array(times_s, dtype=np.float64), moving)
+
+
+def level_from_world(scene: Scene) -> Float[np.ndarray, "4 4"]:
+    """From the world of a scene to x ahead and y left of its first camera, z up, the road at 0 below it."""
+    about = scene.provenance
+    if about.up is None or about.camera_height_m is None:
+        raise InputError(
+            "the scene does not know its road, or was made before scenes kept the height of their camera; "
+            "make it again with dreamdrive generate"
+        )
+    up, first = np.array(about.up), scene.trajectory.world_from_camera[0]
+    ahead = first[:3, 2] - (first[:3, 2] @ up) * up
+    ahead = ahead / np.linalg.norm(ahead)
+    level = np.eye(4)
+    level[:3, :3] = np.stack([ahead, np.cross(up, ahead), up])
+    level[:3, 3] = -level[:3, :3] @ first[:3, 3] + (0, 0, about.camera_height_m)
+    return level
+
+
+def _taken(
+    gaussians: Gaussians, level: Float[np.ndarray, "4 4"], options: OccupancyOptions
+) -> Float[np.ndarray, "k 2"]:
+    """Middles of cells that hold enough, without single ones that no other touches."""
+    opacity = torch.sigmoid(gaussians.logit_opacities).numpy()
+    deviations_m = gaussians.log_scales.exp().numpy()
+    places = gaussians.means.numpy() @ level[:3, :3].T + level[:3, 3]
+    reach_m = options.spread * options.largest_m
+    counts = (opacity >= options.least_opacity) & (deviations_m.max(axis=1, initial=0) <= options.largest_m)
+    counts &= (places[:, 2] >= options.lowest_m - reach_m) & (places[:, 2] <= options.highest_m + reach_m)
+    turns = Rotation.from_quat(gaussians.quaternions.numpy()[counts][:, [1, 2, 3, 0]]).as_matrix()
+    axes = (level[:3, :3] @ turns) * (options.spread * deviations_m[counts])[:, None]
+    out = [sign * axes[:, :, axis] for axis in range(3) for sign in (-1, 1)]
+    parts = np.concatenate([places[counts], *(places[counts] + each for each in out)])
+    share = np.tile(opacity[counts] / (1 + len(out)), 1 + len(out))
+    high = (parts[:, 2] >= options.lowest_m) & (parts[:, 2] <= options.highest_m)
+    cells, of = np.unique(np.floor(parts[high, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True)
+    total = np.bincount(of.reshape(-1), weights=share[high], minlength=len(cells))
+    cells = cells[total >= options.opacity]
+    return (cells[_has_neighbour(cells)] + 0.5) * CELL_M
+
+
+def _has_neighbour(cells: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+    taken = {(row, column) for row, column in cells.tolist()}
+    around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    return np.array([any((r + i, c + j) in taken for i, j in around) for r, c in cells.tolist()], dtype=bool)
