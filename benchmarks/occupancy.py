@@ -11,13 +11,14 @@ eight around it.
 """
 
 import sys
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from common.machine import describe_machine
-from common.markdown import grid
+from common.markdown import table
 from common.options import parser_of
 from common.report import publish
 from common.worlds import DEVELOPMENT, set_of
@@ -44,18 +45,23 @@ def main(doc: str | None) -> int:
     args = parser.parse_args()
     rows: list[dict[str, Any]] = []
     for seed in args.seeds:
-        drive = make_street(seed, _FRAMES, _RATE_HZ, _SIZE)
-        scene = scene_of(drive, _QUALITY, args.runs / f"street-{seed}")
+        drive = _street(seed)
+        scene = scene_of(partial(_street, seed), _QUALITY, args.runs / f"street-{seed}")
         rows.append({"seed": seed} | _counted(drive, scene))
         print(seed, _shares(rows[-1]), flush=True)
     total = {name: sum(row[name] for row in rows) for name in _COUNTS}
     report = {"machine": describe_machine(), "worlds": set_of(args.seeds), "rows": rows, "all": total}
     names = list(_shares(total))
-    table = [
+    lines = [
         [str(row.get("seed", "all")), *(f"{_shares(row)[name]:.3f}" for name in names)]
         for row in [*rows, total]
     ]
-    return publish(args, report, grid(["street", *names], table), ())
+    return publish(args, report, table(["street", *names], lines) + "\n", ())
+
+
+@cache
+def _street(seed: int) -> Drive:
+    return make_street(seed, _FRAMES, _RATE_HZ, _SIZE)
 
 
 def _shares(row: dict[str, Any]) -> dict[str, float]:
@@ -72,7 +78,7 @@ def _counted(drive: Drive, scene: Scene) -> dict[str, int]:
     level, options = level_from_world(scene), OccupancyOptions()
     obstacles = obstacles_of(scene, [float(drive.times_s[frame]) for frame in _AT], options)
     solid = _solid(drive, level, options)
-    counts = dict.fromkeys(_COUNTS, 0)
+    counts: dict[str, int] = dict.fromkeys(_COUNTS, 0)
     for step, frame in enumerate(_AT):
         taken = _cells(obstacles.at(step))
         sides, moving = _facing(drive, frame, level)

@@ -19,6 +19,7 @@ from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.look import look
 from dreamdrive.cli.machine import Terminated
+from dreamdrive.cli.plan import plan
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.train import train
@@ -29,6 +30,7 @@ COMMANDS = {
     "generate": generate,
     "look": look,
     "render": render,
+    "plan": plan,
     "export": export,
     "clean": clean,
     "evaluate": evaluate,

@@ -1,7 +1,8 @@
 """Planned trajectories: what they are compared with, what they hit, and how they are moved away from it."""
 
 from dreamdrive.plan.agents import Agents
-from dreamdrive.plan.avoid import Avoided, AvoidOptions, avoid
+from dreamdrive.plan.avoid import Avoided, AvoidOptions, avoid, avoid_as_uniad
+from dreamdrive.plan.camera_path import path_of_plan, plan_of_path
 from dreamdrive.plan.cost import (
     AGENT_DRIVER,
     CONDITIONAL,

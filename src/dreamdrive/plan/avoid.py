@@ -15,9 +15,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
+from dreamdrive.plan.cost import AGENT_DRIVER, CollisionOptions
 from dreamdrive.plan.footprint import CAR, Footprint
+from dreamdrive.plan.grid import GRID, Occupancy
 from dreamdrive.plan.occupancy import CELL_M
 from dreamdrive.plan.trajectory import Plan
+from dreamdrive.plan.uniad import optimise_as_uniad
 
 _FINE_S = 0.1
 _MOST_CURVED_PER_M = 0.2  # a turning circle of 10 m
@@ -102,8 +105,7 @@ def avoid(
         )
     path = _Path.of(plan, every, speed_m_s)
     near = [_near(cells, path, options) for cells in obstacles_m]
-    planned = path.drives(np.zeros(1), np.zeros(1), options)
-    before_m = float(_clearance(planned, near, options.footprint).min())
+    before_m = clearance(plan, speed_m_s, obstacles_m, options.footprint)
     if before_m >= 0:
         return Avoided(plan, False, before_m, before_m)
     changes = np.linspace(-options.most_braking_m_s2, options.most_gain_m_s2, 13)
@@ -120,6 +122,38 @@ def avoid(
     waypoints_m = drive.places_m[0, every - 1 :: every]
     after_m = float(_clearance(drive, near, options.footprint).min())
     return Avoided(replace(plan, waypoints_m=waypoints_m), True, before_m, after_m)
+
+
+def avoid_as_uniad(
+    plan: Plan,
+    speed_m_s: float,
+    obstacles_m: Sequence[Float[np.ndarray, "_ 2"]],
+    options: CollisionOptions = AGENT_DRIVER,
+) -> Avoided:
+    """The same by UniAD's optimisation, with the values and the condition of Agent-Driver.
+
+    Distances are measured as in ``avoid``. Taken are the cells of the planning grid in which a point lies.
+    """
+    every = len(obstacles_m) // len(plan)
+    rasters = [GRID.taken(cells) for cells in obstacles_m[every - 1 :: every]]
+    occupied = Occupancy(np.stack([rasters[0], *rasters]), GRID, plan.step_s)
+    moved = optimise_as_uniad(plan.waypoints_m[None], [occupied], options, plan.step_s)
+    after = replace(plan, waypoints_m=moved.waypoints_m[0])
+    before_m, after_m = (clearance(each, speed_m_s, obstacles_m, options.footprint) for each in (plan, after))
+    return Avoided(after, bool(moved.chosen[0]), before_m, after_m)
+
+
+def clearance(
+    plan: Plan,
+    speed_m_s: float,
+    obstacles_m: Sequence[Float[np.ndarray, "_ 2"]],
+    footprint: Footprint = CAR,
+) -> float:
+    """Least signed distance of the car from cells that are taken, see ``avoid``; at most 10 m."""
+    options = AvoidOptions(footprint=footprint)
+    path = _Path.of(plan, len(obstacles_m) // len(plan), speed_m_s)
+    near = [_near(cells, path, options) for cells in obstacles_m]
+    return float(_clearance(path.drives(np.zeros(1), np.zeros(1), options), near, footprint).min())
 
 
 @dataclass(frozen=True)

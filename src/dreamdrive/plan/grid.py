@@ -49,6 +49,13 @@ class PlanningGrid:
         """Which rows and columns are those of the grid."""
         return np.logical_and.reduce((cells >= 0) & (cells < self.cells), axis=-1)
 
+    def taken(self, points_m: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, "c c"]:
+        """Cells in which points x, y lie; those outside the grid are left out."""
+        cells = self.cells_at(points_m)
+        found = np.zeros((self.cells, self.cells), bool)
+        found[tuple(cells[self.holds(cells)].T)] = True
+        return found
+
     def vertices(self, points_m: Float[np.ndarray, "*b 2"]) -> Int[np.ndarray, "*b 2"]:
         """Column and row (..., 2) to which ST-P3 and UniAD round a corner; halves go to even ones."""
         return np.round((points_m + self.half_m) / self.cell_m).astype(np.int32)

@@ -11,6 +11,7 @@ from dreamdrive.plan.occupancy import OCCUPANCY, OccupancyOptions, obstacles_of
 from dreamdrive.plan.rectangles import inside
 from dreamdrive.plan.trajectory import AHEAD_RAD
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
 
 CAMERA_AHEAD_M = 0.76
 """How far the front camera of nuScenes' cars is ahead of the origin of the planning frame, its lidar."""
@@ -24,15 +25,19 @@ class Instant:
     """Now, and what is in the way from now on.
 
     Attributes:
+        level_from_world: To the level frame of the scene, see there.
         level_from_planning: Where the planning frame is in the level frame of the scene, and how it points:
             x, y, and the yaw of its axis ahead.
+        planning_from_camera: Where the camera is on the car: x right, y ahead and z up from the road.
         speed_m_s: Of the car, over the last half second.
         yaw_rate_rad_s: The same of its direction, to the left.
         times_s: From now on (T,).
         obstacles_m: Middles of cells that are taken at these, in the planning frame.
     """
 
+    level_from_world: Float[np.ndarray, "4 4"]
     level_from_planning: Float[np.ndarray, " 3"]
+    planning_from_camera: Float[np.ndarray, "4 4"]
     speed_m_s: float
     yaw_rate_rad_s: float
     times_s: Float[np.ndarray, " t"]
@@ -46,8 +51,9 @@ def instant_of(
     options: OccupancyOptions = OCCUPANCY,
     footprint: Footprint = CAR,
     camera_ahead_m: float = CAMERA_AHEAD_M,
+    path: Trajectory | None = None,
 ) -> Instant:
-    """What a planner has at a moment of the recorded drive.
+    """What a planner has at a moment of a drive.
 
     Args:
         scene: The scene. What it learned of later frames is used: for plans that know nothing of these it has
@@ -56,51 +62,56 @@ def instant_of(
         ahead_s: Times from now on (T,) at which what is taken is wanted.
         options: What counts as taken.
         footprint: The car; what lies in it now is left out.
-        camera_ahead_m: How far the first camera is ahead of the origin of plans.
+        camera_ahead_m: How far the camera is ahead of the origin of plans.
+        path: Of the camera; the recorded one where none is given.
 
     Raises:
         InputError: The scene does not know its road, drifts, or has no such moment.
     """
-    path = scene.trajectory
+    path = scene.trajectory if path is None else path
     first_s, last_s = float(path.times_s[0]), float(path.times_s[-1])
     if not first_s <= now_s <= last_s:
-        raise InputError(f"the scene lasts from {first_s:g} to {last_s:g} s, and {now_s:g} s lies outside")
+        raise InputError(f"the drive lasts from {first_s:g} to {last_s:g} s, and {now_s:g} s lies outside")
     obstacles = obstacles_of(scene, [now_s + float(t_s) for t_s in ahead_s], options)
     level = obstacles.level_from_world
-    x, y, yaw = _pose(level @ path.at(np.array([now_s]))[0], camera_ahead_m)
-    before_s = max(first_s, now_s - _SPEED_OVER_S)
-    since_s = now_s - before_s
+    since_s = min(_SPEED_OVER_S, now_s - first_s)
     if since_s <= 0:
         raise InputError(
-            f"{now_s:g} s is the first moment of the scene, which tells no speed; ask for a later one"
+            f"{now_s:g} s is the first moment of the drive, which tells no speed; ask for a later one"
         )
-    was = _pose(level @ path.at(np.array([before_s]))[0], camera_ahead_m)
-    ahead = np.array([np.cos(yaw), np.sin(yaw)])
-    cells = tuple(
-        _outside(_seen_from(obstacles.at(step), np.array([x, y, yaw])), footprint)
-        for step in range(len(ahead_s))
-    )
+    was, now = (level @ pose for pose in path.at(np.array([now_s - since_s, now_s])))
+    before, pose = pose_of(was, camera_ahead_m), pose_of(now, camera_ahead_m)
+    moved = seen_from(pose, before[None, :2])[0]
     return Instant(
-        np.array([x, y, yaw]),
-        float((np.array([x, y]) - was[:2]) @ ahead) / since_s,
-        float((yaw - was[2] + np.pi) % (2 * np.pi) - np.pi) / since_s,
+        level,
+        pose,
+        np.linalg.inv(standing_at(pose)) @ now,
+        float(-moved[1]) / since_s,
+        float((pose[2] - before[2] + np.pi) % (2 * np.pi) - np.pi) / since_s,
         np.asarray(ahead_s, dtype=np.float64),
-        cells,
+        tuple(_outside(seen_from(pose, obstacles.at(step)), footprint) for step in range(len(ahead_s))),
     )
 
 
-def _pose(level_from_camera: Float[np.ndarray, "4 4"], camera_ahead_m: float) -> Float[np.ndarray, " 3"]:
+def standing_at(pose: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "4 4"]:
+    """The planning frame of a pose x, y, yaw in a level frame: x right, y ahead, z up."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    found = np.eye(4)
+    found[:2, :2], found[:2, 3] = [[s, c], [-c, s]], pose[:2]
+    return found
+
+
+def seen_from(pose: Float[np.ndarray, " 3"], points_m: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+    """Points of a level frame in the planning frame of a pose."""
+    return (points_m - pose[:2]) @ standing_at(pose)[:2, :2]
+
+
+def pose_of(level_from_camera: Float[np.ndarray, "4 4"], camera_ahead_m: float) -> Float[np.ndarray, " 3"]:
     """Origin of plans and where it points, of a camera that looks ahead."""
     ahead = level_from_camera[:2, 2]
     yaw = float(np.arctan2(ahead[1], ahead[0]))
     place = level_from_camera[:2, 3] - camera_ahead_m * np.array([np.cos(yaw), np.sin(yaw)])
     return np.array([*place, yaw])
-
-
-def _seen_from(points_m: Float[np.ndarray, "n 2"], pose: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "n 2"]:
-    """Points of the level frame in the planning frame: x right, y ahead."""
-    away, (c, s) = points_m - pose[:2], (np.cos(pose[2]), np.sin(pose[2]))
-    return np.column_stack([away @ np.array([s, -c]), away @ np.array([c, s])])
 
 
 def _outside(points_m: Float[np.ndarray, "n 2"], car: Footprint) -> Float[np.ndarray, "k 2"]:
