@@ -44,7 +44,7 @@ def plan(
         method: avoid moves a car, with its shape, its speed and its limits; uniad six points, each whatever
             the others do, as UniAD does.
         shift_m: How far shift goes to the right in metres; negative is to the left.
-        output: The folder to write; without it OUT/plan/NAME.
+        output: The folder to write; without it OUT/video/plan_NAME.
         force: Replace an older plan.
     """
     use_all_cores()
@@ -56,7 +56,7 @@ def plan(
     instant, planned = _planned(scene, path, now_s)
     after = _moved(planned, instant, method)
     drive = path_of_plan(after.plan, instant, now_s, _RATE_HZ)
-    folder = (out / "plan" / name) if output is None else output
+    folder = out / "video" / f"plan_{name}" if output is None else output
     console = Console(highlight=False, markup=False, soft_wrap=True)
     with Bars(console) as bars:
         said = partial(bars, "plan", total=len(drive))
