@@ -14,6 +14,7 @@ from dreamdrive.plan import (
     level_from_world,
     obstacles_of,
 )
+from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Provenance, Scene
@@ -137,3 +138,36 @@ def test_moments_that_tell_no_speed_are_refused(now_s: float) -> None:
     scene = scene_of(dots(block((0, 1), (5, 6), (0.5, 1))))
     with pytest.raises(InputError, match=r"lies outside|tells no speed"):
         instant_of(scene, now_s, np.array([0.5]))
+
+
+def test_what_moves_goes_on_as_it_did_whatever_lives_later() -> None:
+    points = block((2.05, 3.0), (30.05, 31.0), (0.5, 1.5))
+    living = replace(
+        dots(points),
+        lifespan=torch.tensor([[1.0, 0.05]]).repeat(len(points), 1),
+        actor=torch.zeros(len(points), dtype=torch.int64),
+    )
+    times_s = np.linspace(0, 1, 11)
+    places = np.column_stack([np.full(11, 2.5), np.full(11, HEIGHT_M), 26.5 + 4.0 * times_s])
+    actor = Actor(0, "actor 0", "vehicle", len(points), Track(times_s, places, np.zeros(11)))
+    scene = replace(scene_of(dots(np.zeros((0, 3))), living), actors=(actor,))
+    found = instant_of(scene, 1.0, np.array([0.5, 2.0]))
+    for cells, gone_m in zip(found.obstacles_m, (2.0, 8.0), strict=True):
+        middle = cells.mean(axis=0) - [0, CAMERA_AHEAD_M]
+        np.testing.assert_allclose(middle, [2.5, 20.5 + gone_m], atol=1e-6)
+    assert not len(obstacles_of(scene, [1.0, 3.0]).at(1))
+
+
+def test_what_turns_goes_on_turning() -> None:
+    points = block((-0.2, 0.25), (10, 14), (0.5, 1.5))
+    living = replace(dots(points), actor=torch.zeros(len(points), dtype=torch.int64))
+    times_s = np.linspace(0, 1, 11)
+    places = np.tile([0.0, HEIGHT_M, 12.0], (11, 1))
+    track = Track(times_s, places, np.pi / 4 * times_s)
+    scene = replace(
+        scene_of(dots(np.zeros((0, 3))), living, 0.0), actors=(Actor(0, "a", "vehicle", 1, track),)
+    )
+    found = instant_of(scene, 1.0, np.array([0.1, 2.0]))
+    along, across = (np.ptp(cells, axis=0) for cells in found.obstacles_m)
+    assert along[1] > 3 > along[0]
+    assert across[0] > 3 > across[1]

@@ -56,8 +56,8 @@ def instant_of(
     """What a planner has at a moment of a drive.
 
     Args:
-        scene: The scene. What it learned of later frames is used: for plans that know nothing of these it has
-            to be made of the frames up to now.
+        scene: The scene. What moves goes on from now at the rate of its track; where the scene was made of
+            later frames too, these tell its surfaces and its rate.
         now_s: The moment, on the clock of the scene.
         ahead_s: Times from now on (T,) at which what is taken is wanted.
         options: What counts as taken.
@@ -72,7 +72,7 @@ def instant_of(
     first_s, last_s = float(path.times_s[0]), float(path.times_s[-1])
     if not first_s <= now_s <= last_s:
         raise InputError(f"the drive lasts from {first_s:g} to {last_s:g} s, and {now_s:g} s lies outside")
-    obstacles = obstacles_of(scene, [now_s + float(t_s) for t_s in ahead_s], options)
+    obstacles = obstacles_of(scene, [now_s + float(t_s) for t_s in ahead_s], options, now_s)
     level = obstacles.level_from_world
     since_s = min(_SPEED_OVER_S, now_s - first_s)
     if since_s <= 0:

@@ -6,7 +6,7 @@ car.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -67,10 +67,20 @@ class Obstacles:
         return np.concatenate([self.standing_m, self.moving_m[step]])
 
 
-def obstacles_of(scene: Scene, times_s: Sequence[float], options: OccupancyOptions = OCCUPANCY) -> Obstacles:
-    """What stands in the way in a scene, at times that may lie beyond it.
+def obstacles_of(
+    scene: Scene,
+    times_s: Sequence[float],
+    options: OccupancyOptions = OCCUPANCY,
+    now_s: float | None = None,
+) -> Obstacles:
+    """What stands in the way in a scene.
 
-    After its last frame everything that moves goes on as it did: tracks continue at a constant rate.
+    Args:
+        scene: The scene.
+        times_s: When; they may lie beyond its frames.
+        options: What counts.
+        now_s: A moment from which on everything that moves goes on at the rate of its track, whatever the
+            scene shows of it later; without it, what the scene shows at each time.
 
     Raises:
         InputError: The scene does not know its road, or its street drifts.
@@ -79,8 +89,32 @@ def obstacles_of(scene: Scene, times_s: Sequence[float], options: OccupancyOptio
         raise InputError("the street of this scene drifts: it has no place in which anything could be hit")
     level = level_from_world(scene)
     standing = _taken(scene.static_at(0.0), level, options)
-    moving = tuple(_taken(scene.dynamic_at(t_s), level, options) for t_s in times_s)
+    moving = tuple(
+        _taken(scene.dynamic_at(t_s) if now_s is None else _carried_on(scene, now_s, t_s), level, options)
+        for t_s in times_s
+    )
     return Obstacles(level, standing, np.array(times_s, dtype=np.float64), moving)
+
+
+def _carried_on(scene: Scene, now_s: float, t_s: float) -> Gaussians:
+    """What moves as it is seen now, carried along by the tracks of its actors.
+
+    Surfaces live only as long as frames have seen them, and some of them would be gone.
+    """
+    now = scene.dynamic_at(now_s)
+    if now.actor is None or scene.provenance.up is None:
+        return now
+    up = np.array(scene.provenance.up)
+    means, quaternions = now.means.clone(), now.quaternions.clone()
+    for actor in scene.actors:
+        rows = torch.nonzero(now.actor == actor.id).squeeze(1)
+        here, there = (actor.track.at(np.array([each])) for each in (now_s, t_s))
+        turn = Rotation.from_rotvec(float(there.yaw_rad[0] - here.yaw_rad[0]) * up)
+        away = now.means[rows].numpy() - here.positions_m[0]
+        means[rows] = torch.from_numpy(turn.apply(away) + there.positions_m[0]).to(means)
+        own = Rotation.from_quat(now.quaternions[rows].numpy(), scalar_first=True)
+        quaternions[rows] = torch.from_numpy((turn * own).as_quat(scalar_first=True)).to(quaternions)
+    return replace(now, means=means, quaternions=quaternions)
 
 
 def level_from_world(scene: Scene) -> Float[np.ndarray, "4 4"]:
@@ -110,7 +144,7 @@ def _taken(
     reach_m = options.spread * options.largest_m
     counts = (opacity >= options.least_opacity) & (deviations_m.max(axis=1, initial=0) <= options.largest_m)
     counts &= (places[:, 2] >= options.lowest_m - reach_m) & (places[:, 2] <= options.highest_m + reach_m)
-    turns = Rotation.from_quat(gaussians.quaternions.numpy()[counts][:, [1, 2, 3, 0]]).as_matrix()
+    turns = Rotation.from_quat(gaussians.quaternions.numpy()[counts], scalar_first=True).as_matrix()
     axes = (level[:3, :3] @ turns) * (options.spread * deviations_m[counts])[:, None]
     out = [sign * axes[:, :, axis] for axis in range(3) for sign in (-1, 1)]
     parts = np.concatenate([places[counts], *(places[counts] + each for each in out)])
