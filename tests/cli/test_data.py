@@ -135,6 +135,25 @@ def test_samples_are_made_of_drives_and_of_scenes(
     assert "has pictures of 64x32 and 16 cells, and the network takes pictures of 480x224" in refused.err
 
 
+def test_samples_are_made_of_scenes_that_a_prior_drew(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two scenes of one drive in one set, whose samples say which prior drew their frames."""
+    shorten(monkeypatch)
+    world, written, out = tmp_path / "world", tmp_path / "street", tmp_path / "out"
+    run("world", "make", "--frames", 6, "--size", "96x54", "--one-ray", "-o", world)
+    run("export", world, "--to", "nuscenes", "-o", written)
+    chosen = ("--prior", "street-world", "--knowledge", "none", "--quality", "draft", "--size", "96x54")
+    assert run("generate", written, *chosen, "-o", out).code == 0
+    small = ("--size", "64x32", "--cells", 16, "--per-scene", 2)
+    result = run("dataset", "make", out, out, "--labels", written, *small, "-o", tmp_path / "made")
+    assert result.code == 0, result
+    made = json.loads((tmp_path / "made" / "manifest.json").read_text())["samples"]
+    assert {(each["kind"], each["prior"]) for each in made} == {("rendered", "street-world")}
+    assert [each["id"] for each in made] == [f"world-rendered-000{number}" for number in range(4)]
+    assert made[0]["boxes"] > 0
+
+
 def test_sizes_of_samples_are_checked(run: Run, folder: Path, tmp_path: Path) -> None:
     made = ("dataset", "make", folder, "-o", tmp_path / "samples")
     assert "cut away; at most 270" in run(*made, "--size", "480x300").err

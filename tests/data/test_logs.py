@@ -32,6 +32,15 @@ def test_one_camera_is_a_clip_with_known_poses(drive):
     np.testing.assert_array_equal(clip.rig[0].world_from_camera, np.eye(4))
 
 
+def test_a_clip_lies_where_its_first_picture_was_taken(drive):
+    clip = clip_of_log(drive, cameras="back_left,front", frames="2:5", size=(32, 24))
+    back = drive.cameras[1]
+    assert (clip.log.name, clip.log.start_s, clip.log.level_z_m) == ("scene-0001", back.times_s[2], None)
+    np.testing.assert_array_equal(clip.log.log_from_world, back.world_from_camera[2])
+    placed = np.array(clip.log.log_from_world) @ clip.known.world_from_camera[clip.of_camera(1)]
+    np.testing.assert_allclose(placed, drive.cameras[0].world_from_camera[2:5], atol=1e-9)
+
+
 def test_all_cameras_are_woven_in_the_order_of_time(drive):
     clip = clip_of_log(drive, cameras="all", frames="1:12:2", size=(32, 24))
     np.testing.assert_array_equal(clip.camera, [0, 1] * 6)

@@ -37,6 +37,13 @@ def test_what_is_written_is_read(written, samples):
         np.testing.assert_array_equal(again.labels.auxiliary, sample.labels.auxiliary)
 
 
+def test_sets_from_before_priors_were_told_are_read(written):
+    values = json.loads((written / "manifest.json").read_text())
+    assert {sample.pop("prior") for sample in values["samples"]} == {None}
+    (written / "manifest.json").write_text(json.dumps(values))
+    assert [note.prior for note in BevSet.open(written).notes] == [None] * 3
+
+
 def test_labels_show_road_and_cars(samples):
     labels = samples[0][1].labels
     assert labels.road().any()

@@ -10,8 +10,10 @@ from tests.logs import ego, log
 from dreamdrive.errors import InputError
 from dreamdrive.perception import (
     BevGrid,
+    BevSample,
     ImageSize,
     PathOptions,
+    SampleNote,
     draw_places,
     samples_of_log,
     samples_of_scene,
@@ -117,7 +119,7 @@ def test_a_scene_is_seen_from_new_places(drive):
     made = [each for each in samples_of_scene(scene, drive, places, IMAGE, GRID, options) if each is not None]
     assert len(made) == 4
     note, sample = made[0]
-    assert note.kind == "rendered"
+    assert (note.kind, note.prior) == ("rendered", None)
     assert note.covered > 0.5
     # The road is grey below the horizon, and there is nothing above it.
     assert sample.pictures[0, :, -1].mean() > 80
@@ -135,6 +137,36 @@ def test_labels_of_a_new_place_are_those_of_the_moved_car(drive):
     assert both.sum() >= 0.7 * recorded.labels.vehicle().sum()
     np.testing.assert_allclose(rendered.pixel_from_camera, recorded.pixel_from_camera, atol=1e-3)
     np.testing.assert_allclose(rendered.camera_from_ego[0], recorded.camera_from_ego[0], atol=0.02)
+
+
+def test_on_hills_car_and_boxes_stand_on_the_level_road_of_the_scene(drive):
+    """A street was drawn level, and its log climbs by 3 m with a pitched car: samples are as without."""
+    level = scene_of(drive)
+    link = replace(level.provenance.log, level_z_m=0.1)
+    level = replace(level, provenance=Provenance(log=link, prior="street-world"))
+    pitched = np.eye(4)
+    pitched[[0, 0, 2, 2], [0, 2, 0, 2]] = np.cos(0.1), -np.sin(0.1), np.sin(0.1), np.cos(0.1)
+    climbing = drive.world_from_ego @ pitched
+    climbing[:, 2, 3] += [1.0, 2.0, 3.0]
+    lifted = np.eye(4)
+    lifted[2, 3] = 2.0
+    boxes = tuple(replace(box, world_from_box=lifted @ box.world_from_box) for box in drive.boxes)
+    hilly = replace(drive, world_from_ego=climbing, boxes=boxes)
+    options = PathOptions(aside_m=0.0, turned_deg=0.0, least_covered=0.0)
+
+    def made(scene: Scene, log: Log) -> tuple[SampleNote, BevSample]:
+        places, _ = draw_places(log, (0.499, 0.501), 1, options, seed=0)
+        (sample,) = samples_of_scene(scene, log, places, IMAGE, GRID, options)
+        return sample
+
+    (note, flat), (_, climbed) = made(level, drive), made(level, hilly)
+    assert note.prior == "street-world"
+    np.testing.assert_allclose(flat.camera_from_ego, climbed.camera_from_ego, atol=1e-5)
+    np.testing.assert_array_equal(flat.labels.bits(), climbed.labels.bits())
+    np.testing.assert_array_equal(flat.labels.visibility, climbed.labels.visibility)
+    assert np.abs(flat.pictures.astype(int) - climbed.pictures).mean() < 1
+    as_in_log = replace(level, provenance=Provenance(log=replace(link, level_z_m=None)))
+    assert np.abs(flat.pictures.astype(int) - made(as_in_log, hilly)[1].pictures).mean() > 10
 
 
 def test_what_the_scene_does_not_cover_is_left_out(drive):

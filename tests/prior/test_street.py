@@ -12,9 +12,16 @@ from dreamdrive.data import log_of, read_dataset
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.data.lidar_file import read_points
 from dreamdrive.data.log_layout import layout_of_log
-from dreamdrive.data.nuscenes import write_nuscenes
+from dreamdrive.data.nuscenes import read_nuscenes, write_nuscenes
 from dreamdrive.errors import InputError
-from dreamdrive.prior.street import map_from_cameras, read_street, told_of_street, wanted_frames
+from dreamdrive.export import export_world
+from dreamdrive.prior.street import (
+    map_from_cameras,
+    place_in_log,
+    read_street,
+    told_of_street,
+    wanted_frames,
+)
 from dreamdrive.prior.street_world import street_world
 from dreamdrive.run import digest
 from dreamdrive.run.cost import Planned, plan
@@ -22,7 +29,7 @@ from dreamdrive.run.request import digest_of_log, request_of
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.layout import track_function
 from dreamdrive.scene.log import LogMap
-from dreamdrive.world import draw_street
+from dreamdrive.world import MOUNTS, Drive, Mount, StreetOptions, draw_street, drive
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +123,61 @@ def test_frames_have_the_pinholes_of_the_recording(shared: Path) -> None:
     one = street_world(replace(asked, cameras=None))
     assert (one.rig[0].world_from_camera == np.eye(4)).all()
     np.testing.assert_array_equal(one.frames, clip.frames[::2])
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A level street that bends, as six cameras of a car that nods and rolls see it."""
+    layout = draw_street(4, StreetOptions(seconds=1.2))
+    seen: dict[Mount, Drive] = {
+        m: drive(layout, 11, 10.0, (32, 24), mount=m, antialiased=False) for m in MOUNTS
+    }
+    folder = tmp_path_factory.mktemp("drawn") / "street"
+    export_world(seen, "street", folder)
+    return folder
+
+
+@pytest.mark.parametrize(("cameras", "count"), [(None, 1), ("all", 6), ("back_left,front", 2)])
+def test_a_clip_lies_where_the_cameras_of_its_log_are(drawn: Path, cameras: str | None, count: int) -> None:
+    """The layout has the car's way at labels, each half a second, and a spline between: not when it swerves,
+    as drawn cars do in their first half second."""
+    clip = street_world(Control(drawn, cameras=cameras, frames="6:11", size=(32, 24)))
+    recorded = read_nuscenes(drawn, "street")
+    link, poses = clip.log, clip.known.world_from_camera
+    assert link is not None
+    assert poses is not None
+    assert (link.name, link.start_s) == ("street", pytest.approx(0.6))
+    assert len(clip.rig) == count
+    for index, pose in enumerate(np.array(link.log_from_world) @ poses):
+        camera = recorded.camera(clip.provenance["cameras"][clip.camera[index]])
+        row = int(np.abs(camera.times_s - (link.start_s + clip.times_s[index])).argmin())
+        real = camera.world_from_camera[row]
+        np.testing.assert_allclose(pose[:3, 3], real[:3, 3], atol=0.05)
+        yaw, true = (np.arctan2(each[1, 2], each[0, 2]) for each in (pose, real))
+        assert abs((yaw - true + np.pi) % (2 * np.pi) - np.pi) < np.deg2rad(0.5)
+
+
+def test_a_level_road_lies_as_high_as_the_car_at_the_start(shared: Path) -> None:
+    """The log climbs, and its car is pitched; the layout knows nothing of it."""
+    street = read_street(Control(), shared, without="all")
+    assert street.log is not None
+    slope = np.eye(4)
+    slope[[0, 0, 2, 2], [0, 2, 0, 2]] = np.cos(0.1), -np.sin(0.1), np.sin(0.1), np.cos(0.1)
+    climbing = street.log.world_from_ego @ slope
+    climbing[:, 2, 3] += [0.0, 2.0, 4.0]
+    link = place_in_log(replace(street, log=replace(street.log, world_from_ego=climbing)), 0.75)
+    assert link.level_z_m == pytest.approx(3.1)
+    pose = np.array(link.log_from_world)
+    assert pose[2, 3] == pytest.approx(3.1 + 1.4)
+    np.testing.assert_allclose(
+        pose[:3, :3], (ego(0.75) @ street.cameras[0].ego_from_camera)[:3, :3], atol=1e-3
+    )
+    np.testing.assert_allclose(pose[:2, 3], (ego(0.75) @ street.cameras[0].ego_from_camera)[:2, 3], atol=2e-2)
+
+
+def test_a_layout_is_of_no_log(tmp_path: Path) -> None:
+    write_layout(draw_street(3), tmp_path / "street.json")
+    assert street_world(Control(tmp_path / "street.json", frames="0:2", size=(32, 24))).log is None
 
 
 def test_what_a_scene_does_not_tell_is_said(shared: Path) -> None:

@@ -1,7 +1,7 @@
 """Results of stages are kept, found again, and never trusted when damaged."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.run import codec, stages
 from dreamdrive.run.stages import STAGES, Stages, digest, file_digest, stage_seed
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.look import RoadUser
 from dreamdrive.scene.street_class import StreetClass
 
@@ -121,7 +122,9 @@ def test_progress_names_the_stage(tmp_path: Path) -> None:
 
 def test_nouns_come_back_equal(tmp_path: Path) -> None:
     street = small_street(frames=4)
-    clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
+    rows = tuple(tuple(map(float, row)) for row in np.eye(4) / 3)
+    link = OfLog("scene-0061", rows, 0.3, level_z_m=-0.1)
+    clip, geometry = replace(street_clip(street, hold_out=4), log=link), true_geometry(street)
     for noun in (clip, geometry):
         codec.write(tmp_path, noun, {})
         _assert_equal(codec.read(tmp_path), noun)

@@ -4,13 +4,17 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from tests.scene.scenes import drifting_scene, make_baseline, make_scene
+from tests.stored.test_hostile_folder import change
 
 from dreamdrive.errors import InputError
+from dreamdrive.scene.log import OfLog
+from dreamdrive.scene.scene import Provenance
 from dreamdrive.stored import load_scene, save_scene
 
 
@@ -207,3 +211,24 @@ def test_round_trip_of_a_rig(tmp_path: Path) -> None:
     assert loaded.exposure.camera is not None
     assert loaded.exposure.camera.tolist() == [0, 1]
     assert len(loaded.trajectory) == 2
+
+
+ROWS = ((0.0, 0.0, 1.0, 1 / 3), (-1.0, 0.0, 0.0, 5.25e6), (0.0, -1.0, 0.0, 1.4), (0.0, 0.0, 0.0, 1.0))
+
+
+def test_round_trip_of_the_place_in_a_log(tmp_path: Path) -> None:
+    about = Provenance(log=OfLog("scene-0061", ROWS, 0.3, level_z_m=-0.1), prior="street-world")
+    save_scene(replace(make_scene(), provenance=about), tmp_path / "s")
+    assert load_scene(tmp_path / "s").provenance == about
+
+
+def test_scenes_from_before_priors_were_told_are_read(tmp_path: Path) -> None:
+    about = Provenance(log=OfLog("scene-0061", ROWS, 0.3))
+    save_scene(replace(make_scene(), provenance=about), tmp_path / "s")
+
+    def older(index: dict[str, Any]) -> None:
+        del index["provenance"]["prior"]
+        del index["provenance"]["log"]["level_z_m"]
+
+    change(tmp_path / "s", older)
+    assert load_scene(tmp_path / "s").provenance == about

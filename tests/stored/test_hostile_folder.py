@@ -79,6 +79,10 @@ WRONG = {
     "deformation.position_frequencies": [10**7, -1],
     "sky": [None, {}, {"azimuth_rad": [0], "elevation_rad": [0, 1]}],
     "sky.azimuth_rad": [[1, 0], [0, 1, 2], None],
+    "provenance.log": [
+        {"name": "a", "log_from_world": rows, "start_s": 0.0}
+        for rows in ([], [[1.0]], [[0.0] * 4] * 4, [[1e300] * 4] * 4, "x")
+    ],
     "provenance": [None, [], {"up": [0, 0, 0]}, {"up": "x"}, {"source_index": [1]}, {"lens": 3}],
 }
 

@@ -1,6 +1,7 @@
 """``dreamdrive dataset make``: samples for perception, of scenes along new paths and of recorded drives."""
 
 import time
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -126,6 +127,7 @@ class _Maker:
         """All of them, one after the other."""
         from dreamdrive.perception import draw_places, samples_of_log, samples_of_scene, span_of
 
+        named: Counter[str] = Counter()
         for number, (scene, log, count) in enumerate(plans):
             if scene is None:
                 made = samples_of_log(log, self.image, self.grid, self.per_scene)
@@ -133,7 +135,9 @@ class _Maker:
                 span = span_of(scene, log)
                 places, near = draw_places(log, span, count, self.path, self.seed + number)
                 self.left_out["as good as another one"] += near
-                made = samples_of_scene(scene, log, places, self.image, self.grid, self.path)
+                first = named[log.name]  # several scenes may be of one drive
+                named[log.name] += len(places)
+                made = samples_of_scene(scene, log, places, self.image, self.grid, self.path, first)
             for sample in made:
                 if sample is None:
                     self.left_out["too little of it is in the scene"] += 1

@@ -1,10 +1,10 @@
 """``dreamdrive plan``: a drive through a scene, moved out of the way of what stands and moves in it."""
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from rich.console import Console
 from tyro.conf import Positional, arg
 
@@ -72,7 +72,7 @@ def _wanted(
     """Name and path of the camera, None for going on as recorded, and the moment of planning."""
     from dreamdrive.drive import check_numbers, drives_of
 
-    if at is not None and not np.isfinite(at):
+    if at is not None and not math.isfinite(at):
         raise InputError(f"--at {at}: expected seconds on the clock of the scene")
     if trajectory == CURRENT:
         return CURRENT, None, float(scene.trajectory.times_s[-1]) if at is None else at
@@ -83,6 +83,8 @@ def _wanted(
 
 
 def _planned(scene: "Scene", path: "Trajectory | None", now_s: float) -> "tuple[Instant, Plan]":
+    import numpy as np
+
     from dreamdrive.plan import STEP_S, STEPS, Plan, instant_of, plan_of_path
 
     straight = np.column_stack([np.zeros(STEPS), STEP_S * np.arange(1, STEPS + 1)])

@@ -145,9 +145,8 @@ def clip_of_log(
         source_index=np.concatenate([each.rows for each in shots])[order],
         known=Known(world_from_camera=to_first(poses), intrinsics=True),
         cuts=cuts,
-        recorded=Recorded(
-            str(log.root), False, sizing.source, sizing.scaled, sizing.offset, log=_place_of(log, lead)
-        ),
+        recorded=Recorded(str(log.root), False, sizing.source, sizing.scaled, sizing.offset),
+        log=OfLog.of(log, lead.camera.world_from_camera[lead.rows[0]], times_s[0]),
         provenance={
             "notes": [*_missing(shots), *said, *(note for each in samplers for note in each.notes)],
             "log": log.name,
@@ -166,12 +165,6 @@ def files_of(shots: Sequence[Shots]) -> tuple[tuple[Path, ...], list[Any]]:
         poses = camera.world_from_camera[each.rows].tolist()
         told.append([camera.name, seen, poses, camera.times_s[each.rows].tolist(), each.steps.tolist()])
     return tuple(files), told
-
-
-def _place_of(log: Log, lead: Shots) -> OfLog:
-    first = lead.camera.world_from_camera[lead.rows[0]]
-    rows = tuple(tuple(map(float, row)) for row in first)
-    return OfLog(log.name, rows, float(lead.camera.times_s[lead.rows[0]]))
 
 
 def _read(log: Log, shots: Shots, sampler: Sampler) -> tuple[Any, Any]:

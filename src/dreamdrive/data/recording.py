@@ -49,6 +49,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
         "size": list(clip.size),
         "source_index": first.source_index.tolist(),
         "recorded": None if clip.recorded is None else asdict(clip.recorded),
+        "log": None if clip.log is None else asdict(clip.log),
         "provenance": clip.provenance,
     }
     with new_folder(folder, replace=replace, mark=ABOUT) as made:

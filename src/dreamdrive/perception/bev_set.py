@@ -60,6 +60,7 @@ class SampleNote(msgspec.Struct):
         covered: Share of the pictures that the scene covers; 1 for recorded ones.
         boxes: How many are in the labels.
         cameras: In the order of the pictures.
+        prior: Name of the prior that drew or generated the frames of the scene; None of recorded ones.
     """
 
     id: Annotated[str, Meta(min_length=1, max_length=100)]
@@ -72,6 +73,7 @@ class SampleNote(msgspec.Struct):
     covered: float
     boxes: int
     cameras: list[SampleCamera]
+    prior: str | None = None
 
 
 class _Manifest(msgspec.Struct):

@@ -5,7 +5,7 @@ much of a box is seen is told by the depth of the pictures themselves.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -98,9 +98,18 @@ def span_of(scene: Scene, log: Log) -> tuple[float, float]:
 
 
 def samples_of_scene(
-    scene: Scene, log: Log, places: list[Place], image: ImageSize, grid: BevGrid, options: PathOptions
+    scene: Scene,
+    log: Log,
+    places: list[Place],
+    image: ImageSize,
+    grid: BevGrid,
+    options: PathOptions,
+    first: int = 0,
 ) -> Iterator[tuple[SampleNote, BevSample] | None]:
     """Render the cameras of the log at each place; None where too little is covered.
+
+    Of a scene whose street was drawn level, car and boxes stand on that street. Names of samples count from
+    ``first``.
 
     Raises:
         InputError: The scene was made of another drive, or the drive has no map.
@@ -108,9 +117,11 @@ def samples_of_scene(
     link = _link(scene, log)
     map = road_map(log)
     scene_from_log = np.linalg.inv(np.array(link.log_from_world))
+    if link.level_z_m is not None:
+        log, places = _on_level(log, places, link.level_z_m)
     cameras = in_order(log)
     pinholes = [_pinhole(camera, image) for camera in cameras]
-    for number, place in enumerate(places):
+    for number, place in enumerate(places, first):
         yield _sample(scene, log, map, link, scene_from_log, cameras, pinholes, place, number, grid, options)
 
 
@@ -164,6 +175,7 @@ def _sample(
         covered=float(np.mean(covered)),
         boxes=len(boxes),
         cameras=cameras_of([each.name for each in cameras], sample.pixel_from_camera, sample.camera_from_ego),
+        prior=scene.provenance.prior,
     )
     return note, sample
 
@@ -174,6 +186,28 @@ def _link(scene: Scene, log: Log) -> OfLog:
         of = "no drive of a data set" if link is None else link.name
         raise InputError(f"the scene was made of {of}, the labels are of {log.name}; give those of its drive")
     return link
+
+
+def _on_level(log: Log, places: list[Place], z_m: float) -> tuple[Log, list[Place]]:
+    """The boxes of a log and places of its car, upright on a level road of a height."""
+    boxes = tuple(
+        replace(each, world_from_box=_upright(each.world_from_box, z_m + each.size_lwh_m[:, 2] / 2))
+        for each in log.boxes
+    )
+    stood = [replace(each, world_from_ego=_upright(each.world_from_ego, np.array(z_m))) for each in places]
+    return replace(log, boxes=boxes), stood
+
+
+def _upright(poses: Float[np.ndarray, "*n 4 4"], z_m: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 4 4"]:
+    """Poses of the same places in the plane and the same headings, at heights."""
+    yaw = np.arctan2(poses[..., 1, 0], poses[..., 0, 0])
+    made = np.zeros_like(poses)
+    made[..., 0, 0] = made[..., 1, 1] = np.cos(yaw)
+    made[..., 1, 0] = np.sin(yaw)
+    made[..., 0, 1] = -made[..., 1, 0]
+    made[..., 2, 2] = made[..., 3, 3] = 1
+    made[..., :2, 3], made[..., 2, 3] = poses[..., :2, 3], z_m
+    return made
 
 
 def _drawn(path: Trajectory, time_s: float, options: PathOptions, rng: np.random.Generator) -> Place:

@@ -17,7 +17,8 @@ from dreamdrive.data.select import Selection
 from dreamdrive.errors import InputError
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.layout import Layout, track_function
-from dreamdrive.scene.log import Log, LogCamera
+from dreamdrive.scene.log import Log, LogCamera, OfLog
+from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world import upright
 
 OF_SCENES = ("dataset", "scene", "cameras")
@@ -130,3 +131,22 @@ def map_from_cameras(street: Street, times_s: Float[np.ndarray, " t"]) -> Float[
     mounted = np.stack([below @ camera.ego_from_camera for camera in street.cameras])
     places = np.stack([upright(place) for place in track_function(ego.track)(times_s)])
     return places[:, None] @ mounted
+
+
+def place_in_log(street: Street, time_s: float) -> OfLog:
+    """Where a clip lies in its scene's log, whose first frame is of ``time_s`` and of the first camera.
+
+    In the plane it is exact: a layout is the log's plane, moved. It has no heights, so that its level road
+    lies as high as the log's car is at ``time_s``, all along the drive. The log's own car and boxes leave
+    that road by as much as the street rises or falls, 3 m after 100 m at 3 %, and by the tilt of the car.
+    ``OfLog.level_z_m`` says so: whoever stands them on that road upright has them where the frames show
+    them, and what remains is that of paths between two labels, splines here and straight lines there.
+    """
+    log = street.log
+    assert log is not None
+    car = Trajectory(log.world_from_ego, log.times_s).at(np.array([time_s]))[0]
+    log_from_map = np.eye(4)
+    log_from_map[:2, 3] = log.world_from_ego[0, :2, 3]  # the layout's origin
+    log_from_map[2, 3] = car[2, 3]
+    first = log_from_map @ map_from_cameras(street, np.array([time_s]))[0, 0]
+    return OfLog.of(log, first, time_s, float(car[2, 3]))

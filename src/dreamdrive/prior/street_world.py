@@ -19,6 +19,7 @@ from dreamdrive.prior.street import (
     Street,
     check_no_scene,
     map_from_cameras,
+    place_in_log,
     read_street,
     wanted_frames,
 )
@@ -118,8 +119,12 @@ def _clip_of_scene(
         mounted = [CAR_FROM_EGO @ camera.ego_from_camera for camera in street.cameras]
         rig = tuple(pinhole.at(pose) for pinhole, pose in zip(pinholes, mounted, strict=True))
     clip = _clip(control, np.stack(frames), wanted, fps, rig, _notes(street, log))
-    known = Known(to_first(poses), intrinsics=True)
-    return replace(clip, known=known, provenance={**clip.provenance, "cameras": names})
+    return replace(
+        clip,
+        known=Known(to_first(poses), intrinsics=True),
+        log=place_in_log(street, float(wanted[0] / fps)),
+        provenance={**clip.provenance, "cameras": names},
+    )
 
 
 def _drawn(layout: Layout) -> Layout:

@@ -65,7 +65,7 @@ class Production(Stages):
         clip: Clip = self.results["prior"]
         geometry: Geometry = self.results["geometry"]
         path = request.control.path
-        scene = replace(scene, provenance=_about(path, clip, geometry))
+        scene = replace(scene, provenance=_about(path, clip, geometry, request.prior))
 
         def show(progress: Progress) -> None:
             save_scene(scene, staging / "scene")
@@ -131,7 +131,7 @@ def start(
     )
 
 
-def _about(path: Path | None, clip: Clip, geometry: Geometry) -> Provenance:
+def _about(path: Path | None, clip: Clip, geometry: Geometry, prior: str) -> Provenance:
     return Provenance(
         input=None if path is None else path.name,
         source_index=tuple(clip.source_index.tolist()),
@@ -139,5 +139,6 @@ def _about(path: Path | None, clip: Clip, geometry: Geometry) -> Provenance:
         up=None if geometry.ground is None else tuple(geometry.ground.normal_world.tolist()),
         scale=geometry.scale.source,
         camera_height_m=None if geometry.ground is None else geometry.ground.offset_m,
-        log=None if clip.recorded is None else clip.recorded.log,
+        log=clip.log,
+        prior=prior if clip.recorded is None else None,
     )

@@ -67,7 +67,6 @@ class Recorded:
         scaled: To which these were scaled.
         offset: Columns and rows that were then cut away at the left and the top.
         lens: What was taken out of the frames, as ``data.Lens.from_json`` reads it.
-        log: The drive of a data set that they are of; its world is that of the clip's known poses, moved.
     """
 
     path: str
@@ -76,7 +75,6 @@ class Recorded:
     scaled: tuple[int, int]
     offset: tuple[int, int]
     lens: dict[str, Any] | None = None
-    log: OfLog | None = None
 
 
 @dataclass(frozen=True)
@@ -100,6 +98,8 @@ class Clip:
         looks: What the street network sees, one look a camera of the rig; empty where it was not asked.
         cuts: Index of each first frame of its camera after a change to another scene.
         recorded: How the frames were taken from pictures on disk; None where they were drawn or generated.
+        log: The drive of a data set that the frames are of, or that they were drawn or generated for. The
+            world that it places is the camera of the clip's first frame.
         provenance: Where the frames come from, in words and JSON values; ``provenance["notes"]`` is a list
             of sentences for the report.
     """
@@ -119,6 +119,7 @@ class Clip:
     looks: tuple[Look, ...] = ()
     cuts: tuple[int, ...] = ()
     recorded: Recorded | None = None
+    log: OfLog | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

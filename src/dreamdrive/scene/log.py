@@ -208,11 +208,25 @@ class OfLog:
         name: Of the log.
         log_from_world: From the world of a clip or a scene to that of the log (4 rows of 4).
         start_s: Their time 0 on the clock of the log.
+        level_z_m: Height, in the world of the log, of a level road that stands for its own: the car and all
+            boxes were made to stand upright on it. None where they are as high as in the log.
     """
 
     name: str
     log_from_world: tuple[tuple[float, ...], ...]
     start_s: float
+    level_z_m: float | None = None
+
+    @staticmethod
+    def of(
+        log: Log,
+        log_from_world: Float[np.ndarray, "4 4"],
+        start_s: float,
+        level_z_m: float | None = None,
+    ) -> "OfLog":
+        """The place in a log, from numbers of NumPy."""
+        rows = tuple(tuple(map(float, row)) for row in log_from_world)
+        return OfLog(log.name, rows, float(start_s), level_z_m)
 
 
 def _plain(name: str) -> str:

@@ -56,6 +56,7 @@ class Provenance:
         scale: What metres rest on, in words.
         camera_height_m: Height of the first camera above the road.
         log: The drive of a data set, where it was made of one.
+        prior: Name of the prior that drew or generated its frames; None where they were recorded.
     """
 
     input: str | None = None
@@ -65,6 +66,7 @@ class Provenance:
     scale: str | None = None
     camera_height_m: float | None = None
     log: OfLog | None = None
+    prior: str | None = None
 
 
 @dataclass(frozen=True)

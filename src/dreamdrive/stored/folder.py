@@ -24,7 +24,7 @@ from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
 from dreamdrive.scene.actor import Actor, Box, Track
-from dreamdrive.scene.camera import FARTHEST_M, Camera
+from dreamdrive.scene.camera import FARTHEST_M, Camera, check_rigid
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Provenance, Scene, SceneMotion
@@ -339,3 +339,5 @@ def _check(scene: Scene) -> None:
         raise ValueError(f"source_index names {len(source)} frames of {count}")
     if up is not None and abs(float(np.linalg.norm(up)) - 1) > 1e-3:
         raise ValueError(f"up is {up}, not a unit vector")
+    if scene.provenance.log is not None:
+        check_rigid(np.array(scene.provenance.log.log_from_world), "log_from_world")

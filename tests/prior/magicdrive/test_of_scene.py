@@ -205,6 +205,16 @@ def test_a_scene_becomes_six_pictures_of_each_time(scene: Log, clip: Clip) -> No
     assert clip.provenance["prompt"] == "A driving scene image at boston-seaport. A street that is made up."
 
 
+def test_the_clip_lies_where_the_front_camera_was(control: Control, scene: Log, clip: Clip) -> None:
+    """With the heights and the tilt of the log: nothing is made level."""
+    later = choose_prior("magicdrive")(replace(control, frames="1:2"))
+    for made, time_s in ((clip, 0.0), (later, 0.5)):
+        assert made.log is not None
+        assert (made.log.name, made.log.start_s, made.log.level_z_m) == (scene.name, time_s, None)
+        front = ego(time_s) @ scene.cameras[0].ego_from_camera
+        np.testing.assert_allclose(np.array(made.log.log_from_world), front, atol=2e-3)
+
+
 def test_the_temporal_variant_needs_a_scene_as_long_as_its_clip(control: Control, tmp_path: Path) -> None:
     weights = write_folder(tmp_path / "temporal", temporal=True).path
     with pytest.raises(InputError, match="is labelled for 13 time steps at 12 Hz, and these weights"):

@@ -20,7 +20,7 @@ from dreamdrive.prior.magicdrive.condition import (
 )
 from dreamdrive.prior.street import Street
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, Log, LogCamera, word_of
+from dreamdrive.scene.log import BoxTrack, Log, LogCamera, OfLog, word_of
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.world import upright
 
@@ -84,6 +84,15 @@ class OfScene:
         poses = Trajectory(lead.world_from_camera, lead.times_s).at(times_s)
         poses[:, :3, 3] += _beyond(lead, times_s)
         return poses @ np.linalg.inv(lead.ego_from_camera)
+
+    def place_in_log(self, time_s: float) -> OfLog:
+        """Where a clip lies in the log, whose first frame is of a time and of the first camera.
+
+        It is the pose that the frame was asked for, tilt and height included; the networks follow what they
+        are asked for only roughly. Poses that are looked for in the frames may leave the log's path.
+        """
+        front = self.world_from_car(np.array([time_s]))[0] @ self.ring.car_from_camera[0]
+        return OfLog.of(self.log, front, time_s)
 
     def boxes(
         self, lidar_from_world: Float[np.ndarray, "4 4"], time_s: float

@@ -71,6 +71,7 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
         latents=made.latents,
         source_index=np.repeat(wanted, CAMERAS),
         features={"appearance": appearance(made.frames, valid), f"{name}:{BLOCK}": made.features},
+        log=seen.place_in_log(float(wanted[0] / rate_hz)) if isinstance(seen, OfScene) else None,
         provenance=about | run.about(),
         **_cameras(seen, wanted / rate_hz, parts.settings.size, temporal),
     )
