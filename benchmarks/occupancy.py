@@ -22,7 +22,8 @@ from common.markdown import table
 from common.options import parser_of
 from common.report import publish
 from common.worlds import DEVELOPMENT, set_of
-from dreamdrive.plan import CELL_M, OccupancyOptions, level_from_world, obstacles_of
+from dreamdrive.plan import CELL_M, OccupancyOptions, obstacles_of
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.scene import Scene
 from dreamdrive.world import Drive, make_street
 from dreamdrive.world.drive import WorldBox

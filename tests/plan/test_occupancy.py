@@ -11,12 +11,12 @@ from dreamdrive.plan import (
     CELL_M,
     OccupancyOptions,
     instant_of,
-    level_from_world,
     obstacles_of,
 )
 from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.scene import Provenance, Scene
 
 HEIGHT_M = 1.5

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.errors import InputError
 from dreamdrive.export.log import AXLE_M, Moved, RigCamera, Taken
 from dreamdrive.scene.actor import Actor
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.log import LogMap
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene
@@ -59,20 +59,9 @@ def taken_of_scene(scene: Scene, name: str) -> Taken:
 
 def level_frame(scene: Scene) -> tuple[Float[np.ndarray, "4 4"], Float[np.ndarray, "4 4"]]:
     """From the scene's world to one with z up and the road at 0, and the mounting of its first camera."""
-    about = scene.provenance
-    if about.up is None or about.camera_height_m is None:
-        raise InputError(
-            "the scene does not know its road, or was made before scenes kept the height of their camera; "
-            "make it again with dreamdrive generate"
-        )
-    up, front = np.array(about.up), scene.trajectory.world_from_camera[0]
-    ahead = front[:3, 2] - (front[:3, 2] @ up) * up
-    ahead = ahead / np.linalg.norm(ahead)
-    world_from_scene = np.eye(4)
-    world_from_scene[:3, :3] = np.stack([ahead, np.cross(up, ahead), up])
-    world_from_scene[2, 3] = about.camera_height_m
+    world_from_scene, front = level_from_world(scene), scene.trajectory.world_from_camera[0]
     map_from_ego = np.eye(4)
-    map_from_ego[:3, 3] = (world_from_scene @ front)[:3, 3] - (AXLE_M, 0, about.camera_height_m)
+    map_from_ego[:3, 3] = (world_from_scene @ front)[:3, 3] - (AXLE_M, 0, scene.provenance.camera_height_m)
     return world_from_scene, np.linalg.inv(map_from_ego) @ world_from_scene @ front
 
 
