@@ -7,6 +7,7 @@ class is looked up, imported or called.
 """
 
 import pickletools
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -87,10 +88,15 @@ def follow(data: bytes, path: Path, expected: Expected) -> object:
     """
     machine = _Machine(path, expected)
     try:
-        for count, (instruction, argument, _) in enumerate(pickletools.genops(data)):
-            if count == expected.steps:
-                raise InputError(f"{path} takes over {expected.steps} instructions; expected {expected.what}")
-            machine.step(instruction.name, argument)
+        with warnings.catch_warnings():
+            # Of broken text, of which an error follows where it counts.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for count, (instruction, argument, _) in enumerate(pickletools.genops(data)):
+                if count == expected.steps:
+                    raise InputError(
+                        f"{path} takes over {expected.steps} instructions; expected {expected.what}"
+                    )
+                machine.step(instruction.name, argument)
         return machine.stack.pop()
     except InputError:
         raise
