@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from common.drawn import drawn_clip
 from common.twin import TWIN
 from dreamdrive.choices import QualityName
+from dreamdrive.decompose import DriftOptions
 from dreamdrive.options import QUALITIES
 from dreamdrive.pipeline import build_scene
 from dreamdrive.prior.appearance import appearance
@@ -36,7 +37,9 @@ def scene_of(record: Callable[[], Drive], quality: QualityName, folder: Path) ->
             kept[name] = value
             return value
 
-        scene = build_scene(clip, replace(QUALITIES[quality], knowledge=TWIN), run=run)
+        # In a street that drifts nothing has a place in which it could be hit.
+        options = replace(QUALITIES[quality], knowledge=TWIN, drift=DriftOptions(allowed=False))
+        scene = build_scene(clip, options, run=run)
         folder.parent.mkdir(parents=True, exist_ok=True)
         save_scene(_on_its_road(scene, kept["geometry"]), folder)
     return load_scene(folder)

@@ -16,7 +16,6 @@ from dreamdrive.run.codec import read
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.scene import Scene
-from dreamdrive.show import panels
 from dreamdrive.splat import render_scene
 from dreamdrive.stored import load_scene
 
@@ -70,7 +69,7 @@ def _view(scene: Scene, camera: Camera, t_s: float) -> tuple[Picture, float]:
     view = render_scene(scene, camera, t_s)
     rays = camera.rays() @ camera.world_from_camera[:3, :3].T
     below = rays @ up_of(scene) < 0
-    return panels.to_bytes(view.colour.numpy()), float((below & (view.alpha.numpy() < _HALF)).mean())
+    return view.picture, float((below & (view.alpha.numpy() < _HALF)).mean())
 
 
 def _aside(scene: Scene, frame: int, right_m: float) -> tuple[Picture, float]:

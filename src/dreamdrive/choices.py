@@ -25,7 +25,7 @@ Stage = Literal["prior", "look", "geometry", "initialise", "static", "score", "g
 Show = Literal["colour", "depth", "dynamic", "static"]
 Format = Literal["mp4", "png", "npz"]
 PlanMethod = Literal["avoid", "uniad"]
-ExportKind = Literal["ply", "nuscenes", "ncore"]
+ExportKind = Literal["ply", "nuscenes", "ncore", "mcap"]
 DtypeName = Literal["float16", "float32"]
 Resize = Literal["tf1", "torch", "antialias", "clean"]
 """tf1: bilinear of TensorFlow 1 without half-pixel centres (torch-fidelity); torch: bilinear (pytorch-fid);

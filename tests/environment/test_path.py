@@ -3,7 +3,7 @@ import pytest
 from tests.environment.scenes import HEIGHT_M, SPEED_M_S, scene, straight
 
 from dreamdrive.environment.path import RecordedPath, moved_pose, recorded_path
-from dreamdrive.plan import level_from_world
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.scene import Scene
 
 CAMERA_M = 1.7

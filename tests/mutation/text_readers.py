@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
 from dreamdrive.cli.arguments import EXAMPLES, parse_action
+from dreamdrive.data.argoverse import read_argoverse
 from dreamdrive.data.intrinsics import read_intrinsics
 from dreamdrive.data.layout_file import read_layout, write_layout
 from dreamdrive.data.poses import of_frames, read_pose_file, read_trajectory, write_trajectory
@@ -19,14 +21,17 @@ from dreamdrive.files.paths import read_text
 from dreamdrive.geometry.backends.dust3r.network.config import config_from_call, config_from_json
 from dreamdrive.geometry.backends.files import attach, bent_model
 from dreamdrive.geometry.backends.files.formats import companions
+from dreamdrive.plan import read_results
 from dreamdrive.prior.magicdrive.config import read_settings
 from dreamdrive.scene.action import check_action
 from dreamdrive.scene.camera import FARTHEST_M
 from dreamdrive.scene.trajectory import Trajectory
+from tests.data import test_argoverse as argoverse
 from tests.evaluate.test_geometry_truth import asking, pandaset, recording
 from tests.geometry.backends.dust3r.network.test_config import CALL, HUB
 from tests.geometry.backends.files import drives
 from tests.mutation.reader import Reader
+from tests.plan.test_results import PLANS, as_json, as_pickle, as_table
 from tests.prior.magicdrive.tiny import official_configs
 from tests.streets import small_street
 
@@ -185,6 +190,15 @@ TEXT: tuple[Reader, ...] = (
         lambda f: read_geometry_truth(f, asking([0, 1, 2], (64, 32), "side_camera")),
     ),
     Reader("truth-kitti", recording, lambda f: read_geometry_truth(f, asking([0, 1, 2], (64, 32)))),
+    *(
+        Reader(f"plans-{name}", partial(write, plans=PLANS), lambda f, file=file: read_results(f / file))
+        for name, write, file in (
+            ("json", as_json, "plans.json"),
+            ("pickle", as_pickle, "plans.pkl"),
+            ("table", as_table, "table.npz"),
+        )
+    ),
+    Reader("argoverse", argoverse.write, read_argoverse),
     Reader(
         "dust3r-json",
         _json("config.json", HUB),

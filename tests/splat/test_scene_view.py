@@ -64,6 +64,16 @@ def test_depth_is_in_metres_along_z() -> None:
     view = render_scene(scene(), CAMERA, 0.0)
     assert view.depth_m[24, 17].item() == pytest.approx(6.0, abs=0.01)
     assert view.depth_m[0, 32].item() == 0
+    assert view.seen_depth_m[24, 17] == pytest.approx(6.0, abs=0.01)
+    faint = ((view.alpha > 0) & (view.alpha < 0.5)).numpy()
+    assert faint.any()
+    assert (view.seen_depth_m[faint] == 0).all()
+
+
+def test_a_picture_is_the_nearest_bytes() -> None:
+    view = render_scene(scene(), CAMERA, 0.0)
+    assert view.picture.dtype == np.uint8
+    assert np.abs(view.picture / 255 - view.colour.numpy()).max() <= 0.5 / 255 + 1e-6
 
 
 @pytest.mark.parametrize(("part", "left", "right"), [("static", True, False), ("dynamic", False, True)])

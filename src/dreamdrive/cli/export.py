@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from dreamdrive.scene.geometry import Geometry
     from dreamdrive.scene.scene import Scene
 
+_OF_WORLD = "Pictures, poses and boxes are those of the drawn street."
+
 
 def export(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
@@ -29,12 +31,13 @@ def export(
     """Write a scene or a drawn street in a format that other programs read.
 
     Args:
-        out: The folder that generate wrote; for nuscenes and ncore also one of world make.
+        out: The folder that generate wrote; for nuscenes, ncore and mcap also one of world make.
         to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
-            ncore the clip with its poses for NuRec, 3dgrut and gsplat.
+            ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove.
         output: For ply NAME.ply for everything at the first recorded time; else a folder for static.ply and,
-            with everything at each recorded time, frames/NNNN.ply. For nuscenes and ncore a folder.
-        force: Replace a data set or sequence that is there already.
+            with everything at each recorded time, frames/NNNN.ply. For nuscenes and ncore a folder, for mcap
+            NAME.mcap.
+        force: Replace a data set, sequence or recording that is there already.
     """
     console = Console(highlight=False, markup=False, soft_wrap=True)
     if to == "nuscenes":
@@ -42,6 +45,9 @@ def export(
         console.print(str(output))
     elif to == "ncore":
         said = _export_ncore(out, output, force)
+        console.print(f"{output}\n{said}")
+    elif to == "mcap":
+        said = _export_mcap(out, output, force)
         console.print(f"{output}\n{said}")
     else:
         from dreamdrive.export import export_ply, left_out_of_ply
@@ -79,11 +85,38 @@ def _export_ncore(out: Path, output: Path, force: bool) -> str:
         said = partial(bars, "ncore")
         if is_world(out):
             world_to_ncore(read_drives(out), output, replace=force, progress=said)
-            return "Pictures, poses and boxes are those of the drawn street."
-        scene = open_scene(out)
-        stages = (out.parent if (out / "scene.json").is_file() else out) / "stages"
+            return _OF_WORLD
+        scene, stages = open_scene(out), _stages(out)
         clip, geometry = _kept(stages, scene)
         scene_to_ncore(scene, output, clip=clip, geometry=geometry, replace=force, progress=said)
+    return _of_pictures(clip, stages)
+
+
+def _export_mcap(out: Path, output: Path, force: bool) -> str:
+    """Write it, and say what its pictures are."""
+    from dreamdrive.export import check_mcap, need_foxglove, scene_to_mcap, world_to_mcap
+    from dreamdrive.world import is_world, read_drives
+
+    need_foxglove()
+    check_mcap(output, force)
+    with Bars(Console()) as bars:
+        said = partial(bars, "mcap")
+        if is_world(out):
+            world_to_mcap(read_drives(out), output, replace=force, progress=said)
+            return _OF_WORLD
+        scene, stages = open_scene(out), _stages(out)
+        clip, _ = _kept(stages, scene)
+        scene_to_mcap(scene, output, clip=clip, replace=force, progress=said)
+    return _of_pictures(clip, stages)
+
+
+def _stages(out: Path) -> Path:
+    """Where the run of a scene keeps its results."""
+    return (out.parent if (out / "scene.json").is_file() else out) / "stages"
+
+
+def _of_pictures(clip: "Clip | None", stages: Path) -> str:
+    """What the pictures of a scene are."""
     if clip is None:
         return f"Pictures are rendered from the scene: {stages} does not hold its frames."
     return "Pictures are the frames that the scene was made of."

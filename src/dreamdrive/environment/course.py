@@ -12,7 +12,8 @@ from dreamdrive.environment.path import RecordedPath, moved_pose, recorded_path
 from dreamdrive.environment.road import Road
 from dreamdrive.environment.users import RoadUsers, UserStates, road_users
 from dreamdrive.errors import InputError
-from dreamdrive.plan import inside, level_from_world, obstacles_of, overlapping
+from dreamdrive.plan import inside, obstacles_of, overlapping
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.scene import Scene
 
 STANDING = "standing"

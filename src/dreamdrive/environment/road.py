@@ -8,8 +8,9 @@ from jaxtyping import Float
 from shapely.geometry.base import BaseGeometry
 
 from dreamdrive.errors import InputError
-from dreamdrive.plan import corners, level_from_world
+from dreamdrive.plan import corners
 from dreamdrive.scene.layout import Layout, track_function
+from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.log import Log
 from dreamdrive.scene.scene import Scene
 

@@ -5,6 +5,10 @@ from pathlib import Path
 
 from dreamdrive.choices import ExportKind
 from dreamdrive.errors import InputError
+from dreamdrive.export.mcap import scene_to_mcap, world_to_mcap, write_mcap
+from dreamdrive.export.mcap_file import need_foxglove
+from dreamdrive.export.mcap_words import RecordedBox
+from dreamdrive.export.mcap_writer import DriveRecording, check_mcap, ground_pose
 from dreamdrive.export.ncore import scene_to_ncore, world_to_ncore
 from dreamdrive.export.ncore_words import need_ncore
 from dreamdrive.export.ncore_writer import MARK as NCORE_MARK
@@ -17,6 +21,7 @@ KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {
     "ply": export_ply,
     "nuscenes": export_scene,
     "ncore": scene_to_ncore,
+    "mcap": scene_to_mcap,
 }
 """What ``export --to`` takes."""
 

@@ -6,12 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dreamdrive.errors import InputError
 from dreamdrive.export.ncore_words import need_ncore
 from dreamdrive.export.ncore_writer import NO_MASKS, Masks, write_ncore
-from dreamdrive.export.scene_log import level_frame, taken_of_scene
-from dreamdrive.export.shots import log_of, shots_of_scene, shots_of_world
-from dreamdrive.export.world_log import taken_of_world
+from dreamdrive.export.whole_log import log_of_scene, log_of_world
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -47,15 +44,10 @@ def scene_to_ncore(
             of another scene.
     """
     need_ncore()
-    if clip is not None and clip.times_s.tolist() != scene.times_s.tolist():
-        raise InputError(f"the clip has {len(clip)} frames, which are not those of the scene; give its own")
-    world_from_scene, _ = level_frame(scene)
-    drive = taken_of_scene(scene, folder.name)
-    shots = shots_of_scene(scene, world_from_scene, clip)
-    names = [camera.name for camera in drive.cameras]
-    hidden = NO_MASKS if clip is None else _hidden(clip, geometry, names)
     with tempfile.TemporaryDirectory() as scratch:
-        log = log_of(drive, shots, Path(scratch), progress)
+        log = log_of_scene(scene, folder.name, clip, Path(scratch), progress)
+        names = [camera.name for camera in log.cameras]
+        hidden = NO_MASKS if clip is None else _hidden(clip, geometry, names)
         write_ncore(log, folder, origin="AUTOLABEL", hidden=hidden, replace=replace)
 
 
@@ -64,9 +56,8 @@ def world_to_ncore(
 ) -> None:
     """Write a drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
     need_ncore()
-    drive = taken_of_world(drives, folder.name)
     with tempfile.TemporaryDirectory() as scratch:
-        log = log_of(drive, shots_of_world(drive), Path(scratch), progress)
+        log = log_of_world(drives, folder.name, Path(scratch), progress)
         write_ncore(log, folder, origin="GT_SYNTHETIC", replace=replace)
 
 

@@ -1,15 +1,13 @@
 """What a log holds, in the words of NVIDIA NCore."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.data.picture_file import PICTURE_BYTES, parse_header
 from dreamdrive.errors import InputError
-from dreamdrive.files.paths import read_bytes
+from dreamdrive.export.log_parts import stamps
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import BoxTrack, Log
 
@@ -33,34 +31,6 @@ def need_ncore() -> None:
         ) from None
 
 
-def path_of(log: Log) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
-    """Where the car was at each picture and each labelled time: microseconds, and poses in the log's world.
-
-    Where several cameras have a picture of one time, the first of them tells.
-
-    Raises:
-        InputError: There is one time only.
-    """
-    places: dict[int, np.ndarray] = {}
-    for camera in log.cameras:
-        poses = camera.world_from_camera @ np.linalg.inv(camera.ego_from_camera)
-        for time_us, pose in zip(stamps(log, camera.times_s).tolist(), poses, strict=True):
-            places.setdefault(time_us, pose)
-    for time_us, pose in zip(stamps(log, log.times_s).tolist(), log.world_from_ego, strict=True):
-        places.setdefault(time_us, pose)
-    if len(places) < 2:
-        raise InputError(
-            f"{log.name} has pictures of one time only; NCore wants a path, of two times or more"
-        )
-    times_us = sorted(places)
-    return np.array(times_us), np.stack([places[each] for each in times_us])
-
-
-def stamps(log: Log, times_s: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
-    """Times in microseconds since 1970."""
-    return log.start_us + np.rint(times_s * 1e6).astype(np.int64)
-
-
 def rigid(poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 4 4"]:
     """The same poses, with last rows that are exact, which NCore asks for."""
     exact = poses.copy()
@@ -81,15 +51,6 @@ def model_of(pinhole: Camera) -> "OpenCVPinholeCameraModelParameters":
         tangential_coeffs=np.zeros(2, np.float32),
         thin_prism_coeffs=np.zeros(4, np.float32),
     )
-
-
-def picture_of(file: Path, pinhole: Camera) -> tuple[bytes, str]:
-    """The bytes of a picture and their format; ``InputError`` where it is not of the pinhole's size."""
-    data = read_bytes(file, at_most=PICTURE_BYTES)
-    header, wanted = parse_header(data), (pinhole.width_px, pinhole.height_px, 1)
-    if header is None or (header.width_px, header.height_px, header.orientation) != wanted:
-        raise InputError(f"{file}: expected an upright picture of {wanted[0]}x{wanted[1]} pixels")
-    return data, header.kind.lower()
 
 
 def cuboids_of(

@@ -14,18 +14,9 @@ from jaxtyping import Bool, Float, Int
 from PIL import Image
 
 from dreamdrive.data.lidar_file import read_points
-from dreamdrive.export.ncore_words import (
-    RIG,
-    WORLD,
-    Origin,
-    cuboids_of,
-    model_of,
-    need_ncore,
-    path_of,
-    picture_of,
-    rigid,
-    stamps,
-)
+from dreamdrive.errors import InputError
+from dreamdrive.export.log_parts import path_of, picture_of, stamps
+from dreamdrive.export.ncore_words import RIG, WORLD, Origin, cuboids_of, model_of, need_ncore, rigid
 from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import write_json
 from dreamdrive.scene.log import LidarSweep, Log, LogCamera
@@ -97,6 +88,10 @@ class _Writer:
 
         self.log, self.folder = log, folder
         self.times_us, log_from_rig = path_of(log)
+        if len(self.times_us) < 2:
+            raise InputError(
+                f"{log.name} has pictures of one time only; NCore wants a path, of two times or more"
+            )
         self.world_from_log = np.linalg.inv(log_from_rig[0])
         self.world_from_rig = rigid(self.world_from_log @ log_from_rig)
         first, last = self.times_us[[0, -1]].tolist()

@@ -40,8 +40,7 @@ def taken_of_scene(scene: Scene, name: str) -> Taken:
     def look(camera: int, step: int) -> tuple[np.ndarray, np.ndarray]:
         pose = scene_from_world @ world_from_ego[step] @ rig[camera].ego_from_camera
         view = render_scene(scene, rig[camera].pinhole.at(pose), float(path.times_s[step]), of_rig=camera)
-        picture = np.rint(view.colour.numpy() * 255).astype(np.uint8)
-        return picture, np.where(view.alpha.numpy() > 0.5, view.depth_m.numpy(), 0.0)
+        return view.picture, view.seen_depth_m
 
     boxes = [_moved(actor, scene, path.times_s, world_from_scene) for actor in scene.actors]
     return Taken(

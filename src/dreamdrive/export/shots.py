@@ -65,9 +65,7 @@ def shots_of_scene(
 
         def look() -> tuple[np.ndarray, np.ndarray]:
             seen = render_scene(scene, scene.cameras[view], time_s, of_rig=of_rig)
-            drawn = np.rint(seen.colour.numpy() * 255).astype(np.uint8)
-            depth_m = np.where(seen.alpha.numpy() > 0.5, seen.depth_m.numpy(), 0.0)
-            return drawn if clip is None else clip.frames[view], depth_m
+            return seen.picture if clip is None else clip.frames[view], seen.seen_depth_m
 
         pose = world_from_scene @ scene.cameras[view].world_from_camera
         return Shot(names.index(of_rig), time_s, pose, look)

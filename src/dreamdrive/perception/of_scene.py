@@ -148,8 +148,8 @@ def _sample(
         view = render_scene(scene, pinhole.at(scene_from_log @ pose), time_s, moment=moment)
         alpha = view.alpha.numpy()
         covered.append(float(alpha[_below_horizon(pinhole.at(camera.ego_from_camera))].mean()))
-        pictures.append(np.rint(view.colour.numpy() * 255).astype(np.uint8).transpose(2, 0, 1))
-        views.append((pinhole.at(pose), np.where(alpha > 0.5, view.depth_m.numpy(), 0.0)))
+        pictures.append(view.picture.transpose(2, 0, 1))
+        views.append((pinhole.at(pose), view.seen_depth_m))
     if np.mean(covered) < options.least_covered:
         return None
     boxes = _boxes(log, place, views)

@@ -17,15 +17,16 @@ from dreamdrive.plan.footprint import CAR, Footprint, headings
 from dreamdrive.plan.grid import GRID, Occupancy, PlanningGrid
 from dreamdrive.plan.instant import CAMERA_AHEAD_M, Instant, instant_of
 from dreamdrive.plan.lane_following import IDM, IdmOptions, Lead, follow_lane
+from dreamdrive.plan.lane_of_log import centre_line_of_log, lead_of_log
 from dreamdrive.plan.metrics import STP3_METRIC, UNIAD_METRIC, Convention, raster_scores
 from dreamdrive.plan.occupancy import (
     CELL_M,
     OCCUPANCY,
     Obstacles,
     OccupancyOptions,
-    level_from_world,
     obstacles_of,
 )
+from dreamdrive.plan.of_log import agents_of_log, poses_of_log, road_users_of_log, truth_of_log
 from dreamdrive.plan.planners import constant_turn_and_acceleration, constant_velocity, stand_still
 from dreamdrive.plan.rasters import INVALID, stp3_rasters, uniad_rasters
 from dreamdrive.plan.rectangles import corners, inside, overlapping

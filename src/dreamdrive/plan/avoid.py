@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
+from scipy.spatial import KDTree
 
 from dreamdrive.plan.cost import AGENT_DRIVER, CollisionOptions
 from dreamdrive.plan.footprint import CAR, Footprint
@@ -29,6 +30,7 @@ _STANDING_M = 1e-3
 _SWERVE_S, _SWERVE_LEAST_M = 2.0, 8.0
 """A swerve takes as long as the car drives in this time, and at least so far."""
 _FAR_M, _FORBIDDEN = 10.0, 1e9
+_LOOK_M = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class AvoidOptions:
     most_gain_m_s2: float = 1.5
     most_lateral_m_s2: float = 4.0
     most_aside_m: float = 2.5
-    near_m: float = 8.0
+    near_m: float = 5.5
     footprint: Footprint = CAR
 
 
@@ -152,8 +154,7 @@ def clearance(
     """Least signed distance of the car from cells that are taken, see ``avoid``; at most 10 m."""
     options = AvoidOptions(footprint=footprint)
     path = _Path.of(plan, len(obstacles_m) // len(plan), speed_m_s)
-    near = [_near(cells, path, options) for cells in obstacles_m]
-    return float(_clearance(path.drives(np.zeros(1), np.zeros(1), options), near, footprint).min())
+    return float(_clearance(path.drives(np.zeros(1), np.zeros(1), options), obstacles_m, footprint).min())
 
 
 @dataclass(frozen=True)
@@ -251,7 +252,7 @@ def _best(
     path: _Path,
     changes_m_s2: Float[np.ndarray, " a"],
     asides_m: Float[np.ndarray, " b"],
-    near: list[Float[np.ndarray, "_ 2"]],
+    near: Sequence[Float[np.ndarray, "_ 2"]],
     options: AvoidOptions,
 ) -> tuple[float, float]:
     """The change of acceleration and the way aside that cost least, of all pairs."""
@@ -277,25 +278,30 @@ def _wanted(path: _Path, options: AvoidOptions) -> Float[np.ndarray, " s"]:
 
 def _near(cells_m: Float[np.ndarray, "n 2"], path: _Path, options: AvoidOptions) -> Float[np.ndarray, "k 2"]:
     """Cells that any drive could come near to."""
-    low, high = (end(path.places_m[:-1], axis=0) for end in (np.min, np.max))
-    reach_m = options.near_m
-    inside = ((cells_m >= low - reach_m) & (cells_m <= high + reach_m)).all(axis=1)
-    return cells_m[inside]
+    if not len(cells_m):
+        return cells_m
+    end_m = path.along_m[-1] - _LONGER_M + options.most_gain_m_s2 * path.fine_s[-1] ** 2 / 2
+    stations = np.arange(0.0, end_m + _LOOK_M, _LOOK_M)
+    line = np.stack([np.interp(stations, path.along_m, column) for column in path.places_m.T], axis=-1)
+    away, _ = KDTree(line).query(cells_m, distance_upper_bound=options.near_m)
+    return cells_m[np.isfinite(away)]
 
 
 def _clearance(
-    drives: _Drives, near: list[Float[np.ndarray, "_ 2"]], car: Footprint
+    drives: _Drives, near: Sequence[Float[np.ndarray, "_ 2"]], car: Footprint
 ) -> Float[np.ndarray, "k s"]:
     """Signed distance from the car's rectangle to the nearest cell, which counts as a disc; at most 10 m."""
     found = np.full(drives.places_m.shape[:2], _FAR_M)
     for step, cells in enumerate(near):
         if not len(cells):
             continue
-        away = cells - drives.places_m[:, step, None]
-        ahead = drives.ahead[:, step, None]
-        along = np.abs((away * ahead).sum(-1) - car.ahead_m) - car.length_m / 2
-        aside = np.abs(away[..., 0] * ahead[..., 1] - away[..., 1] * ahead[..., 0]) - car.width_m / 2
-        outside = np.hypot(np.maximum(along, 0), np.maximum(aside, 0))
-        signed = outside + np.minimum(np.maximum(along, aside), 0)
-        found[:, step] = np.minimum(signed.min(axis=1) - CELL_M / 2, _FAR_M)
+        place, ahead = drives.places_m[:, step], drives.ahead[:, step]
+        right = np.column_stack([ahead[:, 1], -ahead[:, 0]])
+        # Products of matrices, as this is where all time goes.
+        along = ahead @ cells.T - ((place * ahead).sum(-1) + car.ahead_m)[:, None]
+        aside = right @ cells.T - (place * right).sum(-1)[:, None]
+        along, aside = np.abs(along) - car.length_m / 2, np.abs(aside) - car.width_m / 2
+        inner = np.maximum(along, aside).min(axis=1)
+        outer = np.sqrt((np.maximum(along, 0) ** 2 + np.maximum(aside, 0) ** 2).min(axis=1))
+        found[:, step] = np.minimum(np.where(inner < 0, inner, outer) - CELL_M / 2, _FAR_M)
     return found

@@ -18,6 +18,8 @@ from dreamdrive.scene.camera import Camera, check_rigid
 Word = TypeVar("Word", bound=str)
 _NEAR_S = 0.05
 """How far from a label its time still is."""
+_ABOUT_RAD = 2.0
+"""Nothing turns so far from one label to the next."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +90,14 @@ class BoxTrack:
         if after in (0, len(times_s)):
             return self.world_from_box[min(after, len(times_s) - 1)]
         one, other = self.world_from_box[after - 1 : after + 1]
+        first, last = one[:3, 3], other[:3, 3]
         share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1])
         turned = Rotation.from_matrix(one[:3, :3].T @ other[:3, :3]).as_rotvec()
+        if np.linalg.norm(turned) > _ABOUT_RAD:  # labelled the other way round: there is nothing in between
+            turned, one = np.zeros(3), (one if share < 0.5 else other)
         pose = one.copy()
         pose[:3, :3] = one[:3, :3] @ Rotation.from_rotvec(share * turned).as_matrix()
-        pose[:3, 3] = one[:3, 3] + share * (other[:3, 3] - one[:3, 3])
+        pose[:3, 3] = (1 - share) * first + share * last
         return pose
 
     def row_at(self, time_s: float) -> int:
@@ -145,6 +150,10 @@ class Polygon:
     holes: tuple[Float[np.ndarray, "_ 2"], ...] = ()
 
 
+LANE_CENTRE = "lane_centre"
+"""Layer of lines: the middle of each lane in the direction of travel. nuScenes' map expansion lacks it."""
+
+
 @dataclass(frozen=True)
 class LogMap:
     """A map by layers, which have the names of nuScenes' map expansion, such as ``drivable_area``."""
@@ -165,7 +174,7 @@ class Log:
         about: What happens, in words of the data set.
         location: Which map it is on.
         root: Folder of the data set.
-        cameras: The front camera first.
+        cameras: The front camera first; empty where pictures are not read.
         times_s: Times that are labelled, on the clock of the log: seconds since ``start_us``.
         start_us: The first of them in microseconds since 1970.
         world_from_ego: Where the car was at those times.

@@ -24,5 +24,5 @@ def draw_drives(scene: Scene) -> UInt8[np.ndarray, "h w 3"] | None:
             view = int(views[round(share * (len(views) - 1))])
             t_s = float(scene.times_s[view])
             seen = render_scene(scene, scene.cameras[view], t_s, of_rig=int(scene.camera[view]))
-            images[f"drive {number + 1}, {t_s:.1f} s"] = panels.to_bytes(seen.colour.numpy())
+            images[f"drive {number + 1}, {t_s:.1f} s"] = seen.picture
     return panels.grid(images, columns=_COLUMNS)

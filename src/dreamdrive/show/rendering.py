@@ -135,7 +135,7 @@ def depth_png(view: SceneView) -> UInt16[np.ndarray, "h w"]:
 def _picture(view: SceneView, show: Show) -> UInt8[np.ndarray, "h w 3"]:
     if show == "depth":
         return panels.depth_colours(view.depth_m.numpy())
-    return panels.to_bytes(view.colour.numpy())
+    return view.picture
 
 
 def _write_frame(path: Path, view: SceneView, show: Show) -> None:

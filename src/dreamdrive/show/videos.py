@@ -111,7 +111,7 @@ def as_recorded(
 ) -> UInt8[np.ndarray, "h w 3"]:
     """A view as a camera of the rig would have shown it, with the distortion of its lens if it has one."""
     if lens is None:
-        return panels.to_bytes(render_scene(scene, camera, t_s, of_rig=of_rig).colour.numpy())
+        return render_scene(scene, camera, t_s, of_rig=of_rig).picture
     wide = lens.covering().at(camera.world_from_camera)
     return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s, of_rig=of_rig).colour.numpy(), wide))
 

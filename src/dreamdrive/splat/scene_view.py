@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from dreamdrive.scene.camera import Camera
@@ -40,6 +41,16 @@ class SceneView:
     def dynamic(self) -> Bool[Tensor, "h w"]:
         """Pixels of moving things: dynamic Gaussians carry at least half of the alpha, and alpha one half."""
         return (self.dynamic_share >= 0.5 * self.alpha) & (self.alpha >= 0.5)
+
+    @property
+    def picture(self) -> UInt8[np.ndarray, "h w 3"]:
+        """The colours as bytes."""
+        return self.colour.mul(255).round().to(torch.uint8).numpy()
+
+    @property
+    def seen_depth_m(self) -> Float[np.ndarray, "h w"]:
+        """Depth where Gaussians cover more than half of the pixel, else 0."""
+        return torch.where(self.alpha > 0.5, self.depth_m, 0.0).numpy()
 
 
 @one_torch_thread()

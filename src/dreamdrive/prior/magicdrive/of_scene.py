@@ -51,8 +51,6 @@ _ON_CAR_M = (4.0, 0.5, 4.0)
 """A lidar is at most so far from the car's origin, and so high."""
 _LIDAR_FROM_FRONT_M = np.array(LIDAR_PLACE_M) - np.array(NUSCENES[0].place_m)
 """Where the LiDAR is on cars of nuScenes, from the front camera: ahead, left, up."""
-_SAME_S = 1e-3
-"""By how much a time may lie beside that of a label and be the same: they are told in microseconds."""
 _BEYOND_S = 0.3
 """How far before or behind its pictures the path of the first camera may be needed: it goes on as there."""
 
@@ -284,17 +282,7 @@ def _placed(
     None before its first label and behind its last one, and where the lidar hit nothing of it, which nuScenes
     does not list.
     """
-    labelled = track.times_s
-    nearest = int(np.abs(labelled - time_s).argmin())
-    inside = labelled[0] - _SAME_S <= time_s <= labelled[-1] + _SAME_S
-    if not inside or track.lidar_points[nearest] == 0:
+    pose, row = track.pose_at(time_s), track.row_at(time_s)
+    if pose is None or track.lidar_points[row] == 0:
         return None
-    later = min(int(np.searchsorted(labelled, time_s)), len(labelled) - 1)
-    earlier = max(later - 1, 0)
-    gap_s = labelled[later] - labelled[earlier]
-    share = 1.0 if gap_s == 0 else float(np.clip((time_s - labelled[earlier]) / gap_s, 0, 1))
-    one, other = track.world_from_box[earlier], track.world_from_box[later]
-    ahead = (1 - share) * one[:3, 0] + share * other[:3, 0]
-    if np.linalg.norm(ahead) < 0.5:  # it turns about: between opposite directions there is none
-        ahead = track.world_from_box[nearest][:3, 0]
-    return (1 - share) * one[:3, 3] + share * other[:3, 3], ahead, track.size_lwh_m[nearest]
+    return pose[:3, 3], pose[:3, 0], track.size_lwh_m[row]

@@ -1,0 +1,40 @@
+"""Scenes and drawn streets as logs in which nothing is lost, for formats that hold all of it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.export.scene_log import level_frame, taken_of_scene
+from dreamdrive.export.shots import log_of, shots_of_scene, shots_of_world
+from dreamdrive.export.world_log import taken_of_world
+from dreamdrive.progress import Progress
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.log import Log
+from dreamdrive.scene.scene import Scene
+from dreamdrive.world import Drive, Mount
+
+
+def log_of_scene(scene: Scene, name: str, clip: Clip | None, folder: Path, progress: Progress) -> Log:
+    """The recorded views of a scene, with its poses, actors and depth.
+
+    Args:
+        scene: The scene.
+        name: Of the log.
+        clip: What the scene was made of, whose frames are written; without it the scene is rendered.
+        folder: For pictures and lidar points.
+        progress: Told of each picture.
+
+    Raises:
+        InputError: The scene does not know the height of its camera, or the clip is of another scene.
+    """
+    if clip is not None and clip.times_s.tolist() != scene.times_s.tolist():
+        raise InputError(f"the clip has {len(clip)} frames, which are not those of the scene; give its own")
+    world_from_scene, _ = level_frame(scene)
+    shots = shots_of_scene(scene, world_from_scene, clip)
+    return log_of(taken_of_scene(scene, name), shots, folder, progress)
+
+
+def log_of_world(drives: Mapping[Mount, Drive], name: str, folder: Path, progress: Progress) -> Log:
+    """A drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
+    drive = taken_of_world(drives, name)
+    return log_of(drive, shots_of_world(drive), folder, progress)
