@@ -3,7 +3,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dreamdrive.plan import CAR, Plan, avoid, headings, overlapping
+from dreamdrive.plan import CAR, AvoidOptions, Plan, avoid, headings, overlapping
 
 AHEAD = np.column_stack([np.zeros(6), 4.0 * np.arange(1, 7)])  # 8 m/s
 NOTHING = np.zeros((0, 2))
@@ -65,6 +65,17 @@ def test_a_car_that_stands_stays_where_it_is() -> None:
     found = avoid(Plan(np.zeros((6, 2))), 0.0, [wall((-1, 1), 5.0)] * 6)
     assert not found.changed
     assert found.clear_before_m == pytest.approx(5.0 - 0.25 - 0.5 - 4.084 / 2)
+
+
+def test_it_keeps_away_from_what_is_ahead_the_more_the_later_it_is() -> None:
+    # The front comes to 26.5 m in three seconds, and others may brake.
+    near, far = (avoid(Plan(AHEAD), 8.0, [wall((-1, 1), y_m)] * 12) for y_m in (28.0, 30.5))
+    assert near.changed
+    assert near.clear_before_m > 0
+    assert near.clear_after_m > near.clear_before_m
+    assert not far.changed
+    trusting = avoid(Plan(AHEAD), 8.0, [wall((-1, 1), 28.0)] * 12, AvoidOptions(unsure_ahead_m_s=0.0))
+    assert not trusting.changed
 
 
 def test_obstacles_come_with_every_waypoint() -> None:

@@ -88,6 +88,14 @@ def test_fog_sky_and_single_specks_take_nothing() -> None:
     assert len(obstacles_of(scene_of(dots(points)), [0.0], OccupancyOptions(opacity=1e4)).standing_m) == 0
 
 
+@pytest.mark.parametrize(("least", "taken"), [(3, 3), (4, 0)])
+def test_few_cells_together_are_floaters(least: int, taken: int) -> None:
+    # Three cells in a row, by their corners.
+    places = np.concatenate([block((0.1 + k, 0.4 + k), (8.1 + k, 8.4 + k), (0.5, 1.5)) for k in (0, 0.5, 1)])
+    found = obstacles_of(scene_of(dots(places)), [0.0], OccupancyOptions(least_cells=least))
+    assert len(found.standing_m) == taken
+
+
 def test_what_moves_is_there_at_its_times() -> None:
     living = replace(
         dots(block((0, 1), (10, 11), (0.5, 1.5))), lifespan=torch.tensor([[0.5, 0.1]]).repeat(1000, 1)

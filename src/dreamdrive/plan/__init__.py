@@ -20,6 +20,7 @@ from dreamdrive.plan.lane_following import IDM, IdmOptions, Lead, follow_lane
 from dreamdrive.plan.lane_of_log import centre_line_of_log, lead_of_log
 from dreamdrive.plan.metrics import STP3_METRIC, UNIAD_METRIC, Convention, raster_scores
 from dreamdrive.plan.occupancy import (
+    CAUTIOUS,
     CELL_M,
     OCCUPANCY,
     Obstacles,

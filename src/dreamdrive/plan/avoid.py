@@ -40,6 +40,8 @@ class AvoidOptions:
     Attributes:
         clear_m: Wanted distance of the car's rectangle from what stands in the way.
         unsure_m_s: By how much it grows a second, as nobody knows what others will do.
+        unsure_ahead_m_s: By how much the car is taken to be longer ahead each second, as others may brake;
+            never by more than it has driven.
         clear_weight: Cost of a metre short of it, squared.
         hit_cost: Of each time at which the rectangle touches a cell: more than any other drive.
         comfort_weight: Of a metre per second squared more or less than planned, squared.
@@ -54,6 +56,7 @@ class AvoidOptions:
 
     clear_m: float = 0.4
     unsure_m_s: float = 0.1
+    unsure_ahead_m_s: float = 1.0
     clear_weight: float = 20.0
     hit_cost: float = 10_000.0
     comfort_weight: float = 0.05
@@ -78,10 +81,11 @@ class Avoided:
 
 @dataclass(frozen=True)
 class _Drives:
-    """K drives at S times: the reference point and where the car points; whether a car can drive so."""
+    """K drives at S times: the reference point, where the car points, how far it has come; whether it can."""
 
     places_m: Float[np.ndarray, "k s 2"]
     ahead: Float[np.ndarray, "k s 2"]
+    driven_m: Float[np.ndarray, "k s"]
     feasible: Bool[np.ndarray, " k"]
 
 
@@ -91,7 +95,7 @@ def avoid(
     obstacles_m: Sequence[Float[np.ndarray, "_ 2"]],
     options: AvoidOptions = AvoidOptions(),
 ) -> Avoided:
-    """The best drive near a planned one; the same one where it touches nothing.
+    """The best drive near a planned one; the same one where it touches nothing, even with a car longer ahead.
 
     Args:
         plan: What is planned.
@@ -108,7 +112,8 @@ def avoid(
     path = _Path.of(plan, every, speed_m_s)
     near = [_near(cells, path, options) for cells in obstacles_m]
     before_m = clearance(plan, speed_m_s, obstacles_m, options.footprint)
-    if before_m >= 0:
+    planned = path.drives(np.zeros(1), np.zeros(1), options)
+    if (_clearance(planned, near, options.footprint, _longer(planned, path, options)) >= 0).all():
         return Avoided(plan, False, before_m, before_m)
     changes = np.linspace(-options.most_braking_m_s2, options.most_gain_m_s2, 13)
     asides = np.linspace(-options.most_aside_m, options.most_aside_m, 11)
@@ -122,7 +127,7 @@ def avoid(
         change, aside = _best(path, *tried, near, options)
     drive = path.drives(np.array([change]), np.array([aside]), options)
     waypoints_m = drive.places_m[0, every - 1 :: every]
-    after_m = float(_clearance(drive, near, options.footprint).min())
+    after_m = float(_clearance(drive, obstacles_m, options.footprint).min())
     return Avoided(replace(plan, waypoints_m=waypoints_m), True, before_m, after_m)
 
 
@@ -230,6 +235,7 @@ class _Path:
         return _Drives(
             places[:, self.every :: self.every],
             ahead[:, self.every :: self.every],
+            driven_m[:, self.every :: self.every],
             _feasible(ahead, driven_m, speed_m_s, step_s, options),
         )
 
@@ -262,7 +268,7 @@ def _best(
     moved_m = drives.places_m - planned.places_m
     right = np.stack([planned.ahead[..., 1], -planned.ahead[..., 0]], axis=-1)
     along, aside = (moved_m * planned.ahead).sum(-1), (moved_m * right).sum(-1)
-    clear_m = _clearance(drives, near, options.footprint)
+    clear_m = _clearance(drives, near, options.footprint, _longer(drives, path, options))
     short_m = np.maximum(_wanted(path, options) - clear_m, 0.0)
     cost = (along**2 + options.aside_weight * aside**2).sum(1)
     cost += (options.clear_weight * short_m**2 + options.hit_cost * (clear_m < 0)).sum(1)
@@ -274,6 +280,10 @@ def _best(
 
 def _wanted(path: _Path, options: AvoidOptions) -> Float[np.ndarray, " s"]:
     return options.clear_m + options.unsure_m_s * path.fine_s[path.every :: path.every]
+
+
+def _longer(drives: _Drives, path: _Path, options: AvoidOptions) -> Float[np.ndarray, "k s"]:
+    return np.minimum(options.unsure_ahead_m_s * path.fine_s[path.every :: path.every], drives.driven_m)
 
 
 def _near(cells_m: Float[np.ndarray, "n 2"], path: _Path, options: AvoidOptions) -> Float[np.ndarray, "k 2"]:
@@ -288,9 +298,15 @@ def _near(cells_m: Float[np.ndarray, "n 2"], path: _Path, options: AvoidOptions)
 
 
 def _clearance(
-    drives: _Drives, near: Sequence[Float[np.ndarray, "_ 2"]], car: Footprint
+    drives: _Drives,
+    near: Sequence[Float[np.ndarray, "_ 2"]],
+    car: Footprint,
+    longer_m: Float[np.ndarray, "k s"] | None = None,
 ) -> Float[np.ndarray, "k s"]:
-    """Signed distance from the car's rectangle to the nearest cell, which counts as a disc; at most 10 m."""
+    """Signed distance from the car's rectangle to the nearest cell, which counts as a disc; at most 10 m.
+
+    ``longer_m`` is what the car has ahead of it at each time.
+    """
     found = np.full(drives.places_m.shape[:2], _FAR_M)
     for step, cells in enumerate(near):
         if not len(cells):
@@ -300,7 +316,9 @@ def _clearance(
         # Products of matrices, as this is where all time goes.
         along = ahead @ cells.T - ((place * ahead).sum(-1) + car.ahead_m)[:, None]
         aside = right @ cells.T - (place * right).sum(-1)[:, None]
-        along, aside = np.abs(along) - car.length_m / 2, np.abs(aside) - car.width_m / 2
+        ahead_m = 0.0 if longer_m is None else longer_m[:, step, None]
+        along = np.maximum(along - ahead_m, -along) - car.length_m / 2
+        aside = np.abs(aside) - car.width_m / 2
         inner = np.maximum(along, aside).min(axis=1)
         outer = np.sqrt((np.maximum(along, 0) ** 2 + np.maximum(aside, 0) ** 2).min(axis=1))
         found[:, step] = np.minimum(np.where(inner < 0, inner, outer) - CELL_M / 2, _FAR_M)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.plan.footprint import CAR, Footprint
-from dreamdrive.plan.occupancy import OCCUPANCY, OccupancyOptions, obstacles_of
+from dreamdrive.plan.occupancy import CAUTIOUS, OccupancyOptions, obstacles_of
 from dreamdrive.plan.rectangles import inside
 from dreamdrive.plan.trajectory import AHEAD_RAD
 from dreamdrive.scene.scene import Scene
@@ -48,7 +48,7 @@ def instant_of(
     scene: Scene,
     now_s: float,
     ahead_s: Float[np.ndarray, " t"],
-    options: OccupancyOptions = OCCUPANCY,
+    options: OccupancyOptions = CAUTIOUS,
     footprint: Footprint = CAR,
     camera_ahead_m: float = CAMERA_AHEAD_M,
     path: Trajectory | None = None,

@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
@@ -32,6 +35,7 @@ class OccupancyOptions:
         lowest_m: Height above the road from which a car would hit it: kerbs are lower.
         highest_m: Height up to which it would: a car, and a margin.
         opacity: Sum that takes a cell, of Gaussians or parts of them.
+        least_cells: So many taken ones have to touch one another: fewer are floaters.
         spread: Where the parts of a Gaussian are, in its standard deviations along both ways of each axis:
             those of far surfaces are few, and larger than a cell.
     """
@@ -41,10 +45,14 @@ class OccupancyOptions:
     lowest_m: float = 0.3
     highest_m: float = 2.0
     opacity: float = 2.5
+    least_cells: int = 2
     spread: float = 0.7
 
 
 OCCUPANCY = OccupancyOptions()
+"""As many cells right as can be, see ``benchmarks/occupancy.py``."""
+CAUTIOUS = OccupancyOptions(opacity=1.5, least_cells=3)
+"""For planners: less of what is far is missed, and more is taken that is free."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,7 @@ def _carried_on(scene: Scene, now_s: float, t_s: float) -> Gaussians:
 def _taken(
     gaussians: Gaussians, level: Float[np.ndarray, "4 4"], options: OccupancyOptions
 ) -> Float[np.ndarray, "k 2"]:
-    """Middles of cells that hold enough, without single ones that no other touches."""
+    """Middles of cells that hold enough, without those that lie alone."""
     opacity = torch.sigmoid(gaussians.logit_opacities).numpy()
     deviations_m = gaussians.log_scales.exp().numpy()
     places = gaussians.means.numpy() @ level[:3, :3].T + level[:3, 3]
@@ -137,10 +145,14 @@ def _taken(
     cells, of = np.unique(np.floor(parts[high, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True)
     total = np.bincount(of.reshape(-1), weights=share[high], minlength=len(cells))
     cells = cells[total >= options.opacity]
-    return (cells[_has_neighbour(cells)] + 0.5) * CELL_M
+    return (cells[_together(cells, options.least_cells)] + 0.5) * CELL_M
 
 
-def _has_neighbour(cells: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
-    taken = {(row, column) for row, column in cells.tolist()}
-    around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
-    return np.array([any((r + i, c + j) in taken for i, j in around) for r, c in cells.tolist()], dtype=bool)
+def _together(cells: Int[np.ndarray, "n 2"], least: int) -> Bool[np.ndarray, " n"]:
+    """Which cells are of so many that touch one another, if only by corners."""
+    if not len(cells):
+        return np.zeros(0, bool)
+    pairs = KDTree(cells).query_pairs(1.5, output_type="ndarray")
+    touching = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(cells), len(cells)))
+    _, group = connected_components(touching, directed=False)
+    return np.asarray(np.bincount(group)[group] >= least)
