@@ -7,7 +7,7 @@ quality draft with known poses. At three times, within 30 m of the camera: recal
 those sides of boxes that face the camera and are in sight at that time which are taken in the scene.
 Precision is, of the cells that are taken in the scene within the field of view, the share in which a box or
 another solid thing is that is 0.3 to 2 m high. Both are counted in the very cell, and in it or one of the
-eight around it.
+eight around it. Cautious are the options that planners use.
 """
 
 import sys
@@ -22,7 +22,7 @@ from common.markdown import table
 from common.options import parser_of
 from common.report import publish
 from common.worlds import DEVELOPMENT, set_of
-from dreamdrive.plan import CELL_M, OccupancyOptions, obstacles_of
+from dreamdrive.plan import CAUTIOUS, CELL_M, OCCUPANCY, OccupancyOptions, obstacles_of
 from dreamdrive.scene.level import level_from_world
 from dreamdrive.scene.scene import Scene
 from dreamdrive.world import Drive, make_street
@@ -31,6 +31,7 @@ from planning.made import scene_of
 
 _FRAMES, _RATE_HZ, _SIZE, _QUALITY = 24, 10.0, (320, 192), "draft"
 _AT = (8, 16, 23)
+_OPTIONS = {"default": OCCUPANCY, "cautious": CAUTIOUS}
 _REACH_M, _NEAREST_M = 30.0, 2.0
 _APART_M = 0.1
 _LOOKED_AT = (0.4, 0.6)  # of the height of a box
@@ -48,16 +49,21 @@ def main(doc: str | None) -> int:
     for seed in args.seeds:
         drive = _street(seed)
         scene = scene_of(partial(_street, seed), _QUALITY, args.runs / f"street-{seed}")
-        rows.append({"seed": seed} | _counted(drive, scene))
-        print(seed, _shares(rows[-1]), flush=True)
-    total = {name: sum(row[name] for row in rows) for name in _COUNTS}
-    report = {"machine": describe_machine(), "worlds": set_of(args.seeds), "rows": rows, "all": total}
-    names = list(_shares(total))
+        for name, options in _OPTIONS.items():
+            rows.append({"seed": seed, "options": name} | _counted(drive, scene, options))
+            print(seed, name, _shares(rows[-1]), flush=True)
+    rows += [_all(rows, name) for name in _OPTIONS]
+    report = {"machine": describe_machine(), "worlds": set_of(args.seeds), "rows": rows}
+    names = list(_shares(rows[-1]))
     lines = [
-        [str(row.get("seed", "all")), *(f"{_shares(row)[name]:.3f}" for name in names)]
-        for row in [*rows, total]
+        [str(row["seed"]), row["options"], *(f"{_shares(row)[name]:.3f}" for name in names)] for row in rows
     ]
-    return publish(args, report, table(["street", *names], lines) + "\n", ())
+    return publish(args, report, table(["street", "options", *names], lines) + "\n", ())
+
+
+def _all(rows: list[dict[str, Any]], options: str) -> dict[str, Any]:
+    of = [row for row in rows if row["options"] == options]
+    return {"seed": "all", "options": options} | {name: sum(row[name] for row in of) for name in _COUNTS}
 
 
 @cache
@@ -75,8 +81,8 @@ def _shares(row: dict[str, Any]) -> dict[str, float]:
     }
 
 
-def _counted(drive: Drive, scene: Scene) -> dict[str, int]:
-    level, options = level_from_world(scene), OccupancyOptions()
+def _counted(drive: Drive, scene: Scene, options: OccupancyOptions) -> dict[str, int]:
+    level = level_from_world(scene)
     obstacles = obstacles_of(scene, [float(drive.times_s[frame]) for frame in _AT], options)
     solid = _solid(drive, level, options)
     counts: dict[str, int] = dict.fromkeys(_COUNTS, 0)

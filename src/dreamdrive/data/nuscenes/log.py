@@ -70,7 +70,7 @@ def _read(folder: Path, scene: str, changed: tuple[tuple[str, int], ...]) -> Log
     del changed
     tables = open_tables(folder)
     chosen = _scene(tables, scene)
-    samples = tables.rows("sample", SampleRow, lambda row: row.scene_token == chosen.token)
+    samples = tables.rows("sample", SampleRow, "scene_token", {chosen.token})
     if not samples:
         raise InputError(f"{tables.folder}: sample.json has no row of the scene {chosen.name}")
     times = sorted(samples.values(), key=lambda row: row.timestamp)
@@ -140,14 +140,14 @@ def _scene(tables: Tables, wanted: str) -> SceneRow:
 
 def _shots(tables: Tables, samples: Mapping[str, SampleRow]) -> dict[str, list[_Shot]]:
     """What each channel took in a scene, in the order of time, without rows whose tokens lead nowhere."""
-    rows = tables.rows("sample_data", DataRow, lambda row: row.sample_token in samples)
+    rows = tables.rows("sample_data", DataRow, "sample_token", samples)
     sensors = tables.rows("sensor", SensorRow)
     mounted = tables.rows("calibrated_sensor", CalibratedRow)
     mounted = _whole_rotations(tables, "calibrated_sensor", mounted)
     linked = tables.linked(mounted.values(), "calibrated_sensor", "sensor", lambda r: r.sensor_token, sensors)
     calibrated = {row.token: row for row in linked}
     wanted = {row.ego_pose_token for row in rows.values()}
-    poses = tables.rows("ego_pose", PoseRow, lambda row: row.token in wanted)
+    poses = tables.rows("ego_pose", PoseRow, "token", wanted)
     poses = _whole_rotations(tables, "ego_pose", poses)
     kept = tables.linked(
         rows.values(), "sample_data", "calibrated_sensor", lambda r: r.calibrated_sensor_token, calibrated
@@ -263,10 +263,11 @@ def _ego(
 def _boxes(tables: Tables, samples: Mapping[str, SampleRow], start_us: int) -> tuple[BoxTrack, ...]:
     """Boxes by what they are of, each in the order of time."""
     lost = "boxes"
-    rows = tables.optional("sample_annotation", AnnotationRow, lost, lambda row: row.sample_token in samples)
+    rows = tables.optional("sample_annotation", AnnotationRow, lost, "sample_token", samples)
     if not rows:
         return ()
-    instances = tables.optional("instance", InstanceRow, lost)
+    wanted = {row.instance_token for row in rows.values()}
+    instances = tables.optional("instance", InstanceRow, lost, "token", wanted)
     categories = tables.optional("category", NamedRow, lost)
     named = tables.linked(instances.values(), "instance", "category", lambda r: r.category_token, categories)
     known = {row.token: categories[row.category_token].name for row in named}

@@ -212,7 +212,8 @@ def _of_layers(folder: Path, within: Within) -> LogMap:
 
 def _of_mask(tables: Tables, log_token: str, within: Within) -> LogMap:
     """The drivable area of the picture that ``map.json`` names, whose last row lies at y = 0."""
-    rows = tables.optional("map", MapRow, "maps", lambda row: log_token in row.log_tokens)
+    maps = tables.optional("map", MapRow, "maps")
+    rows = {token: row for token, row in maps.items() if log_token in row.log_tokens}
     if not rows:
         return LogMap()
     if len({row.filename for row in rows.values()}) > 1:

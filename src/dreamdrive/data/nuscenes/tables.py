@@ -1,18 +1,21 @@
 """The tables of nuScenes: JSON lists of rows with tokens (Caesar et al. 2020), of which few rows are kept.
 
 The tables of the full data set hold millions of rows in gigabytes. A file is mapped into memory, split into
-rows and decoded row by row; what nobody asks for is dropped at once. The devkit is not needed.
+rows and looked up by tokens; what nobody asks for is never decoded. The devkit is not needed.
 """
 
 import hashlib
 import mmap
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, TypeVar
 
 import msgspec
+import numpy as np
+from jaxtyping import Int
 from msgspec import Meta
 
 from dreamdrive.data.formats.pandaset import Place
@@ -154,21 +157,28 @@ class Tables:
         """Whether the file of a table is there."""
         return (self.folder / f"{name}.json").is_file()
 
-    def rows(self, name: str, kind: type[R], keep: Callable[[R], bool] = lambda row: True) -> dict[str, R]:
-        """Rows of a table by their tokens that are whole and wanted.
+    def rows(self, name: str, kind: type[R], by: str = "", keys: Collection[str] = ()) -> dict[str, R]:
+        """Rows of a table by their tokens that are whole.
+
+        Args:
+            name: Of the table.
+            kind: What its rows are.
+            by: A field; then only rows in which it is one of the ``keys``. The first time all rows are looked
+                at, and after that few.
+            keys: See there.
 
         Raises:
             InputError: The file is missing or is no JSON list: it was cut off, or is another file.
         """
         path, found = self.folder / f"{name}.json", dict[str, R]()
         decode = msgspec.json.Decoder(kind).decode
-        for number, raw in enumerate(_split(path)):
+        for number, raw in _rows_by(path, by, keys) if by else enumerate(_split(path)):
             try:
                 row = decode(raw)
             except msgspec.DecodeError as error:
                 self.fault(f"{name}.json: rows are damaged and left out", f"row {number}: {error}")
                 continue
-            if not keep(row):
+            if by and getattr(row, by) not in keys:
                 continue
             if row.token in found:
                 self.fault(f"{name}.json: tokens stand twice; their first rows count", row.token)
@@ -177,14 +187,14 @@ class Tables:
         return found
 
     def optional(
-        self, name: str, kind: type[R], lost: str, keep: Callable[[R], bool] = lambda row: True
+        self, name: str, kind: type[R], lost: str, by: str = "", keys: Collection[str] = ()
     ) -> dict[str, R]:
         """The same of a table that may be missing or damaged: there are no ``lost`` then, which is said."""
         if not self.has(name):
             self.fault(f"{name}.json is missing: there are no {lost}")
             return {}
         try:
-            return self.rows(name, kind, keep)
+            return self.rows(name, kind, by, keys)
         except InputError as error:
             self.fault(f"{error}: there are no {lost}")
             return {}
@@ -247,6 +257,51 @@ def open_tables(path: Path) -> Tables:
 
 def _is_version(folder: Path) -> bool:
     return (folder / "scene.json").is_file() and (folder / "sample.json").is_file()
+
+
+@dataclass(frozen=True)
+class _Index:
+    """The rows of a table in the order of one of their fields, by hashes: a full table has 2.6 million.
+
+    Attributes:
+        rows: All rows, each still text.
+        hashes: Of the field, in their order.
+        numbers: Of the rows, in the same order.
+        damaged: Numbers of those that lack it.
+    """
+
+    rows: list[msgspec.Raw]
+    hashes: Int[np.ndarray, " n"]
+    numbers: Int[np.ndarray, " n"]
+    damaged: list[int]
+
+
+def _rows_by(path: Path, by: str, keys: Collection[str]) -> Iterator[tuple[int, msgspec.Raw]]:
+    """Rows with their numbers in which a field may be one of the keys, and those that lack it."""
+    with open_file(path):  # or it is said what is wrong
+        changed_ns = path.stat().st_mtime_ns
+    index = _index(path, by, changed_ns)
+    wanted = np.array([hash(key) for key in keys], dtype=np.int64)
+    ends = (np.searchsorted(index.hashes, wanted, side=side) for side in ("left", "right"))
+    found = {n for low, high in zip(*ends, strict=True) for n in index.numbers[low:high].tolist()}
+    for number in sorted(found.union(index.damaged)):
+        yield number, index.rows[number]
+
+
+@lru_cache(maxsize=6)
+def _index(path: Path, by: str, changed_ns: int) -> _Index:
+    """Kept for whoever reads several scenes: a full table takes seconds."""
+    del changed_ns
+    rows, damaged = _split(path), list[int]()
+    decode = msgspec.json.Decoder(msgspec.defstruct("Keyed", [(by, str)])).decode
+    hashes = np.zeros(len(rows), dtype=np.int64)
+    for number, raw in enumerate(rows):
+        try:
+            hashes[number] = hash(getattr(decode(raw), by))
+        except msgspec.DecodeError:
+            damaged.append(number)
+    order = np.argsort(hashes, kind="stable")
+    return _Index(rows, hashes[order], order, damaged)
 
 
 def _split(path: Path) -> list[msgspec.Raw]:
