@@ -30,6 +30,13 @@ def test_half_a_box_is_half_seen():
     assert share_seen(box(15, 0, 1.5), [(CAMERA, depth)]) == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("depth_m", "margin", "share"), [(12.0, 0.0, 0.0), (12.0, 0.2, 1.0), (10.0, 0.2, 0.0)]
+)
+def test_reconstructed_depth_is_wrong_by_a_share_of_the_distance(depth_m, margin, share):
+    assert share_seen(box(15, 0, 1.5), [(CAMERA, wall(depth_m))], margin) == share
+
+
 def test_a_box_behind_the_camera_is_not_seen():
     assert share_seen(box(-15, 0, 1.5), [(CAMERA, wall(30.0))]) == 0.0
 

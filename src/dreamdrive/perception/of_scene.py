@@ -22,7 +22,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import Log, LogCamera, LogMap, OfLog, box_corners
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.scene.visibility import View, level_of, share_seen
+from dreamdrive.scene.visibility import RECONSTRUCTED, View, level_of, share_seen
 from dreamdrive.splat import moment_of, render_scene
 
 NEAR_M = 70.0
@@ -251,5 +251,7 @@ def _boxes(log: Log, place: Place, views: list[View]) -> list[Annotation]:
     for track, pose in boxes_at(log, place.time_s):
         if np.linalg.norm(pose[:2, 3] - place.world_from_ego[:2, 3]) < NEAR_M:
             corners = box_corners(pose, track.size_lwh_m[track.row_at(place.time_s)])
-            found.append(annotation_of(track, pose, place.time_s, level_of(share_seen(corners, views))))
+            found.append(
+                annotation_of(track, pose, place.time_s, level_of(share_seen(corners, views, RECONSTRUCTED)))
+            )
     return found

@@ -9,15 +9,24 @@ from jaxtyping import Float
 from dreamdrive.scene.camera import NEAR_M, Camera
 
 _MARGIN_M = 0.3
-"""How much nearer than a box something must be to stand before it."""
+"""How much nearer than a box something must be to stand before it, where depth is true."""
+RECONSTRUCTED = 0.2
+"""The same where depth is that of a scene, as a share of the distance. Of vehicles that are in sight a fifth
+would count as hidden by themselves without it, and a twelfth with it."""
 _FARTHEST_PX = 1e5
 
 View = tuple[Camera, Float[np.ndarray, "h w"]]
 """A camera with its pose, and depth along z in metres, 0 where there is none."""
 
 
-def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View]) -> float:
-    """Of the pixels that a box covers in all pictures, the share before which nothing stands; 0 for none."""
+def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View], margin: float = 0.0) -> float:
+    """Of the pixels that a box covers in all pictures, the share before which nothing stands; 0 for none.
+
+    Args:
+        corners: Of the box.
+        views: Where cameras are, and what they see.
+        margin: How much nearer something must be, as a share of the distance; at least 0.3 m.
+    """
     covered = seen = 0
     for camera, depth_m in views:
         local = (corners - camera.world_from_camera[:3, 3]) @ camera.world_from_camera[:3, :3]
@@ -34,7 +43,8 @@ def share_seen(corners: Float[np.ndarray, "8 3"], views: Sequence[View]) -> floa
         mask = np.zeros(part.shape, np.uint8)
         cv2.fillConvexPoly(mask, cv2.convexHull(cells - low), 1)
         inside = mask > 0
-        before = (part > 0) & (part < local[:, 2].min() - _MARGIN_M)
+        nearest_m = local[:, 2].min()
+        before = (part > 0) & (part < nearest_m - max(_MARGIN_M, margin * nearest_m))
         covered += int(inside.sum())
         seen += int((inside & ~before).sum())
     return seen / covered if covered else 0.0
