@@ -15,7 +15,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -49,8 +48,15 @@ def main(doc: str | None) -> int:
         print(f"{trials[-1].name}: {number + 1} of {len(wanted)}", flush=True)
     rows = [row for planner in PLANNERS for row in _rows(planner, trials)]
     report = {"machine": describe_machine(), "set": args.set, "scenarios": len(trials), "rows": rows}
-    report["trials"] = [msgspec.to_builtins(each) for each in trials]
+    report["trials"] = [_brief(each) for each in trials]
     return publish(args, report, _tables(rows, trials), ())
+
+
+def _brief(trial: Trial) -> dict[str, Any]:
+    """Which plans collide, and how far each is from the true drive in the mean."""
+    hits = [name for name, at in trial.collides.items() if any(at)]
+    error_m = {name: round(float(np.mean(at)), 3) for name, at in trial.error_m.items()}
+    return {"name": trial.name, "collide": hits, "error_m": error_m}
 
 
 def _trial(kind: Any, seed: int, protocol: Protocol, runs: Path) -> Trial:
@@ -127,7 +133,8 @@ def _tables(rows: list[dict[str, Any]], trials: list[Trial]) -> str:
         for row in rows
     ]
     kinds = [[kind, *(str(_hits(kind, name, trials)) for name in _columns())] for kind in KINDS]
-    return table(head, lines) + "\n\n" + table(["kind", *_columns()], kinds) + "\n"
+    columns = [name.replace(" | ", ", ") for name in _columns()]
+    return table(head, lines) + "\n\n" + table(["kind", *columns], kinds) + "\n"
 
 
 def _fall(row: dict[str, Any]) -> tuple[str, str, str]:
