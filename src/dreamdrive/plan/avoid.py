@@ -111,20 +111,20 @@ def avoid(
         )
     path = _Path.of(plan, every, speed_m_s)
     near = [_near(cells, path, options) for cells in obstacles_m]
-    before_m = clearance(plan, speed_m_s, obstacles_m, options.footprint)
     planned = path.drives(np.zeros(1), np.zeros(1), options)
+    before_m = float(_clearance(planned, obstacles_m, options.footprint).min())
     if (_clearance(planned, near, options.footprint, _longer(planned, path, options)) >= 0).all():
         return Avoided(plan, False, before_m, before_m)
     changes = np.linspace(-options.most_braking_m_s2, options.most_gain_m_s2, 13)
     asides = np.linspace(-options.most_aside_m, options.most_aside_m, 11)
     widths = changes[1] - changes[0], asides[1] - asides[0]
-    change, aside = _best(path, np.append(changes, 0.0), asides, near, options)
+    change, aside = _best(path, planned, np.append(changes, 0.0), asides, near, options)
     for finer in (3, 9):
         tried = (
             around + width / finer * np.arange(-2, 3)
             for around, width in zip((change, aside), widths, strict=True)
         )
-        change, aside = _best(path, *tried, near, options)
+        change, aside = _best(path, planned, *tried, near, options)
     drive = path.drives(np.array([change]), np.array([aside]), options)
     waypoints_m = drive.places_m[0, every - 1 :: every]
     after_m = float(_clearance(drive, obstacles_m, options.footprint).min())
@@ -256,6 +256,7 @@ def _feasible(
 
 def _best(
     path: _Path,
+    planned: _Drives,
     changes_m_s2: Float[np.ndarray, " a"],
     asides_m: Float[np.ndarray, " b"],
     near: Sequence[Float[np.ndarray, "_ 2"]],
@@ -264,7 +265,6 @@ def _best(
     """The change of acceleration and the way aside that cost least, of all pairs."""
     pairs = np.stack(np.meshgrid(changes_m_s2, asides_m, indexing="ij"), axis=-1).reshape(-1, 2)
     drives = path.drives(pairs[:, 0], pairs[:, 1], options)
-    planned = path.drives(np.zeros(1), np.zeros(1), options)
     moved_m = drives.places_m - planned.places_m
     right = np.stack([planned.ahead[..., 1], -planned.ahead[..., 0]], axis=-1)
     along, aside = (moved_m * planned.ahead).sum(-1), (moved_m * right).sum(-1)
