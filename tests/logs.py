@@ -1,5 +1,6 @@
 """A small drive of two cameras, made up, with all that a log may hold."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -49,6 +50,18 @@ def camera(folder: Path, name: str, yaw: float, late_s: float = 0.0) -> LogCamer
         ego_from_camera=mounted,
         pinhole=Camera(50.0, 51.0, 32.5, 23.5, 64, 48),
         key=np.isin(np.round(SHOTS_S, 6), TIMES_S),
+    )
+
+
+def single(camera: LogCamera, row: int) -> LogCamera:
+    """The same camera with one of its pictures."""
+    one = slice(row, row + 1)
+    return replace(
+        camera,
+        files=camera.files[one],
+        times_s=camera.times_s[one],
+        world_from_camera=camera.world_from_camera[one],
+        key=camera.key[one],
     )
 
 

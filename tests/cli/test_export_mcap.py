@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.cli.conftest import Run
-from tests.test_pipeline import TINY, make, shorten
 
 from dreamdrive import load_scene
 from dreamdrive.run import codec
@@ -20,15 +19,6 @@ pytest.importorskip("mcap_protobuf", reason="pip install mcap-protobuf-support")
 from tests.export.mcap_reader import picture_of, placed, read
 
 FRONT = "/CAM_FRONT/image_rect_compressed"
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("run") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
-        make(out, replace(TINY, frames="0:4", hold_out=None))
-    return out
 
 
 def test_frames_of_a_run_are_written_with_its_poses(run: Run, finished: Path, tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.cli.conftest import Run
-from tests.test_pipeline import TINY, make, shorten
 
 from dreamdrive import load_scene
 from dreamdrive.run import codec
@@ -18,15 +17,6 @@ from dreamdrive.scene.geometry import Geometry
 pytest.importorskip("ncore.data.v4", reason="pip install 'dreamdrive[ncore]'")
 
 from tests.export.ncore_reader import read, world_from_camera
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("run") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
-        make(out, replace(TINY, frames="0:4", hold_out=None))
-    return out
 
 
 @pytest.fixture

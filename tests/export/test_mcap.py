@@ -12,7 +12,7 @@ import pytest
 from tests.conftest import ROOT
 from tests.environment.scenes import AHEAD, ONCOMING
 from tests.environment.scenes import scene as driven_scene
-from tests.logs import START_US, ego, log
+from tests.logs import START_US, ego, log, single
 from tests.rigs import drives, true_poses
 from tests.streets import street_clip
 
@@ -141,14 +141,7 @@ def test_a_picture_of_another_size_is_refused(drive: Log, file: Path) -> None:
 
 
 def test_a_log_of_one_time_is_written(drive: Log, file: Path) -> None:
-    front, one = drive.cameras[0], slice(1, 2)
-    alone = replace(
-        front,
-        files=front.files[one],
-        times_s=front.times_s[one],
-        world_from_camera=front.world_from_camera[one],
-        key=front.key[one],
-    )
+    alone = single(drive.cameras[0], 1)
     write_mcap(
         replace(
             drive,

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from tests.logs import START_US, ego, log, pose
+from tests.logs import START_US, ego, log, pose, single
 
 from dreamdrive.data.lidar_file import read_points
 from dreamdrive.data.nuscenes import write_points
@@ -119,14 +119,7 @@ def test_a_picture_of_another_size_is_refused(drive: Log, tmp_path: Path) -> Non
 
 
 def test_a_single_time_is_no_path(drive: Log, tmp_path: Path) -> None:
-    front, one = drive.cameras[0], slice(1, 2)
-    alone = replace(
-        front,
-        files=front.files[one],
-        times_s=front.times_s[one],
-        world_from_camera=front.world_from_camera[one],
-        key=front.key[one],
-    )
+    alone = single(drive.cameras[0], 1)
     short = replace(
         drive, cameras=(alone,), times_s=drive.times_s[:1], world_from_ego=drive.world_from_ego[:1]
     )

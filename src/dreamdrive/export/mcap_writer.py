@@ -33,6 +33,7 @@ from dreamdrive.export.mcap_words import (
 )
 from dreamdrive.files.atomic import new_file
 from dreamdrive.scene.camera import Camera, check_rigid
+from dreamdrive.world import upright
 
 SUFFIX = ".mcap"
 _JPEG = 95
@@ -59,8 +60,9 @@ def check_mcap(file: Path, replace: bool) -> None:
 
 def ground_pose(x_m: float, y_m: float, yaw_rad: float, up_m: float = 0.0) -> Float[np.ndarray, "4 4"]:
     """The pose of what stands level: x ahead, y left, z up; yaw counts from x counter-clockwise."""
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return np.array([[cos, -sin, 0, x_m], [sin, cos, 0, y_m], [0, 0, 1, up_m], [0, 0, 0, 1.0]])
+    pose = upright((x_m, y_m, yaw_rad))
+    pose[2, 3] = up_m
+    return pose
 
 
 class DriveRecording:
