@@ -1,6 +1,6 @@
 """What generated samples are worth to a network that segments the street from above (the paper's Table II).
 
-    python benchmarks/perception.py [--runs DIR] [--only streets|scenes|sets|networks] [--json FILE]
+    python benchmarks/perception.py [--runs DIR] [--only streets|scenes|sets|networks] [--cuda] [--json FILE]
 
 Streets, sizes, arms, regime and seeds stand in perception/protocol.json. A family of drawn streets stands for
 real ones: six cameras, noise. Of all training streets 4D scenes are made from their recorded pictures, with
@@ -8,28 +8,30 @@ the weights of the street network that have seen no street of that edition; samp
 paths. Arms: all training streets as recorded (oracle), few of them (real), these with rendered samples
 (generated), with as many pictures that were warped without a scene (warped), and rendered samples of all
 streets alone (only). All networks are tested on streets that nothing was made of. Everything is kept and
-goes on where it was stopped.
+goes on where it was stopped; with ``--cuda`` all networks are trained at once on a GPU, and not kept.
 """
 
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Any
+
+import torch
 
 from common.machine import describe_machine
 from common.options import parser_of
 from common.report import publish
 from common.twin import TWIN
+from dreamdrive.device import CPU
 from dreamdrive.perception import (
     QUICK,
     SMALL,
     BevSet,
+    CrossViewTransformer,
     CvtOptions,
-    CvtTraining,
-    Regime,
     Samples,
-    ScheduleOptions,
     load_cvt,
     score,
     train_on,
@@ -37,6 +39,7 @@ from dreamdrive.perception import (
 from perception.making import make_scene, make_sets, make_street
 from perception.protocol import Places, Protocol, read_protocol
 from perception.tables import tables
+from perception.together import Student, held, train_together
 
 _NETWORKS: dict[str, CvtOptions] = {"quick": QUICK, "small": SMALL}
 _STEPS = ("streets", "scenes", "sets", "networks")
@@ -47,6 +50,7 @@ def main(doc: str | None) -> int:
     parser = parser_of(doc, runs="runs/perception", markdown=True)
     parser.add_argument("--only", choices=_STEPS)
     parser.add_argument("--protocol", type=Path)
+    parser.add_argument("--cuda", action="store_true")
     args = parser.parse_args()
     protocol = read_protocol() if args.protocol is None else read_protocol(args.protocol)
     places, network = Places(args.runs), _NETWORKS[protocol.network]
@@ -60,8 +64,10 @@ def main(doc: str | None) -> int:
         make_sets(protocol, places, network)
     if args.only not in (None, "networks"):
         return 0
-    rows = [_trial(arm, seed, protocol, places, network) for seed in protocol.seeds for arm in protocol.arms]
-    report = {"machine": describe_machine(), "trials": rows}
+    make = _on_gpu if args.cuda else _on_cpu
+    rows = make(protocol, places, network)
+    gpu = {"gpu": torch.cuda.get_device_name()} if args.cuda else {}
+    report = {"machine": describe_machine() | gpu, "trials": rows}
     return publish(args, report, tables(rows, protocol), ())
 
 
@@ -71,38 +77,54 @@ def _each(what: str, seeds: list[int], make: Callable[[int], None]) -> None:
         print(f"{what} {seed}: {number + 1} of {len(seeds)}", flush=True)
 
 
-def _trial(arm: str, seed: int, protocol: Protocol, places: Places, network: CvtOptions) -> dict[str, Any]:
-    """Train a network of an arm, or take the one that is there, and count its cells street by street."""
-    r = protocol.regime
-    training = CvtTraining(
-        schedule=ScheduleOptions(steps=r.steps, rate=r.rate),
-        low_precision=r.low_precision,
-        replicas=r.replicas,
-        frozen_layers=r.frozen_layers,
-        seed=seed,
-    )
-    sets = [BevSet.open(places.set(name)) for name in protocol.arms[arm]]
-    regime = Regime(network, training, r.batch, TWIN)
-    weights = train_on(sets, places.network(arm, seed), regime)
-    assert weights is not None
-    trained = load_cvt(weights)
-    row: dict[str, Any] = {"arm": arm, "seed": seed, "samples": sum(map(len, sets))}
+def _on_cpu(protocol: Protocol, places: Places, network: CvtOptions) -> list[dict[str, Any]]:
+    """Train a network after the other, or take those that are there, and count their cells."""
+    rows: list[dict[str, Any]] = []
+    for seed, arm in product(protocol.seeds, protocol.arms):
+        regime = protocol.regime_of(seed, network, TWIN)
+        sets = [BevSet.open(places.set(name)) for name in protocol.arms[arm]]
+        weights = train_on(sets, places.network(arm, seed), regime)
+        assert weights is not None
+        rows.append(_tested(arm, seed, load_cvt(weights), protocol, places, CPU))
+    return rows
+
+
+def _on_gpu(protocol: Protocol, places: Places, network: CvtOptions) -> list[dict[str, Any]]:
+    """Train all networks at the same time, and count their cells."""
+    device, students = torch.device("cuda"), dict[tuple[int, str], Student]()
+    for arm, names in protocol.arms.items():
+        samples = held(Samples([BevSet.open(places.set(name)) for name in names]), device)
+        for seed in protocol.seeds:
+            students[seed, arm] = Student(samples, protocol.regime_of(seed, network, TWIN))
+    for done in train_together(list(students.values())):
+        print(f"{len(students)} networks: {done} of {protocol.regime.steps} steps", flush=True)
+    return [
+        _tested(arm, seed, students[seed, arm].network, protocol, places, device)
+        for seed, arm in product(protocol.seeds, protocol.arms)
+    ]
+
+
+def _tested(
+    arm: str,
+    seed: int,
+    trained: CrossViewTransformer,
+    protocol: Protocol,
+    places: Places,
+    device: torch.device,
+) -> dict[str, Any]:
+    """Counts of cells street by street."""
+    own = sum(len(BevSet.open(places.set(name))) for name in set(protocol.arms[arm]))
+    row: dict[str, Any] = {"arm": arm, "seed": seed, "samples": own}
     of = ["validation", *([protocol.realism.tested] if arm == protocol.realism.trained else [])]
     for name in of:
-        by_drive = score(trained, Samples([BevSet.open(places.set(name))]))
+        samples = Samples([BevSet.open(places.set(name))])
+        by_drive = score(trained, samples, device=device, at_once=1 if device.type == "cpu" else 16)
         row[name] = {
-            street: {what: asdict(at_one_half(counts)) for what, counts in found.items()}
+            street: {what: asdict(counts) for what, counts in found.items()}
             for street, found in by_drive.items()
         }
     print(arm, seed, "is tested", flush=True)
     return row
-
-
-def at_one_half(counts: Any) -> Any:
-    """Counts at a probability of one half alone, which is what is published."""
-    at = counts.thresholds.index(0.5)
-    one = {name: (getattr(counts, name)[at],) for name in ("hits", "false_alarms", "misses")}
-    return replace(counts, thresholds=(0.5,), **one)
 
 
 if __name__ == "__main__":

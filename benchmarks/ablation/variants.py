@@ -109,6 +109,7 @@ VARIANTS = {
         {"initialise": with_appearance},
     ),
     "all-frames": Variant("scores splatted into all frames", scored(window=None)),
+    "no-balance": Variant("what moves weighs no more than what stands", scored(balance=None)),
     "dssim": Variant("(1 - SSIM) / 2 as error", around={"score": scored_on(dssim_errors)}),
     "feature-error": Variant(
         "distance of splatted features (appearance) as error", around={"score": scored_on(feature_errors)}

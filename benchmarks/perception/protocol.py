@@ -5,6 +5,8 @@ from pathlib import Path
 
 import msgspec
 
+from dreamdrive.perception import CvtOptions, CvtTraining, LossOptions, Regime, ScheduleOptions
+
 PROTOCOL = Path(__file__).with_name("protocol.json")
 
 
@@ -57,6 +59,7 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     frozen_layers: int
     low_precision: bool
     replicas: int
+    alpha: float
 
 
 class Realism(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -78,6 +81,19 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     arms: dict[str, list[str]]
     realism: Realism
     seeds: list[int]
+
+    def regime_of(self, seed: int, network: CvtOptions, trunk: str) -> Regime:
+        """How a network is trained."""
+        r = self.regime
+        training = CvtTraining(
+            schedule=ScheduleOptions(steps=r.steps, rate=r.rate),
+            losses=LossOptions(alpha=r.alpha),
+            low_precision=r.low_precision,
+            replicas=r.replicas,
+            frozen_layers=r.frozen_layers,
+            seed=seed,
+        )
+        return Regime(network, training, r.batch, trunk)
 
 
 def read_protocol(path: Path = PROTOCOL) -> Protocol:

@@ -19,12 +19,15 @@ def counts_of(rows: Sequence[Mapping[str, Any]], arm: str, tested: str, what: st
     own = sorted((row for row in rows if row["arm"] == arm and tested in row), key=lambda row: row["seed"])
     streets = sorted(own[0][tested]) if own else []
     return np.array(
-        [
-            [[row[tested][s][what][k][0] for k in ("hits", "false_alarms", "misses")] for s in streets]
-            for row in own
-        ],
+        [[_at_one_half(row[tested][s][what]) for s in streets] for row in own],
         dtype=np.float64,
     )
+
+
+def _at_one_half(counts: Mapping[str, Sequence[float]]) -> list[float]:
+    """Counts at a probability of one half, at which published figures are."""
+    at = counts["thresholds"].index(0.5)
+    return [counts[name][at] for name in ("hits", "false_alarms", "misses")]
 
 
 def iou(counts: Counts) -> float:

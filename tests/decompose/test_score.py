@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -5,6 +7,7 @@ from tests.fit.test_fit import quiet
 from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.decompose import ScoreOptions, error_maps, score
+from dreamdrive.decompose.score import _weight_of_moving
 from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
 
 
@@ -61,3 +64,24 @@ def test_gaussians_without_features_are_refused(fitted):
     bare = type(seeds)(**{n: v for n, v in seeds.tensors().items() if n != "features"})
     with pytest.raises(ValueError, match="carry no features"):
         score(clip, geometry, bare, errors, ScoreOptions(), 0, quiet)
+
+
+def test_what_moves_counts_as_much_as_its_share_lacks():
+    weight = torch.ones(10, 10)
+    rare, common = torch.zeros(10, 10), torch.zeros(10, 10)
+    rare[0, :5], common[:6] = 1, 1
+    assert _weight_of_moving([(rare, weight)], 0.4, 10.0) == pytest.approx(8)
+    assert _weight_of_moving([(rare, weight)], 0.4, 3.0) == 3
+    assert _weight_of_moving([(common, weight)], 0.4, 10.0) == 1
+    assert _weight_of_moving([(0 * rare, weight)], 0.4, 10.0) == 10  # where nothing moves it counts nothing
+    assert _weight_of_moving([(rare, rare)], 0.4, 10.0) == 1
+
+
+def test_balance_teaches_faster_what_moves(fitted):
+    _, clip, geometry, seeds, errors = fitted
+    truth = seeds.features[:, 0] >= 0.5
+    short = ScoreOptions(steps=12)
+    alike = score(clip, geometry, seeds, errors, replace(short, balance=None), 0, quiet)
+    balanced = score(clip, geometry, seeds, errors, short, 0, quiet)
+    assert balanced[truth].median() > alike[truth].median() + 0.2
+    assert balanced[~truth].quantile(0.9) < 0.2

@@ -72,3 +72,16 @@ def test_where_no_cell_counts_nothing_is_learned() -> None:
     assert not said.vehicle.grad.any()
     as_published = bev_losses(said, hidden, LossOptions(empty_is_nan=True))
     assert all(math.isnan(float(value.detach())) for value in as_published.values())
+
+
+def test_vehicles_that_weigh_more_are_said_at_lower_odds() -> None:
+    """At one half the gradients of both sides are equal where a share of 1 - alpha is a vehicle."""
+    for alpha, share in ((0.75, 0.25), (0.5, 0.5)):
+        found = torch.zeros(100, requires_grad=True)
+        target = (torch.arange(100) < 100 * share).float()
+        focal_loss(found, target, 2.0, alpha).sum().backward()
+        assert found.grad is not None
+        assert float(found.grad.sum()) == pytest.approx(0, abs=1e-6)
+    said, labels = BevPrediction(logits("pred"), logits("center_pred")), truth()
+    even = bev_losses(said, labels, LossOptions(alpha=0.5))["vehicle"]
+    torch.testing.assert_close(even, bev_losses(said, labels)["vehicle"])

@@ -82,10 +82,13 @@ def test_sets_of_two_sizes_are_refused(sets, tmp_path):
         Samples([sets["one"], BevSet.open(tmp_path / "set")])
 
 
-def test_scores_of_drives_add_up(sets):
+@pytest.mark.parametrize("at_once", [1, 2, 8])
+def test_scores_of_drives_add_up(sets, at_once):
     network = CrossViewTransformer(TINY).eval()
     samples = Samples(list(sets.values()))
-    found = score(network, samples)
+    told = []
+    found = score(network, samples, at_once=at_once, progress=lambda *each: told.append(each))
+    assert told[-1] == (6, 6)
     assert set(found) == {"one", "other"}
     batch = as_batch([samples[k] for k in range(6)])
     with torch.no_grad():

@@ -17,6 +17,7 @@ from dreamdrive.perception import (
     ScheduleOptions,
     bev_counts,
     load_cvt,
+    make_optimiser,
     train_cvt,
 )
 from dreamdrive.perception.replicas import replicated
@@ -113,6 +114,20 @@ def test_replicas_learn_what_one_network_does() -> None:
         torch.testing.assert_close(found[1][name], value)
     for one, other in zip(whole.parameters(), apart.parameters(), strict=True):
         torch.testing.assert_close(one.grad, other.grad, rtol=1e-4, atol=1e-6)
+
+
+def test_the_fused_optimiser_steps_as_the_plain_one() -> None:
+    """It takes memory as it lies: gradients that lie otherwise than their weights would be mixed up."""
+    fused, plain = network(), network()
+    for each in (fused, plain):
+        with replicated(each, 1, LossOptions(), low_precision=False) as replicas:
+            replicas.learn(street(3, batch=4), seed=0)
+    options = ScheduleOptions(steps=6)
+    make_optimiser(fused, options).step()
+    rate = options.rate_at(0)
+    torch.optim.AdamW(plain.parameters(), lr=rate, weight_decay=options.weight_decay, foreach=False).step()
+    for (name, one), other in zip(fused.named_parameters(), plain.parameters(), strict=True):
+        torch.testing.assert_close(one, other, msg=name)
 
 
 def test_replicas_are_for_cores(tmp_path: Path) -> None:

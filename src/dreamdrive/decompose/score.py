@@ -1,6 +1,6 @@
 """F_score: a dynamic score for every Gaussian, trained through the splat (eq. 7-9)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,6 +43,10 @@ class ScoreOptions:
             splats all into all (the paper). A car's copy stands on empty road in all frames but a few:
             averaged over all, its target is that of the road, and nothing fast ever crosses the threshold:
             0.284.
+        balance: Share of the weight that what moves gets where it covers less: a walker alone is a thousandth
+            of a frame, and scores of a fit to so few pixels never reach the threshold. None weighs all pixels
+            alike (the paper).
+        most_weight: Of a pixel that moves, by balance.
     """
 
     target: TargetName = "error_and_evidence"
@@ -54,6 +58,8 @@ class ScoreOptions:
     position_frequencies: int = 4
     shrink: int = 2
     window: int | None = 1
+    balance: float | None = 0.4
+    most_weight: float = 10.0
 
 
 class ScoreNetwork(nn.Module):
@@ -168,7 +174,20 @@ def _targets(
             target = np.maximum(target, geometry.moving[i])
         weight = (clip.valid[i] & (geometry.fixed_regions[clip.camera[i]] == 0)).astype(np.float32)
         targets[i] = (_shrunk(target, options.shrink), _shrunk(weight, options.shrink))
-    return targets
+    if options.balance is None:
+        return targets
+    more = _weight_of_moving(targets.values(), options.balance, options.most_weight)
+    return {i: (target, weight * (1 + (more - 1) * target)) for i, (target, weight) in targets.items()}
+
+
+def _weight_of_moving(
+    targets: Iterable[tuple[Float[Tensor, "a b"], Float[Tensor, "a b"]]], balance: float, most: float
+) -> float:
+    """How many times a moving pixel counts, at least once."""
+    pairs = list(targets)
+    moving = sum(float((target * weight).sum()) for target, weight in pairs)
+    share = moving / max(sum(float(weight.sum()) for _, weight in pairs), 1e-9)
+    return min(max(balance / max(share, 1e-9), 1.0), most)
 
 
 def _shrunk(values: Float[np.ndarray, "h w"], factor: int) -> Float[Tensor, "a b"]:

@@ -92,7 +92,7 @@ class MbConv(nn.Module):
         self._keeps_shape = stride == 1 and channels == out
         self._drop = drop
         self.draws: torch.Generator | None = None
-        """From which is drawn what is dropped, on the CPU on all devices; None for torch's own generator."""
+        """From which is drawn what is dropped, on its device; None for torch's own of the pictures'."""
 
     def forward(self, x: Tensor) -> Tensor:
         """Apply to (n, channels, h, w)."""
@@ -158,5 +158,6 @@ def _drop_samples(
     x: Float[Tensor, "n c h w"], share: float, draws: torch.Generator | None
 ) -> Float[Tensor, "n c h w"]:
     """Zero for a share of the samples; the others grow by as much."""
-    kept = torch.rand(len(x), 1, 1, 1, generator=draws) >= share
+    device = x.device if draws is None else draws.device
+    kept = torch.rand(len(x), 1, 1, 1, generator=draws, device=device) >= share
     return x * (kept / (1 - share)).to(x)

@@ -5,6 +5,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dreamdrive.device import CPU
 from dreamdrive.perception.grid import BevGrid
 
 _GUARD = 1e-7
@@ -113,7 +114,7 @@ class CrossView(nn.Module):
         ego_from_camera: Float[Tensor, "b n 4 4"],
     ) -> tuple[Float[Tensor, "b n q dim"], Float[Tensor, "b n k dim"]]:
         """Codes of length 1 of places and of rays, for each camera."""
-        pixels = image_plane(h, w, self._image).to(places).flatten(1)
+        pixels = image_plane(h, w, self._image, places.device).flatten(1)
         rays = functional.pad(camera_from_pixel @ pixels, (0, 0, 0, 1), value=1.0)
         points = (ego_from_camera @ rays).transpose(-1, -2)
         centres = _at_each(self.cam_embed, ego_from_camera[..., -1])[:, :, None]
@@ -121,10 +122,11 @@ class CrossView(nn.Module):
         return _unit(on_ground - centres), _unit(_at_each(self.img_embed, points) - centres)
 
 
-def image_plane(h: int, w: int, image: tuple[int, int]) -> Float[Tensor, "3 h w"]:
+def image_plane(h: int, w: int, image: tuple[int, int], device: torch.device = CPU) -> Float[Tensor, "3 h w"]:
     """Pixels (u, v, 1) of a map of features; its outermost stand on the borders of the picture."""
-    u, v = torch.linspace(0, 1, w) * image[1], torch.linspace(0, 1, h) * image[0]
-    return torch.stack([u.expand(h, w), v[:, None].expand(h, w), torch.ones(h, w)])
+    u = torch.linspace(0, 1, w, device=device) * image[1]
+    v = torch.linspace(0, 1, h, device=device) * image[0]
+    return torch.stack([u.expand(h, w), v[:, None].expand(h, w), torch.ones(h, w, device=device)])
 
 
 def _norm_first(channels: int, dim: int) -> nn.Sequential:

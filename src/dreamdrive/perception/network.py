@@ -71,20 +71,21 @@ class Encoder(nn.Module):
         for name, values in (("mean", MEAN), ("spread", SPREAD)):
             self.register_buffer(name, torch.tensor(values)[:, None, None], persistent=False)
 
+    def features(self, pictures: Float[Tensor, "b n 3 h w"]) -> list[Float[Tensor, "b n _ _ _"]]:
+        """Maps of features of pictures in [0, 1]."""
+        maps = self.backbone((pictures.flatten(0, 1) - self.mean) / self.spread)
+        return [each.unflatten(0, pictures.shape[:2]) for each in maps]
+
     def forward(
         self,
-        pictures: Float[Tensor, "b n 3 h w"],
-        pixel_from_camera: Float[Tensor, "b n 3 3"],
-        camera_from_ego: Float[Tensor, "b n 4 4"],
+        features: list[Float[Tensor, "b n _ _ _"]],
+        camera_from_pixel: Float[Tensor, "b n 3 3"],
+        ego_from_camera: Float[Tensor, "b n 4 4"],
     ) -> Float[Tensor, "b dim rows columns"]:
-        """See ``CrossViewTransformer``."""
-        b, n = pictures.shape[:2]
-        camera_from_pixel = torch.linalg.inv(pixel_from_camera)
-        ego_from_camera = torch.linalg.inv(camera_from_ego)
-        features = self.backbone((pictures.flatten(0, 1) - self.mean) / self.spread)
+        """See ``CrossViewTransformer.answer``."""
+        b = len(camera_from_pixel)
         x = self.bev_embedding.learned_features.expand(b, -1, -1, -1)
-        for look, layer, feature in zip(self.cross_views, self.layers, features, strict=True):
-            seen = feature.unflatten(0, (b, n))
+        for look, layer, seen in zip(self.cross_views, self.layers, features, strict=True):
             x = layer(look(x, self.bev_embedding.grid, seen, camera_from_pixel, ego_from_camera))
         return x
 
@@ -133,6 +134,13 @@ class CrossViewTransformer(nn.Module):
         Returns:
             Logits in float32.
         """
+        features = self.features(pictures)
+        return self.answer(features, torch.linalg.inv(pixel_from_camera), torch.linalg.inv(camera_from_ego))
+
+    def features(
+        self, pictures: Float[Tensor, "b n 3 h w"] | UInt8[Tensor, "b n 3 h w"]
+    ) -> list[Float[Tensor, "b n _ _ _"]]:
+        """What the backbone sees in pictures, the first part of ``forward``."""
         image = self.options.image
         if pictures.shape[-2:] != (image.height_px, image.width_px):
             raise ValueError(
@@ -140,7 +148,19 @@ class CrossViewTransformer(nn.Module):
             )
         if not pictures.is_floating_point():
             pictures = pictures.float() / 255
-        decoded = self.decoder(self.encoder(pictures, pixel_from_camera, camera_from_ego))
+        return self.encoder.features(pictures)
+
+    def answer(
+        self,
+        features: list[Float[Tensor, "b n _ _ _"]],
+        camera_from_pixel: Float[Tensor, "b n 3 3"],
+        ego_from_camera: Float[Tensor, "b n 4 4"],
+    ) -> BevPrediction:
+        """Segment the street, the other part: out of features, with matrices that are inverted already.
+
+        Nothing here waits for a device.
+        """
+        decoded = self.decoder(self.encoder(features, camera_from_pixel, ego_from_camera))
         said = self.to_logits(decoded).float()
         parts = iter(said.unbind(dim=1))
         found: dict[str, Tensor] = {}

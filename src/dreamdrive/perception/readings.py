@@ -111,11 +111,8 @@ def train_on(
 ) -> Path | None:
     """Train a network on samples of some sets, or take the one that the folder holds already."""
     samples = Samples(sets)
-    torch.manual_seed(regime.training.seed)
-    network = CrossViewTransformer(regime.network)
-    _start(network, regime.trunk)
     return train_cvt(
-        network,
+        first_network(regime),
         shuffled(samples, regime.batch, regime.training.seed),
         folder,
         regime.training,
@@ -124,6 +121,14 @@ def train_on(
         stop=stop,
         progress=lambda done, total: progress(f"train {folder.name}", done, total),
     )
+
+
+def first_network(regime: Regime) -> CrossViewTransformer:
+    """A network with the weights that it starts from."""
+    torch.manual_seed(regime.training.seed)
+    network = CrossViewTransformer(regime.network)
+    _start(network, regime.trunk)
+    return network
 
 
 def _trained_on(

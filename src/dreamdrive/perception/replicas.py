@@ -67,7 +67,7 @@ class Replicas:
         found = [learn(0)] if count == 1 else list(self._pool.map(learn, range(count)))
         learned = _learned(self._networks[0])
         for each, gradients in zip(learned, zip(*(part[0] for part in found), strict=True), strict=True):
-            each.grad = _sum(gradients)
+            each.grad = _laid_out(_sum(gradients), each)
         return {name: torch.stack([part[1][name] for part in found]).sum() for name in found[0][1]}
 
     def _learn(self, network: CrossViewTransformer, batch: BevBatch, share: float) -> Learned:
@@ -109,3 +109,10 @@ def _sum(gradients: tuple[Tensor | None, ...]) -> Tensor | None:
     """In the order of the parts, so that the result is always the same."""
     known = [each for each in gradients if each is not None]
     return torch.stack(known).sum(dim=0) if len(known) > 1 else (known or [None])[0]
+
+
+def _laid_out(gradient: Tensor | None, like: Tensor) -> Tensor | None:
+    """In memory as its weights are, which the fused optimiser of a GPU asks for."""
+    if gradient is None or gradient.stride() == like.stride():
+        return gradient
+    return torch.empty_like(like).copy_(gradient)

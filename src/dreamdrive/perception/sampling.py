@@ -57,17 +57,27 @@ def shuffled(samples: Samples, size: int, seed: int) -> Callable[[int], Iterable
         size: Samples of a batch.
         seed: Of the orders.
     """
-    if len(samples) < size:
-        raise InputError(f"{len(samples)} samples are fewer than a batch of {size}")
-    rounds = len(samples) // size
+    _rounds(len(samples), size)
 
     def batches(first: int) -> Iterator[BevBatch]:
-        step = first
-        while True:
-            order = np.random.default_rng([seed, step // rounds]).permutation(len(samples))
-            for row in range(step % rounds, rounds):
-                chosen = order[row * size : (row + 1) * size].tolist()
-                yield as_batch([samples[index] for index in chosen])
-                step += 1
+        for rows in shuffled_rows(len(samples), size, seed, first):
+            yield as_batch([samples[index] for index in rows])
 
     return batches
+
+
+def shuffled_rows(count: int, size: int, seed: int, first: int = 0) -> Iterator[list[int]]:
+    """Which of ``count`` samples the batches of ``shuffled`` hold, from a step on."""
+    rounds, step = _rounds(count, size), first
+    while True:
+        order = np.random.default_rng([seed, step // rounds]).permutation(count)
+        for row in range(step % rounds, rounds):
+            yield order[row * size : (row + 1) * size].tolist()
+            step += 1
+
+
+def _rounds(count: int, size: int) -> int:
+    """Batches of a round."""
+    if count < size:
+        raise InputError(f"{count} samples are fewer than a batch of {size}")
+    return count // size

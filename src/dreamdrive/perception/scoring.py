@@ -1,6 +1,7 @@
 """How well a network segments a set of samples, all of it and drive by drive."""
 
 from collections import defaultdict
+from itertools import groupby
 
 import torch
 
@@ -21,18 +22,32 @@ def score(
     samples: Samples,
     *,
     device: torch.device = CPU,
+    at_once: int = 1,
     progress: Progress = silent,
 ) -> dict[str, Counts]:
-    """Counts of cells by drive; added up they are those of the whole set, as published figures are."""
+    """Counts of cells by drive; added up they are those of the whole set, as published figures are.
+
+    Args:
+        network: In its place; it is moved to the device and left there.
+        samples: To segment; those of a drive stand together.
+        device: Where.
+        at_once: Most samples of a drive in one batch; all have as many cameras.
+        progress: Told of samples done.
+    """
     network.to(device).eval()
     found: dict[str, Counts] = defaultdict(dict)
-    for index in range(len(samples)):
-        batch = as_batch([samples[index]]).to(device)
-        said = network(batch.pictures, batch.pixel_from_camera, batch.camera_from_ego)
-        drive = found[samples.scene(index)]
-        for name, counts in bev_counts(said, batch.truth).items():
-            drive[name] = drive[name] + counts if name in drive else counts
-        progress(index + 1, len(samples))
+    done = 0
+    for scene, group in groupby(range(len(samples)), samples.scene):
+        rows = list(group)
+        for first in range(0, len(rows), at_once):
+            some = rows[first : first + at_once]
+            batch = as_batch([samples[index] for index in some]).to(device)
+            said = network(batch.pictures, batch.pixel_from_camera, batch.camera_from_ego)
+            drive = found[scene]
+            for name, counts in bev_counts(said, batch.truth).items():
+                drive[name] = drive[name] + counts if name in drive else counts
+            done += len(some)
+            progress(done, len(samples))
     return dict(found)
 
 

@@ -89,7 +89,7 @@ def train_cvt(
     """
     folder.mkdir(parents=True, exist_ok=True)
     _check_replicas(options.replicas, device)
-    _set_learning(network.to(device), options.frozen_layers)
+    set_learning(network.to(device), options.frozen_layers)
     optimiser = make_optimiser(network, options.schedule)
     both = network, nn.Module()  # no average is kept beside the network
     first, before_s = load_checkpoint(folder, both, optimiser, options, data)
@@ -114,7 +114,7 @@ def train_cvt(
     return folder / WEIGHTS
 
 
-def _set_learning(network: CrossViewTransformer, frozen_layers: int) -> None:
+def set_learning(network: CrossViewTransformer, frozen_layers: int) -> None:
     """Let everything learn but the first layers of the backbone."""
     network.requires_grad_(True).train()
     if not frozen_layers:

@@ -1,0 +1,161 @@
+"""Many networks trained at the same time on one GPU.
+
+A step of a small network is thousands of small kernels: most of its time goes into starting them, and none
+fills the GPU. So all samples lie on the GPU, a step is captured once as a CUDA graph, which also chooses its
+samples and its rate, and the graphs of all networks run side by side, each in a stream of its own. Where the
+trunk does not learn, what it sees in the samples is found once.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from itertools import islice
+
+import torch
+from torch import Tensor, nn
+
+from dreamdrive.perception import CrossViewTransformer, Regime, Samples, as_batch, bev_losses
+from dreamdrive.perception.batch import BevTruth
+from dreamdrive.perception.readings import first_network
+from dreamdrive.perception.sampling import shuffled_rows
+from dreamdrive.perception.training import set_learning
+
+_WARM_UP = 3
+"""Steps before a capture, in which libraries choose their kernels."""
+_AT_ONCE = 16
+"""Samples whose features are found at once."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Samples on a device: pictures or what a trunk sees in them, and matrices that are inverted already."""
+
+    seen: tuple[Tensor, ...]
+    camera_from_pixel: Tensor
+    ego_from_camera: Tensor
+    truth: BevTruth
+
+    def __len__(self) -> int:
+        return len(self.camera_from_pixel)
+
+    def rows(self, rows: Tensor) -> "Held":
+        """Some of the samples."""
+        truth = BevTruth(*(getattr(self.truth, each.name)[rows] for each in fields(BevTruth)))
+        seen = tuple(each[rows] for each in self.seen)
+        return Held(seen, self.camera_from_pixel[rows], self.ego_from_camera[rows], truth)
+
+    @torch.no_grad()
+    def as_seen_by(self, network: CrossViewTransformer) -> "Held":
+        """Features in place of the pictures, in bfloat16."""
+        network.eval()
+        parts: list[list[Tensor]] = []
+        for pictures in self.seen[0].split(_AT_ONCE):
+            with torch.autocast(pictures.device.type, torch.bfloat16):
+                parts.append([each.bfloat16() for each in network.features(pictures)])
+        return replace(self, seen=tuple(torch.cat(each) for each in zip(*parts, strict=True)))
+
+
+def held(samples: Samples, device: torch.device) -> Held:
+    """All samples on a device, as pictures."""
+    batch = as_batch([samples[index] for index in range(len(samples))])
+    return Held(
+        (batch.pictures.to(device),),
+        torch.linalg.inv(batch.pixel_from_camera).to(device),
+        torch.linalg.inv(batch.camera_from_ego).to(device),
+        batch.truth.to(device),
+    )
+
+
+class Student:
+    """A network and the steps of its training; samples, rates and orders are those of ``train_on``.
+
+    Args:
+        samples: Pictures on a device, or features of the trunk where it does not learn.
+        regime: How it is trained; its replicas do not count.
+    """
+
+    def __init__(self, samples: Held, regime: Regime) -> None:
+        self._samples, self._options = samples, regime.training
+        schedule, device = regime.training.schedule, samples.camera_from_pixel.device
+        self.network: CrossViewTransformer = first_network(regime).to(device)
+        set_learning(self.network, regime.training.frozen_layers)
+        rows = shuffled_rows(len(samples), regime.batch, regime.training.seed)
+        self._rows = torch.tensor(list(islice(rows, schedule.steps)), device=device)
+        rates = [schedule.rate_at(step) for step in range(schedule.steps)]
+        self._rates = torch.tensor(rates, device=device)
+        self.losses = torch.zeros(schedule.steps, device=device)
+        self._done = torch.zeros(1, dtype=torch.long, device=device)
+        self._learned = [each for each in self.network.parameters() if each.requires_grad]
+        self._rate = torch.tensor(rates[0], device=device)
+        self._optimiser = torch.optim.AdamW(
+            self._learned,
+            lr=self._rate,
+            weight_decay=schedule.weight_decay,
+            fused=True,
+            capturable=device.type == "cuda",
+        )
+
+    def step(self) -> None:
+        """Learn from the next batch; nothing waits for the device."""
+        self._rate.copy_(self._rates[self._done][0])
+        batch, low = self._samples.rows(self._rows[self._done][0]), self._options.low_precision
+        network, cameras = self.network, (batch.camera_from_pixel, batch.ego_from_camera)
+        with torch.autocast(self._rate.device.type, torch.bfloat16, enabled=low, cache_enabled=False):
+            seen = network.features(batch.seen[0]) if len(batch.seen) == 1 else list(batch.seen)
+            said = network.answer(seen, *cameras)
+        loss = torch.stack(list(bev_losses(said, batch.truth, self._options.losses).values())).sum()
+        self._optimiser.zero_grad()
+        loss.backward()  # pyright: ignore[reportUnknownMemberType]
+        nn.utils.clip_grad_norm_(self._learned, self._options.clip)
+        self._optimiser.step()
+        self.losses[self._done] = loss.detach()
+        self._done += 1
+
+    def start_again(self, first: dict[str, Tensor]) -> None:
+        """Undo all steps: weights become the first ones, the optimiser and the counter zero."""
+        self.network.load_state_dict(first)
+        self._done.zero_()
+        for state in self._optimiser.state.values():
+            for value in state.values():
+                value.zero_()
+
+    def capture(self) -> "Captured":
+        """The step as a graph of a stream of its own."""
+        stream, first = torch.cuda.Stream(), {k: v.clone() for k, v in self.network.state_dict().items()}
+        stream.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(stream):
+            for _ in range(_WARM_UP):
+                self.step()
+        stream.synchronize()
+        graph = torch.cuda.CUDAGraph()
+        with torch.cuda.graph(graph, stream=stream):
+            self.step()
+        self.start_again(first)
+        torch.cuda.synchronize()
+        return Captured(graph, stream, len(self._rates))
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A step that runs by itself."""
+
+    graph: torch.cuda.CUDAGraph
+    stream: torch.cuda.Stream
+    steps: int
+
+
+def train_together(students: list[Student]) -> Iterator[int]:
+    """Train all of them; says now and then how many steps are done."""
+    torch.backends.cudnn.benchmark = True
+    captured = [each.capture() for each in students]
+    for step in range(max(each.steps for each in captured)):
+        for each in captured:
+            if step < each.steps:
+                with torch.cuda.stream(each.stream):
+                    each.graph.replay()
+        if step % 100 == 99:
+            torch.cuda.synchronize()
+            yield step + 1
+    torch.cuda.synchronize()
+    for each in students:
+        if not torch.isfinite(each.losses).all():
+            raise ArithmeticError("a loss is not finite")
