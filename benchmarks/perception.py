@@ -79,13 +79,13 @@ def _each(what: str, seeds: list[int], make: Callable[[int], None]) -> None:
 
 def _on_cpu(protocol: Protocol, places: Places, network: CvtOptions) -> list[dict[str, Any]]:
     """Train a network after the other, or take those that are there, and count their cells."""
-    rows: list[dict[str, Any]] = []
+    rows, tests = list[dict[str, Any]](), _tests(protocol, places)
     for seed, arm in product(protocol.seeds, protocol.arms):
         regime = protocol.regime_of(seed, network, TWIN)
         sets = [BevSet.open(places.set(name)) for name in protocol.arms[arm]]
         weights = train_on(sets, places.network(arm, seed), regime)
         assert weights is not None
-        rows.append(_tested(arm, seed, load_cvt(weights), protocol, places, CPU))
+        rows.append(_tested(arm, seed, load_cvt(weights), protocol, places, tests, CPU))
     return rows
 
 
@@ -98,10 +98,17 @@ def _on_gpu(protocol: Protocol, places: Places, network: CvtOptions) -> list[dic
             students[seed, arm] = Student(samples, protocol.regime_of(seed, network, TWIN))
     for done in train_together(list(students.values())):
         print(f"{len(students)} networks: {done} of {protocol.regime.steps} steps", flush=True)
+    tests = _tests(protocol, places)
     return [
-        _tested(arm, seed, students[seed, arm].network, protocol, places, device)
+        _tested(arm, seed, students[seed, arm].network, protocol, places, tests, device)
         for seed, arm in product(protocol.seeds, protocol.arms)
     ]
+
+
+def _tests(protocol: Protocol, places: Places) -> dict[str, Samples]:
+    """What networks are tested on."""
+    names = "validation", protocol.realism.tested
+    return {name: Samples([BevSet.open(places.set(name))]) for name in names}
 
 
 def _tested(
@@ -110,6 +117,7 @@ def _tested(
     trained: CrossViewTransformer,
     protocol: Protocol,
     places: Places,
+    tests: dict[str, Samples],
     device: torch.device,
 ) -> dict[str, Any]:
     """Counts of cells street by street."""
@@ -117,8 +125,7 @@ def _tested(
     row: dict[str, Any] = {"arm": arm, "seed": seed, "samples": own}
     of = ["validation", *([protocol.realism.tested] if arm == protocol.realism.trained else [])]
     for name in of:
-        samples = Samples([BevSet.open(places.set(name))])
-        by_drive = score(trained, samples, device=device, at_once=1 if device.type == "cpu" else 16)
+        by_drive = score(trained, tests[name], device=device, at_once=1 if device.type == "cpu" else 16)
         row[name] = {
             street: {what: asdict(counts) for what, counts in found.items()}
             for street, found in by_drive.items()

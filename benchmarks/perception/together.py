@@ -7,6 +7,7 @@ trunk does not learn, what it sees in the samples is found once.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 
@@ -56,7 +57,8 @@ class Held:
 
 def held(samples: Samples, device: torch.device) -> Held:
     """All samples on a device, as pictures."""
-    batch = as_batch([samples[index] for index in range(len(samples))])
+    with ThreadPoolExecutor() as pool:
+        batch = as_batch(list(pool.map(samples.__getitem__, range(len(samples)))))
     return Held(
         (batch.pictures.to(device),),
         torch.linalg.inv(batch.pixel_from_camera).to(device),
