@@ -93,9 +93,10 @@ def _on_gpu(protocol: Protocol, places: Places, network: CvtOptions) -> list[dic
     """Train all networks at the same time, and count their cells."""
     device, students = torch.device("cuda"), dict[tuple[int, str], Student]()
     for arm, names in protocol.arms.items():
-        samples = held(Samples([BevSet.open(places.set(name)) for name in names]), device)
-        for seed in protocol.seeds:
-            students[seed, arm] = Student(samples, protocol.regime_of(seed, network, TWIN))
+        samples = Samples([BevSet.open(places.set(name)) for name in names])
+        regimes = {seed: protocol.regime_of(seed, network, TWIN) for seed in protocol.seeds}
+        on_device = held(samples, regimes[protocol.seeds[0]], device)
+        students |= {(seed, arm): Student(on_device, regime) for seed, regime in regimes.items()}
     for done in train_together(list(students.values())):
         print(f"{len(students)} networks: {done} of {protocol.regime.steps} steps", flush=True)
     tests = _tests(protocol, places)

@@ -2,19 +2,27 @@
 
 A step of a small network is thousands of small kernels: most of its time goes into starting them, and none
 fills the GPU. So all samples lie on the GPU, a step is captured once as a CUDA graph, which also chooses its
-samples and its rate, and the graphs of all networks run side by side, each in a stream of its own. Where the
-trunk does not learn, what it sees in the samples is found once.
+samples and its rate, and the graphs of all networks run side by side, each in a stream of its own. What the
+first layers of the trunk see, which do not learn, is found once.
 """
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from itertools import islice
 
 import torch
 from torch import Tensor, nn
 
-from dreamdrive.perception import CrossViewTransformer, Regime, Samples, as_batch, bev_losses
+from dreamdrive.errors import InputError
+from dreamdrive.perception import (
+    CrossViewTransformer,
+    Regime,
+    Samples,
+    StreetTrunk,
+    as_batch,
+    bev_losses,
+)
 from dreamdrive.perception.batch import BevTruth
 from dreamdrive.perception.readings import first_network
 from dreamdrive.perception.sampling import shuffled_rows
@@ -28,39 +36,38 @@ _AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Held:
-    """Samples on a device: pictures or what a trunk sees in them, and matrices that are inverted already."""
+    """Samples on a device: fine features of their pictures, and matrices that are inverted already."""
 
-    seen: tuple[Tensor, ...]
+    fine: Tensor
     camera_from_pixel: Tensor
     ego_from_camera: Tensor
     truth: BevTruth
 
     def __len__(self) -> int:
-        return len(self.camera_from_pixel)
+        return len(self.fine)
 
     def rows(self, rows: Tensor) -> "Held":
         """Some of the samples."""
         truth = BevTruth(*(getattr(self.truth, each.name)[rows] for each in fields(BevTruth)))
-        seen = tuple(each[rows] for each in self.seen)
-        return Held(seen, self.camera_from_pixel[rows], self.ego_from_camera[rows], truth)
-
-    @torch.no_grad()
-    def as_seen_by(self, network: CrossViewTransformer) -> "Held":
-        """Features in place of the pictures, in bfloat16."""
-        network.eval()
-        parts: list[list[Tensor]] = []
-        for pictures in self.seen[0].split(_AT_ONCE):
-            with torch.autocast(pictures.device.type, torch.bfloat16):
-                parts.append([each.bfloat16() for each in network.features(pictures)])
-        return replace(self, seen=tuple(torch.cat(each) for each in zip(*parts, strict=True)))
+        return Held(self.fine[rows], self.camera_from_pixel[rows], self.ego_from_camera[rows], truth)
 
 
-def held(samples: Samples, device: torch.device) -> Held:
-    """All samples on a device, as pictures."""
+@torch.no_grad()
+def held(samples: Samples, regime: Regime, device: torch.device) -> Held:
+    """All samples on a device; the regime is one whose trunk learns nothing before its last layer."""
+    if regime.network.trunk != "street" or regime.training.frozen_layers < 2:
+        raise InputError("networks learn together on the trunk street, with at least two frozen layers")
     with ThreadPoolExecutor() as pool:
         batch = as_batch(list(pool.map(samples.__getitem__, range(len(samples)))))
+    encoder = first_network(regime).to(device).eval().encoder
+    assert isinstance(encoder.backbone, StreetTrunk)
+    parts: list[Tensor] = []
+    for some in batch.pictures.split(_AT_ONCE):
+        normal = (some.to(device).flatten(0, 1).float() / 255 - encoder.mean) / encoder.spread
+        with torch.autocast(device.type, torch.bfloat16, enabled=regime.training.low_precision):
+            parts.append(encoder.backbone.fine(normal).unflatten(0, some.shape[:2]))
     return Held(
-        (batch.pictures.to(device),),
+        torch.cat(parts),
         torch.linalg.inv(batch.pixel_from_camera).to(device),
         torch.linalg.inv(batch.camera_from_ego).to(device),
         batch.truth.to(device),
@@ -71,15 +78,18 @@ class Student:
     """A network and the steps of its training; samples, rates and orders are those of ``train_on``.
 
     Args:
-        samples: Pictures on a device, or features of the trunk where it does not learn.
+        samples: On a device.
         regime: How it is trained; its replicas do not count.
     """
 
     def __init__(self, samples: Held, regime: Regime) -> None:
         self._samples, self._options = samples, regime.training
-        schedule, device = regime.training.schedule, samples.camera_from_pixel.device
+        schedule, device = regime.training.schedule, samples.fine.device
         self.network: CrossViewTransformer = first_network(regime).to(device)
         set_learning(self.network, regime.training.frozen_layers)
+        trunk = self.network.encoder.backbone
+        assert isinstance(trunk, StreetTrunk)
+        self._last = trunk.layers[2]
         rows = shuffled_rows(len(samples), regime.batch, regime.training.seed)
         self._rows = torch.tensor(list(islice(rows, schedule.steps)), device=device)
         rates = [schedule.rate_at(step) for step in range(schedule.steps)]
@@ -100,10 +110,10 @@ class Student:
         """Learn from the next batch; nothing waits for the device."""
         self._rate.copy_(self._rates[self._done][0])
         batch, low = self._samples.rows(self._rows[self._done][0]), self._options.low_precision
-        network, cameras = self.network, (batch.camera_from_pixel, batch.ego_from_camera)
+        cameras, size = (batch.camera_from_pixel, batch.ego_from_camera), batch.fine.shape[:2]
         with torch.autocast(self._rate.device.type, torch.bfloat16, enabled=low, cache_enabled=False):
-            seen = network.features(batch.seen[0]) if len(batch.seen) == 1 else list(batch.seen)
-            said = network.answer(seen, *cameras)
+            coarse = self._last(batch.fine.flatten(0, 1)).unflatten(0, size)
+            said = self.network.answer([batch.fine, coarse], *cameras)
         loss = torch.stack(list(bev_losses(said, batch.truth, self._options.losses).values())).sum()
         self._optimiser.zero_grad()
         loss.backward()  # pyright: ignore[reportUnknownMemberType]

@@ -38,10 +38,14 @@ class StreetTrunk(nn.Module):
 
     def forward(self, pictures: Float[Tensor, "n 3 h w"]) -> list[Tensor]:
         """Features of pictures that are normalised as for ImageNet."""
+        fine = self.fine(pictures)
+        return [fine, self.layers[2](fine)]
+
+    def fine(self, pictures: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 24 y x"]:
+        """The first of the two maps, of which ``layers[2]`` makes the other."""
         x = (pictures * self.spread + self.mean).contiguous(memory_format=torch.channels_last)
         # Of bytes, as it was trained: EfficientNet-Lite's own scale.
-        fine = self.layers[1](self.layers[0]((x - 127 / 255) * (255 / 128)))
-        return [fine, self.layers[2](fine)]
+        return self.layers[1](self.layers[0]((x - 127 / 255) * (255 / 128)))
 
 
 def _filter(conv: nn.Conv2d) -> FilterConv:
