@@ -5,7 +5,13 @@ from pathlib import Path
 
 import msgspec
 
-from dreamdrive.perception import CvtOptions, CvtTraining, LossOptions, Regime, ScheduleOptions
+from dreamdrive.perception import (
+    CvtOptions,
+    CvtTraining,
+    LossOptions,
+    Regime,
+    ScheduleOptions,
+)
 
 PROTOCOL = Path(__file__).with_name("protocol.json")
 
@@ -58,7 +64,6 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rate: float
     frozen_layers: int
     low_precision: bool
-    replicas: int
     alpha: float
 
 
@@ -76,7 +81,6 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     streets: Streets
     real: Real
     generated: Generated
-    network: str
     regime: Training
     arms: dict[str, list[str]]
     realism: Realism
@@ -89,7 +93,6 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             schedule=ScheduleOptions(steps=r.steps, rate=r.rate),
             losses=LossOptions(alpha=r.alpha),
             low_precision=r.low_precision,
-            replicas=r.replicas,
             frozen_layers=r.frozen_layers,
             seed=seed,
         )
@@ -118,7 +121,3 @@ class Places:
     def set(self, name: str) -> Path:
         """A set of samples."""
         return self.runs / "sets" / name
-
-    def network(self, arm: str, seed: int) -> Path:
-        """A training."""
-        return self.runs / "networks" / f"{arm}-{seed}"

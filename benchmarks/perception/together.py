@@ -1,21 +1,22 @@
-"""Many networks trained at the same time on one GPU.
+"""Many networks trained on the same samples: on cores one each, on a GPU side by side.
 
-A step of a small network is thousands of small kernels: most of its time goes into starting them, and none
-fills the GPU. So all samples lie on the GPU, a step is captured once as a CUDA graph, which also chooses its
-samples and its rate, and the graphs of all networks run side by side, each in a stream of its own. What the
-first layers of the trunk see, which do not learn, is found once.
+What the first layers of the trunk see, which do not learn, is found once. On a GPU a step of a small network
+is thousands of small kernels: most of its time goes into starting them. So all samples lie there, a step is
+captured once as a CUDA graph, which also chooses its samples and its rate, and the graphs of several networks
+run side by side, each in a stream of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from itertools import islice
+from itertools import accumulate, islice
 
 import torch
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
 from dreamdrive.perception import (
+    BevSet,
     CrossViewTransformer,
     Regime,
     Samples,
@@ -36,42 +37,68 @@ _AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Held:
-    """Samples on a device: fine features of their pictures, and matrices that are inverted already."""
+    """Samples on a device: fine features of their pictures, and matrices that are inverted already.
 
+    Attributes:
+        which: Of each sample of an arm its row in what follows, where each stands once.
+        fine: Features.
+        camera_from_pixel: Inverse intrinsics.
+        ego_from_camera: Inverse extrinsics.
+        truth: Labels.
+    """
+
+    which: Tensor
     fine: Tensor
     camera_from_pixel: Tensor
     ego_from_camera: Tensor
     truth: BevTruth
 
     def __len__(self) -> int:
-        return len(self.fine)
+        return len(self.which)
 
     def rows(self, rows: Tensor) -> "Held":
         """Some of the samples."""
-        truth = BevTruth(*(getattr(self.truth, each.name)[rows] for each in fields(BevTruth)))
-        return Held(self.fine[rows], self.camera_from_pixel[rows], self.ego_from_camera[rows], truth)
+        own = self.which[rows]
+        truth = BevTruth(*(getattr(self.truth, each.name)[own] for each in fields(BevTruth)))
+        return Held(own, self.fine[own], self.camera_from_pixel[own], self.ego_from_camera[own], truth)
 
 
 @torch.no_grad()
-def held(samples: Samples, regime: Regime, device: torch.device) -> Held:
-    """All samples on a device; the regime is one whose trunk learns nothing before its last layer."""
+def held(sets: Sequence[BevSet], regime: Regime, device: torch.device) -> Held:
+    """All samples of sets on a device, in their order; a set may stand there several times.
+
+    Args:
+        sets: Of recorded, rendered or warped samples.
+        regime: One whose trunk learns nothing before its last layer.
+        device: Where.
+    """
     if regime.network.trunk != "street" or regime.training.frozen_layers < 2:
-        raise InputError("networks learn together on the trunk street, with at least two frozen layers")
+        raise InputError("networks are trained together on the trunk street, with two frozen layers or more")
+    once = {each.folder: each for each in sets}
+    samples = Samples(list(once.values()))
+    starts = dict(zip(once, accumulate((len(each) for each in once.values()), initial=0), strict=False))
+    which = [starts[each.folder] + row for each in sets for row in range(len(each))]
     with ThreadPoolExecutor() as pool:
         batch = as_batch(list(pool.map(samples.__getitem__, range(len(samples)))))
-    encoder = first_network(regime).to(device).eval().encoder
-    assert isinstance(encoder.backbone, StreetTrunk)
-    parts: list[Tensor] = []
-    for some in batch.pictures.split(_AT_ONCE):
-        normal = (some.to(device).flatten(0, 1).float() / 255 - encoder.mean) / encoder.spread
-        with torch.autocast(device.type, torch.bfloat16, enabled=regime.training.low_precision):
-            parts.append(encoder.backbone.fine(normal).unflatten(0, some.shape[:2]))
     return Held(
-        torch.cat(parts),
+        torch.tensor(which, device=device),
+        _fine(batch.pictures, regime, device),
         torch.linalg.inv(batch.pixel_from_camera).to(device),
         torch.linalg.inv(batch.camera_from_ego).to(device),
         batch.truth.to(device),
     )
+
+
+def _fine(pictures: Tensor, regime: Regime, device: torch.device) -> Tensor:
+    """What the frozen layers see."""
+    encoder = first_network(regime).to(device).eval().encoder
+    assert isinstance(encoder.backbone, StreetTrunk)
+    parts: list[Tensor] = []
+    for some in pictures.split(_AT_ONCE):
+        normal = (some.to(device).flatten(0, 1).float() / 255 - encoder.mean) / encoder.spread
+        with torch.autocast(device.type, torch.bfloat16, enabled=regime.training.low_precision):
+            parts.append(encoder.backbone.fine(normal).unflatten(0, some.shape[:2]))
+    return torch.cat(parts)
 
 
 class Student:
@@ -79,7 +106,7 @@ class Student:
 
     Args:
         samples: On a device.
-        regime: How it is trained; its replicas do not count.
+        regime: How it is trained; as one replica.
     """
 
     def __init__(self, samples: Held, regime: Regime) -> None:
@@ -155,10 +182,23 @@ class Captured:
     steps: int
 
 
-def train_together(students: list[Student]) -> Iterator[int]:
-    """Train all of them; says now and then how many steps are done."""
-    torch.backends.cudnn.benchmark = True
-    captured = [each.capture() for each in students]
+def train_together(students: Sequence[Student]) -> Iterator[int]:
+    """Train all of them on their GPU, or one after another on cores; says the steps done."""
+    if students[0].losses.is_cuda:
+        torch.backends.cudnn.benchmark = True
+        yield from _replayed([each.capture() for each in students])
+    else:
+        for each in students:
+            for step in range(len(each.losses)):
+                each.step()
+                if step % 100 == 99:
+                    yield step + 1
+    for each in students:
+        if not torch.isfinite(each.losses).all():
+            raise ArithmeticError("a loss is not finite")
+
+
+def _replayed(captured: Sequence["Captured"]) -> Iterator[int]:
     for step in range(max(each.steps for each in captured)):
         for each in captured:
             if step < each.steps:
@@ -168,6 +208,3 @@ def train_together(students: list[Student]) -> Iterator[int]:
             torch.cuda.synchronize()
             yield step + 1
     torch.cuda.synchronize()
-    for each in students:
-        if not torch.isfinite(each.losses).all():
-            raise ArithmeticError("a loss is not finite")

@@ -1,11 +1,14 @@
 """Steps that a GPU takes for many networks are those of the training, here on the CPU."""
 
 import json
+from dataclasses import replace
 
 import pytest
 import torch
 from tests.logs import log
 
+from dreamdrive.errors import InputError
+from dreamdrive.knowledge import SHIPPED
 from dreamdrive.perception import (
     BevGrid,
     BevSet,
@@ -13,7 +16,6 @@ from dreamdrive.perception import (
     CvtTraining,
     ImageSize,
     Regime,
-    Samples,
     ScheduleOptions,
     samples_of_log,
     train_on,
@@ -28,11 +30,10 @@ TINY = CvtOptions(
 )  # fmt: skip
 
 
-def regime(frozen_layers: int, low_precision: bool = False) -> Regime:
+def regime(frozen_layers: int) -> Regime:
     training = CvtTraining(
         schedule=ScheduleOptions(steps=4),
         frozen_layers=frozen_layers,
-        low_precision=low_precision,
         log_each=1,
     )
     return Regime(TINY, training, batch=2)
@@ -46,12 +47,12 @@ def bev_set(tmp_path_factory):
     return BevSet.open(folder / "set")
 
 
-@pytest.mark.parametrize("frozen_layers", [0, 2])
+@pytest.mark.parametrize("frozen_layers", [2, 3])
 def test_a_student_learns_as_a_training_does(bev_set, tmp_path, frozen_layers):
-    asked = regime(frozen_layers)
+    asked = replace(regime(frozen_layers), trunk=SHIPPED)
     assert train_on([bev_set], tmp_path, asked) is not None
     wanted = [json.loads(line)["loss"] for line in (tmp_path / "losses.jsonl").read_text().splitlines()]
-    student = Student(held(Samples([bev_set]), torch.device("cpu")), asked)
+    student = Student(held([bev_set], asked, torch.device("cpu")), asked)
     for _ in range(3):  # as before a capture
         student.step()
     student.start_again(first_network(asked).state_dict())
@@ -60,12 +61,15 @@ def test_a_student_learns_as_a_training_does(bev_set, tmp_path, frozen_layers):
     torch.testing.assert_close(student.losses, torch.tensor(wanted), rtol=2e-3, atol=1e-5)
 
 
-def test_features_of_a_trunk_that_does_not_learn_stand_for_the_pictures(bev_set):
-    asked = regime(3, low_precision=True)
-    pictures = held(Samples([bev_set]), torch.device("cpu"))
-    features = pictures.as_seen_by(first_network(asked))
-    one, other = Student(pictures, asked), Student(features, asked)
-    for _ in range(2):
-        one.step()
-        other.step()
-    torch.testing.assert_close(one.losses, other.losses, rtol=2e-2, atol=0)
+def test_what_learns_early_is_not_held(bev_set):
+    with pytest.raises(InputError, match="two frozen layers or more"):
+        held([bev_set], regime(1), torch.device("cpu"))
+
+
+def test_a_set_may_count_several_times(bev_set):
+    asked, device = regime(2), torch.device("cpu")
+    one, three = held([bev_set], asked, device), held([bev_set] * 3, asked, device)
+    assert (len(one), len(three)) == (3, 9)
+    assert torch.equal(one.fine, three.fine)
+    rows = torch.tensor([1, 4, 7])
+    assert torch.equal(three.rows(rows).fine, one.fine[[1, 1, 1]])

@@ -1,0 +1,131 @@
+"""Trainings of the experiment and their tests, each kept once it is done."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from common.keep import is_current, save
+from common.twin import TWIN
+from common.workers import Task, work_off
+from dreamdrive.device import CPU
+from dreamdrive.perception import MANIFEST, QUICK, BevSet, CrossViewTransformer, Regime, Samples, score
+from dreamdrive.run import digest
+from perception.protocol import Places, Protocol, read_protocol
+from perception.together import Held, Student, held, train_together
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A network of an arm and a seed.
+
+    Attributes:
+        arm: What it learns from.
+        seed: Of its first weights and the order of its samples.
+        runs: Folder of the experiment.
+        path: File of the protocol.
+    """
+
+    arm: str
+    seed: int
+    runs: Path
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """For files and messages."""
+        return f"{self.arm}-{self.seed}"
+
+    block = "networks"
+
+    @property
+    def owner(self) -> str:
+        """Itself: any two may be trained side by side."""
+        return self.name
+
+    @property
+    def result(self) -> Path:
+        """Where its counts are kept."""
+        return self.runs / "trials" / f"{self.name}.json"
+
+    @cached_property
+    def protocol(self) -> Protocol:
+        """The experiment."""
+        return read_protocol(self.path)
+
+    @property
+    def sets(self) -> list[BevSet]:
+        """What it learns from."""
+        return [BevSet.open(Places(self.runs).set(name)) for name in self.protocol.arms[self.arm]]
+
+    @property
+    def tests(self) -> list[str]:
+        """Names of the sets it is tested on."""
+        realism = self.protocol.realism
+        return ["validation", *([realism.tested] if self.arm == realism.trained else [])]
+
+    @property
+    def regime(self) -> Regime:
+        """How it is trained."""
+        return self.protocol.regime_of(self.seed, QUICK, TWIN)
+
+    @property
+    def key(self) -> str:
+        """Of everything its counts follow from."""
+        names = [*self.protocol.arms[self.arm], *self.tests]
+        manifests = {name: (Places(self.runs).set(name) / MANIFEST).read_bytes() for name in set(names)}
+        sets = {name: hashlib.sha256(manifest).hexdigest() for name, manifest in manifests.items()}
+        return digest([asdict(replace(self.regime, trunk=None)), names, sets])
+
+    def is_done(self) -> bool:
+        """Whether its counts are there and still follow."""
+        if is_current(self.result, self.key):
+            return True
+        self.result.unlink(missing_ok=True)
+        return False
+
+
+def train_and_test(trials: Sequence[Trial], workers: int, *, cuda: bool) -> list[str]:
+    """Train and test; returns the names of those that failed."""
+    if not cuda:
+        return [each.name for each in work_off(trials, _on_a_core, workers)]
+    device = torch.device("cuda")
+    samples = {each.arm: held(each.sets, each.regime, device) for each in {t.arm: t for t in trials}.values()}
+    for seed in sorted({each.seed for each in trials}):
+        _train([each for each in trials if each.seed == seed], samples)
+    return []
+
+
+def _on_a_core(task: Task) -> None:
+    assert isinstance(task, Trial)
+    _train([task], {task.arm: held(task.sets, task.regime, CPU)})
+
+
+def _train(trials: Sequence[Trial], samples: Mapping[str, Held]) -> None:
+    """Train networks together on samples of their arms, and keep the counts of each."""
+    students = [Student(samples[each.arm], each.regime) for each in trials]
+    names = ", ".join(each.name for each in trials)
+    for done in train_together(students):
+        print(f"{names}: {done} of {trials[0].protocol.regime.steps} steps", flush=True)
+    for trial, student in zip(trials, students, strict=True):
+        save(trial.result, trial.key, _counts(trial, student.network))
+
+
+def _counts(trial: Trial, network: CrossViewTransformer) -> dict[str, Any]:
+    """Cells that are right and wrong, street by street."""
+    distinct = {each.folder: len(each) for each in trial.sets}
+    row: dict[str, Any] = {"arm": trial.arm, "seed": trial.seed, "samples": sum(distinct.values())}
+    device = network.encoder.mean.device
+    row["device"] = torch.cuda.get_device_name(device) if device.type == "cuda" else "one core"
+    for name in trial.tests:
+        samples = Samples([BevSet.open(Places(trial.runs).set(name))])
+        by_drive = score(network, samples, device=device, at_once=1 if device == CPU else 16)
+        row[name] = {
+            street: {what: asdict(counts) for what, counts in found.items()}
+            for street, found in by_drive.items()
+        }
+    return row
