@@ -1,7 +1,7 @@
 """What generated samples are worth to a network that segments the street from above (the paper's Table II).
 
     python benchmarks/perception.py [--runs DIR] [--only streets|scenes|sets|networks] [--workers N] [--cuda]
-                                    [--json FILE] [--markdown FILE]
+                                    [--json FILE] [--markdown FILE] [--picture FILE]
 
 Streets, sizes, arms, regime and seeds stand in perception/protocol.json. A family of drawn streets stands for
 real ones: six cameras, noise. Of all training streets 4D scenes are made from their recorded pictures, with
@@ -23,10 +23,13 @@ from common.options import parser_of
 from common.report import publish
 from dreamdrive.perception import QUICK
 from perception.making import make_scene, make_sets, make_street
+from perception.picture import picture
 from perception.protocol import PROTOCOL, Places, read_protocol
 from perception.tables import tables
 from perception.trials import Trial, train_and_test
 
+_SHOWN = 11
+"""Of the training streets the one in the picture."""
 _STEPS = ("streets", "scenes", "sets", "networks")
 
 
@@ -37,6 +40,7 @@ def main(doc: str | None) -> int:
     parser.add_argument("--protocol", type=Path, default=PROTOCOL)
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="networks side by side")
     parser.add_argument("--cuda", action="store_true")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="samples of one street as PNG or JPEG")
     args = parser.parse_args()
     protocol = read_protocol(args.protocol)
     places = Places(args.runs)
@@ -48,6 +52,8 @@ def main(doc: str | None) -> int:
         _each("scene", [*training, *tested], lambda seed: make_scene(seed, protocol, places))
     if args.only in (None, "sets"):
         make_sets(protocol, places, QUICK)
+    if args.picture:
+        picture(args.picture, places, training[_SHOWN])
     if args.only not in (None, "networks"):
         return 0
     trials = [Trial(arm, seed, args.runs, args.protocol) for seed in protocol.seeds for arm in protocol.arms]

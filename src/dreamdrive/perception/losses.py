@@ -23,8 +23,9 @@ class LossOptions:
     gamma: float = 2.0
     """How much less a cell counts that is answered well."""
     alpha: float = -1.0
-    """Weight of a vehicle's cells, twice over, and 1 - alpha of the others; below 0 there are no weights, as
-    published. With 0.75 a probability of one half is said where one in four is a vehicle's."""
+    """Weight of cells with a vehicle; others weigh 1 - alpha, and all twice as much, so that 0.5 is even.
+    Below 0, as published, there are no weights. With 0.75 a probability of one half is said of cells of which
+    one in four has a vehicle."""
     visibility: int = 2
     """Least visibility of vehicles whose cells count."""
     empty_is_nan: bool = False
