@@ -27,6 +27,11 @@ TINY = CvtOptions(
     head=8,
 )
 
+ON_STREET_TRUNK = CvtOptions(
+    ImageSize(32, 64, 4), BevGrid(16, 16), ("vehicle", "road"), "street", dim=16, heads=2, head_dim=8,
+    bottlenecks=(1, 1), decoder=(16, 16, 8), head=8,
+)  # fmt: skip
+
 
 class Stub(nn.Module):
     """Two convolutions in place of a trunk, as in the golden numbers."""

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 import torch
 from tests.logs import log
+from tests.perception.streets import ON_STREET_TRUNK as TINY
 
 from dreamdrive.errors import InputError
 from dreamdrive.perception import (
     BevGrid,
     BevSet,
     CrossViewTransformer,
-    CvtOptions,
     CvtTraining,
-    ImageSize,
     Regime,
     Samples,
     ScheduleOptions,
@@ -26,10 +25,6 @@ from dreamdrive.perception import (
 )
 from dreamdrive.perception.inputs import as_batch
 
-TINY = CvtOptions(
-    ImageSize(32, 64, 4), BevGrid(16, 16), ("vehicle", "road"), "street", dim=16, heads=2, head_dim=8,
-    bottlenecks=(1, 1), decoder=(16, 16, 8), head=8,
-)  # fmt: skip
 REGIME = Regime(TINY, CvtTraining(schedule=ScheduleOptions(steps=2)), batch=2)
 
 

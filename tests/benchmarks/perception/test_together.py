@@ -6,15 +6,13 @@ from dataclasses import replace
 import pytest
 import torch
 from tests.logs import log
+from tests.perception.streets import ON_STREET_TRUNK as TINY
 
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import SHIPPED
 from dreamdrive.perception import (
-    BevGrid,
     BevSet,
-    CvtOptions,
     CvtTraining,
-    ImageSize,
     Regime,
     ScheduleOptions,
     samples_of_log,
@@ -23,11 +21,6 @@ from dreamdrive.perception import (
 )
 from dreamdrive.perception.readings import first_network
 from perception.together import Student, held
-
-TINY = CvtOptions(
-    ImageSize(32, 64, 4), BevGrid(16, 16), ("vehicle", "road"), "street", dim=16, heads=2, head_dim=8,
-    bottlenecks=(1, 1), decoder=(16, 16, 8), head=8,
-)  # fmt: skip
 
 
 def regime(frozen_layers: int) -> Regime:
