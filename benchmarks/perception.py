@@ -56,7 +56,7 @@ def main(doc: str | None) -> int:
         picture(args.picture, places, training[_SHOWN])
     if args.only not in (None, "networks"):
         return 0
-    trials = [Trial(arm, seed, args.runs, args.protocol) for seed in protocol.seeds for arm in protocol.arms]
+    trials = [Trial(arm, seed, args.runs, protocol) for seed in protocol.seeds for arm in protocol.arms]
     failed = train_and_test([each for each in trials if not each.is_done()], args.workers, cuda=args.cuda)
     rows = [row for each in trials if (row := load(each.result)) is not None]
     report = {"machine": describe_machine(), "trials": rows}

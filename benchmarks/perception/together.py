@@ -95,7 +95,7 @@ def _fine(pictures: Tensor, regime: Regime, device: torch.device) -> Tensor:
     assert isinstance(encoder.backbone, StreetTrunk)
     parts: list[Tensor] = []
     for some in pictures.split(_AT_ONCE):
-        normal = (some.to(device).flatten(0, 1).float() / 255 - encoder.mean) / encoder.spread
+        normal = encoder.normalised(some.to(device).float() / 255)
         with torch.autocast(device.type, torch.bfloat16, enabled=regime.training.low_precision):
             parts.append(encoder.backbone.fine(normal).unflatten(0, some.shape[:2]))
     return torch.cat(parts)

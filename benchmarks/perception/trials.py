@@ -1,9 +1,7 @@
 """Trainings of the experiment and their tests, each kept once it is done."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,9 @@ from common.keep import is_current, save
 from common.twin import TWIN
 from common.workers import Task, work_off
 from dreamdrive.device import CPU
-from dreamdrive.perception import MANIFEST, QUICK, BevSet, CrossViewTransformer, Regime, Samples, score
+from dreamdrive.perception import QUICK, BevSet, CrossViewTransformer, Regime, Samples, score
 from dreamdrive.run import digest
-from perception.protocol import Places, Protocol, read_protocol
+from perception.protocol import Places, Protocol
 from perception.together import Held, Student, held, train_together
 
 
@@ -27,13 +25,13 @@ class Trial:
         arm: What it learns from.
         seed: Of its first weights and the order of its samples.
         runs: Folder of the experiment.
-        path: File of the protocol.
+        protocol: The experiment.
     """
 
     arm: str
     seed: int
     runs: Path
-    path: Path
+    protocol: Protocol
 
     @property
     def name(self) -> str:
@@ -51,11 +49,6 @@ class Trial:
     def result(self) -> Path:
         """Where its counts are kept."""
         return self.runs / "trials" / f"{self.name}.json"
-
-    @cached_property
-    def protocol(self) -> Protocol:
-        """The experiment."""
-        return read_protocol(self.path)
 
     @property
     def sets(self) -> list[BevSet]:
@@ -77,9 +70,8 @@ class Trial:
     def key(self) -> str:
         """Of everything its counts follow from."""
         names = [*self.protocol.arms[self.arm], *self.tests]
-        manifests = {name: (Places(self.runs).set(name) / MANIFEST).read_bytes() for name in set(names)}
-        sets = {name: hashlib.sha256(manifest).hexdigest() for name, manifest in manifests.items()}
-        return digest([asdict(replace(self.regime, trunk=None)), names, sets])
+        sets = {name: BevSet.open(Places(self.runs).set(name)).digest() for name in set(names)}
+        return digest([replace(self.regime, trunk=None), Path(TWIN), names, sets])
 
     def is_done(self) -> bool:
         """Whether its counts are there and still follow."""

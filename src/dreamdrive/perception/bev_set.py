@@ -6,6 +6,7 @@
 - ``labels/ID.npz``: the auxiliary maps, of cells that have any.
 """
 
+import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -111,6 +112,10 @@ class BevSet:
 
     def __len__(self) -> int:
         return len(self.notes)
+
+    def digest(self) -> str:
+        """SHA-256 of the manifest, which tells sets apart."""
+        return hashlib.sha256((self.folder / MANIFEST).read_bytes()).hexdigest()
 
     def __getitem__(self, index: int) -> BevSample:
         """A sample with its pictures and labels."""

@@ -73,8 +73,11 @@ class Encoder(nn.Module):
 
     def features(self, pictures: Float[Tensor, "b n 3 h w"]) -> list[Float[Tensor, "b n _ _ _"]]:
         """Maps of features of pictures in [0, 1]."""
-        maps = self.backbone((pictures.flatten(0, 1) - self.mean) / self.spread)
-        return [each.unflatten(0, pictures.shape[:2]) for each in maps]
+        return [each.unflatten(0, pictures.shape[:2]) for each in self.backbone(self.normalised(pictures))]
+
+    def normalised(self, pictures: Float[Tensor, "b n 3 h w"]) -> Float[Tensor, "bn 3 h w"]:
+        """Pictures in [0, 1] as a backbone takes them, those of all samples in a row."""
+        return (pictures.flatten(0, 1) - self.mean) / self.spread
 
     def forward(
         self,
@@ -134,13 +137,6 @@ class CrossViewTransformer(nn.Module):
         Returns:
             Logits in float32.
         """
-        features = self.features(pictures)
-        return self.answer(features, torch.linalg.inv(pixel_from_camera), torch.linalg.inv(camera_from_ego))
-
-    def features(
-        self, pictures: Float[Tensor, "b n 3 h w"] | UInt8[Tensor, "b n 3 h w"]
-    ) -> list[Float[Tensor, "b n _ _ _"]]:
-        """What the backbone sees in pictures, the first part of ``forward``."""
         image = self.options.image
         if pictures.shape[-2:] != (image.height_px, image.width_px):
             raise ValueError(
@@ -148,7 +144,8 @@ class CrossViewTransformer(nn.Module):
             )
         if not pictures.is_floating_point():
             pictures = pictures.float() / 255
-        return self.encoder.features(pictures)
+        features = self.encoder.features(pictures)
+        return self.answer(features, torch.linalg.inv(pixel_from_camera), torch.linalg.inv(camera_from_ego))
 
     def answer(
         self,
@@ -156,7 +153,7 @@ class CrossViewTransformer(nn.Module):
         camera_from_pixel: Float[Tensor, "b n 3 3"],
         ego_from_camera: Float[Tensor, "b n 4 4"],
     ) -> BevPrediction:
-        """Segment the street, the other part: out of features, with matrices that are inverted already.
+        """Segment the street out of features of the encoder, with matrices that are inverted already.
 
         Nothing here waits for a device.
         """

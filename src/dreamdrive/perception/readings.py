@@ -5,7 +5,6 @@
 - ``synthetic-train``: generated samples alone, tested on real ones.
 """
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ import torch
 from dreamdrive.device import CPU
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge import SHIPPED
-from dreamdrive.perception.bev_set import MANIFEST, BevSet
+from dreamdrive.perception.bev_set import BevSet
 from dreamdrive.perception.network import CrossViewTransformer
 from dreamdrive.perception.options import CvtOptions
 from dreamdrive.perception.sampling import Samples, shuffled
@@ -116,7 +115,7 @@ def train_on(
         shuffled(samples, regime.batch, regime.training.seed),
         folder,
         regime.training,
-        data={str(k): _digest(each) for k, each in enumerate(sets)},
+        data={str(k): each.digest() for k, each in enumerate(sets)},
         device=device,
         stop=stop,
         progress=lambda done, total: progress(f"train {folder.name}", done, total),
@@ -149,10 +148,6 @@ def _check_size(samples: BevSet, network: CvtOptions) -> None:
             f"{samples.folder} has {got}, and the network takes {wanted}; make the set with other --size and "
             "--cells, or choose another --network"
         )
-
-
-def _digest(samples: BevSet) -> str:
-    return hashlib.sha256((samples.folder / MANIFEST).read_bytes()).hexdigest()
 
 
 def _start(network: CrossViewTransformer, trunk: str | None) -> None:

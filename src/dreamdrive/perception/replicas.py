@@ -112,7 +112,7 @@ def _sum(gradients: tuple[Tensor | None, ...]) -> Tensor | None:
 
 
 def _laid_out(gradient: Tensor | None, like: Tensor) -> Tensor | None:
-    """In memory as its weights are, which the fused optimiser of a GPU asks for."""
+    """In memory as its weights are: the fused optimiser mixes up others on a CPU, and a GPU refuses them."""
     if gradient is None or gradient.stride() == like.stride():
         return gradient
     return torch.empty_like(like).copy_(gradient)

@@ -38,12 +38,11 @@ def score(
     found: dict[str, Counts] = defaultdict(dict)
     done = 0
     for scene, group in groupby(range(len(samples)), samples.scene):
-        rows = list(group)
+        rows, drive = list(group), found[scene]
         for first in range(0, len(rows), at_once):
             some = rows[first : first + at_once]
             batch = as_batch([samples[index] for index in some]).to(device)
             said = network(batch.pictures, batch.pixel_from_camera, batch.camera_from_ego)
-            drive = found[scene]
             for name, counts in bev_counts(said, batch.truth).items():
                 drive[name] = drive[name] + counts if name in drive else counts
             done += len(some)
