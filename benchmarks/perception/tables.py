@@ -9,6 +9,7 @@ from common.markdown import table
 from perception.protocol import Protocol
 
 CLASSES = ("vehicle", "road")
+_PAIRS = (("real", "generated"), ("real", "warped"), ("warped", "generated"), ("oracle", "only"))
 _RESAMPLES = 2000
 Counts = np.ndarray
 """Hits, false alarms and misses (seeds, streets, 3)."""
@@ -56,9 +57,10 @@ def tables(rows: Sequence[Mapping[str, Any]], protocol: Protocol) -> str:
         samples = next((str(row["samples"]) for row in rows if row["arm"] == arm), "-")
         lines.append([arm, samples, *(f"{iou(c):.2f}" if c.size else "-" for c in counts.values())])
     text = table(["arm", "samples", "vehicle IoU", "road IoU"], lines)
-    pairs = (("real", "generated"), ("real", "warped"), ("warped", "generated"), ("oracle", "only"))
     changed: list[list[str]] = []
-    for one, other in pairs:
+    for one, other in _PAIRS:
+        if not {one, other} <= protocol.arms.keys():
+            continue
         row = [f"{other} over {one}"]
         for what in CLASSES:
             first, second = (counts_of(rows, arm, "validation", what) for arm in (one, other))
