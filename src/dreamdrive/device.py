@@ -26,6 +26,14 @@ def why_no_cuda() -> str | None:
     return None
 
 
+def has_bfloat16(device: torch.device) -> bool:
+    """Whether a device computes in bfloat16 itself; others only act as if, slowly."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    can = getattr(torch.cpu, "get_capabilities", dict)()  # torch before 2.10 does not tell
+    return any(can.get(name, False) for name in ("amx_bf16", "avx512_bf16", "bf16"))
+
+
 def chosen_device() -> torch.device:
     """Where networks run: what ``computing_on`` says, the CPU outside of it."""
     return _chosen

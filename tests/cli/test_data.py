@@ -135,6 +135,25 @@ def test_samples_are_made_of_drives_and_of_scenes(
     assert "has pictures of 64x32 and 16 cells, and the network takes pictures of 480x224" in refused.err
 
 
+@pytest.mark.slow
+def test_a_network_is_trained_on_samples_and_tested(run: Run, tmp_path: Path) -> None:
+    world, written, real = tmp_path / "world", tmp_path / "street", tmp_path / "real"
+    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x54", "--one-ray", "-o", world)
+    run("export", world, "--to", "nuscenes", "-o", written)
+    run("dataset", "make", written, "--size", "208x96", "--cells", 104, "-o", real)
+    sets = ("--real", real, "--synthetic", real, "--validation", real)
+    asked = ("evaluate", "perception", "--mode", "synthetic-train", *sets, "--network", "quick")
+    quick = (*asked, "--trunk", "street", "--steps", 1, "--batch", 2, "--alpha", 0.75, "-o", tmp_path / "n")
+    result = run(*quick, "--json", tmp_path / "said.json")
+    assert result.code == 0, result
+    said = json.loads((tmp_path / "said.json").read_text())
+    assert [each["trained_on"] for each in said["trials"]] == ["real", "synthetic"]
+    assert said["trials"][0]["iou"] == said["trials"][1]["iou"]  # the same samples, the same seed
+    training = said["regime"]["training"]
+    assert (training["frozen_layers"], training["losses"]["alpha"]) == (2, 0.75)
+    assert "--alpha 1: expected a number between 0 and 1" in run(*asked, "--alpha", 1, "-o", tmp_path).err
+
+
 def test_samples_are_made_of_scenes_that_a_prior_drew(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
