@@ -74,7 +74,7 @@ def _held_out(what: str, cameras: list[str], asked: Control, args: Any) -> list[
         mine = [key for key in report["held_out"] if _camera_of(key) == ending]
         scene = [report["held_out"][key] for key in mine]
         guesses = {
-            guess: float(np.mean([each[key]["psnr"] for key in mine]))
+            guess: float(np.mean([each["frames"][key]["psnr"] for key in mine]))
             for guess, each in report["baselines"].items()
         }
         best = max(guesses, key=lambda guess: guesses[guess])

@@ -16,11 +16,11 @@ from dreamdrive.motion import REPRESENTATIONS, Tracks
 from dreamdrive.options import QUALITIES
 from dreamdrive.splat import BACKENDS, reference
 
-STEPS = 50
+STEPS = 25
 # Of the loss, relative: Adam makes a whole step of a gradient that is nothing but rounding, as at nodes of a
 # hexplane that hardly count. Once something was split, one Gaussian on the edge of that may tell it apart.
 BEFORE, AFTER = {"hexplane": 2e-3}, 2e-2
-FIRST_SPLIT = 20
+FIRST_SPLIT = 10
 GROWING = DensifySettings(start=0.3, stop=1.0, every=FIRST_SPLIT, gradient=1e-4)
 
 
