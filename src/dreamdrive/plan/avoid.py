@@ -8,7 +8,7 @@ and then finer ones around the best.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,12 @@ _LONGER_M = 30.0
 _STANDING_M = 1e-3
 _SWERVE_S, _SWERVE_LEAST_M = 2.0, 8.0
 """A swerve takes as long as the car drives in this time, and at least so far."""
-_FAR_M, _FORBIDDEN = 10.0, 1e9
+_FAR_M = 10.0
 _LOOK_M = 1.0
+
+
+_Cells = Float[np.ndarray, "3 _"]
+"""Middles of cells as x, y and 1, to be multiplied with lines."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,10 @@ class _Drives:
     driven_m: Float[np.ndarray, "k s"]
     feasible: Bool[np.ndarray, " k"]
 
+    def feasible_ones(self) -> "_Drives":
+        """Without what a car cannot do."""
+        return _Drives(*(getattr(self, each.name)[self.feasible] for each in fields(self)))
+
 
 def avoid(
     plan: Plan,
@@ -110,9 +118,9 @@ def avoid(
             f"obstacles at {len(obstacles_m)} times for {len(plan)} waypoints; expected a multiple"
         )
     path = _Path.of(plan, every, speed_m_s)
-    near = [_near(cells, path, options) for cells in obstacles_m]
+    near, taken = _near(obstacles_m, path, options), [_cells(each) for each in obstacles_m]
     planned = path.drives(np.zeros(1), np.zeros(1), options)
-    before_m = float(_clearance(planned, obstacles_m, options.footprint).min())
+    before_m = float(_clearance(planned, taken, options.footprint).min())
     if (_clearance(planned, near, options.footprint, _longer(planned, path, options)) >= 0).all():
         return Avoided(plan, False, before_m, before_m)
     changes = np.linspace(-options.most_braking_m_s2, options.most_gain_m_s2, 13)
@@ -127,7 +135,7 @@ def avoid(
         change, aside = _best(path, planned, *tried, near, options)
     drive = path.drives(np.array([change]), np.array([aside]), options)
     waypoints_m = drive.places_m[0, every - 1 :: every]
-    after_m = float(_clearance(drive, obstacles_m, options.footprint).min())
+    after_m = float(_clearance(drive, taken, options.footprint).min())
     return Avoided(replace(plan, waypoints_m=waypoints_m), True, before_m, after_m)
 
 
@@ -159,7 +167,8 @@ def clearance(
     """Least signed distance of the car from cells that are taken, see ``avoid``; at most 10 m."""
     options = AvoidOptions(footprint=footprint)
     path = _Path.of(plan, len(obstacles_m) // len(plan), speed_m_s)
-    return float(_clearance(path.drives(np.zeros(1), np.zeros(1), options), obstacles_m, footprint).min())
+    taken = [_cells(each) for each in obstacles_m]
+    return float(_clearance(path.drives(np.zeros(1), np.zeros(1), options), taken, footprint).min())
 
 
 @dataclass(frozen=True)
@@ -168,8 +177,9 @@ class _Path:
 
     along_m: Float[np.ndarray, " n"]
     places_m: Float[np.ndarray, "n 2"]
+    tangents: Float[np.ndarray, "n 2"]
     fine_s: Float[np.ndarray, " f"]
-    planned_m: Float[np.ndarray, " f"]
+    planned_m_s: Float[np.ndarray, " f"]
     every: int
     swerve_m: float
 
@@ -190,11 +200,13 @@ class _Path:
         along_m, places = planned_m[moves], places[moves]
         ahead = np.array([0.0, 1.0]) if len(places) < 2 else places[-1] - places[-2]
         beyond = places[-1] + _LONGER_M * ahead / np.linalg.norm(ahead)
+        along_m, places = np.append(along_m, along_m[-1] + _LONGER_M), np.vstack([places, beyond])
         return _Path(
-            np.append(along_m, along_m[-1] + _LONGER_M),
-            np.vstack([places, beyond]),
+            along_m,
+            places,
+            np.gradient(places, along_m, axis=0),
             fine_s,
-            planned_m,
+            np.gradient(planned_m, float(fine_s[1])),
             every,
             max(_SWERVE_S * speed_m_s, _SWERVE_LEAST_M),
         )
@@ -207,8 +219,7 @@ class _Path:
     ) -> _Drives:
         """Drives along it with other accelerations and beside it."""
         step_s = float(self.fine_s[1])
-        planned_m_s = np.gradient(self.planned_m, step_s)
-        speed_m_s = np.maximum(planned_m_s + change_m_s2[:, None] * self.fine_s, 0.0)
+        speed_m_s = np.maximum(self.planned_m_s + change_m_s2[:, None] * self.fine_s, 0.0)
         driven_m = (
             np.concatenate(
                 [
@@ -219,10 +230,9 @@ class _Path:
             )
             * step_s
         )
-        tangents = np.gradient(self.places_m, self.along_m, axis=0)
         places, ahead = (
             np.stack([np.interp(driven_m, self.along_m, column) for column in rows.T], axis=-1)
-            for rows in (self.places_m, tangents)
+            for rows in (self.places_m, self.tangents)
         )
         ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
         right = np.stack([ahead[..., 1], -ahead[..., 0]], axis=-1)
@@ -259,12 +269,14 @@ def _best(
     planned: _Drives,
     changes_m_s2: Float[np.ndarray, " a"],
     asides_m: Float[np.ndarray, " b"],
-    near: Sequence[Float[np.ndarray, "_ 2"]],
+    near: Sequence[_Cells],
     options: AvoidOptions,
 ) -> tuple[float, float]:
     """The change of acceleration and the way aside that cost least, of all pairs."""
     pairs = np.stack(np.meshgrid(changes_m_s2, asides_m, indexing="ij"), axis=-1).reshape(-1, 2)
     drives = path.drives(pairs[:, 0], pairs[:, 1], options)
+    if drives.feasible.any():
+        pairs, drives = pairs[drives.feasible], drives.feasible_ones()
     moved_m = drives.places_m - planned.places_m
     right = np.stack([planned.ahead[..., 1], -planned.ahead[..., 0]], axis=-1)
     along, aside = (moved_m * planned.ahead).sum(-1), (moved_m * right).sum(-1)
@@ -273,7 +285,6 @@ def _best(
     cost = (along**2 + options.aside_weight * aside**2).sum(1)
     cost += (options.clear_weight * short_m**2 + options.hit_cost * (clear_m < 0)).sum(1)
     cost += options.comfort_weight * clear_m.shape[1] * pairs[:, 0] ** 2
-    cost[~drives.feasible] += _FORBIDDEN
     row = int(cost.argmin())
     return float(pairs[row, 0]), float(pairs[row, 1])
 
@@ -286,20 +297,31 @@ def _longer(drives: _Drives, path: _Path, options: AvoidOptions) -> Float[np.nda
     return np.minimum(options.unsure_ahead_m_s * path.fine_s[path.every :: path.every], drives.driven_m)
 
 
-def _near(cells_m: Float[np.ndarray, "n 2"], path: _Path, options: AvoidOptions) -> Float[np.ndarray, "k 2"]:
-    """Cells that any drive could come near to."""
-    if not len(cells_m):
-        return cells_m
-    end_m = path.along_m[-1] - _LONGER_M + options.most_gain_m_s2 * path.fine_s[-1] ** 2 / 2
-    stations = np.arange(0.0, end_m + _LOOK_M, _LOOK_M)
+def _near(
+    obstacles_m: Sequence[Float[np.ndarray, "_ 2"]], path: _Path, options: AvoidOptions
+) -> list[_Cells]:
+    """Cells that any drive could come near to by the time at which they are taken."""
+    extremes = np.array([-options.most_braking_m_s2, options.most_gain_m_s2])
+    drives = path.drives(extremes, np.zeros(2), options)
+    first_m, last_m = drives.driven_m - options.near_m
+    last_m = last_m + 2 * options.near_m + _longer(drives, path, options)[1]
+    stations = np.arange(0.0, drives.driven_m[1, -1] + _LOOK_M, _LOOK_M)
     line = np.stack([np.interp(stations, path.along_m, column) for column in path.places_m.T], axis=-1)
-    away, _ = KDTree(line).query(cells_m, distance_upper_bound=options.near_m)
-    return cells_m[np.isfinite(away)]
+    lowest, highest = line.min(axis=0) - options.near_m, line.max(axis=0) + options.near_m
+    cells = np.concatenate(obstacles_m)
+    when = np.repeat(np.arange(len(obstacles_m)), [len(each) for each in obstacles_m])
+    beside = ((cells >= lowest) & (cells <= highest)).all(axis=1)
+    cells, when = cells[beside], when[beside]
+    away, station = KDTree(line).query(cells, distance_upper_bound=options.near_m)
+    at_m = station * _LOOK_M  # beyond the last one for cells that are far away
+    near = np.isfinite(away) & (at_m >= first_m[when]) & (at_m <= last_m[when])
+    parts = np.searchsorted(when[near], np.arange(1, len(obstacles_m)))
+    return np.split(_cells(cells[near]), parts, axis=1)
 
 
 def _clearance(
     drives: _Drives,
-    near: Sequence[Float[np.ndarray, "_ 2"]],
+    obstacles: Sequence[_Cells],
     car: Footprint,
     longer_m: Float[np.ndarray, "k s"] | None = None,
 ) -> Float[np.ndarray, "k s"]:
@@ -307,19 +329,38 @@ def _clearance(
 
     ``longer_m`` is what the car has ahead of it at each time.
     """
+    count = len(drives.places_m)
     found = np.full(drives.places_m.shape[:2], _FAR_M)
-    for step, cells in enumerate(near):
-        if not len(cells):
+    lines, half_m = _rectangles(drives, car, np.zeros_like(found) if longer_m is None else longer_m)
+    for step, cells in enumerate(obstacles):
+        if not cells.shape[1]:
             continue
-        place, ahead = drives.places_m[:, step], drives.ahead[:, step]
-        right = np.column_stack([ahead[:, 1], -ahead[:, 0]])
-        # Products of matrices, as this is where all time goes.
-        along = ahead @ cells.T - ((place * ahead).sum(-1) + car.ahead_m)[:, None]
-        aside = right @ cells.T - (place * right).sum(-1)[:, None]
-        ahead_m = 0.0 if longer_m is None else longer_m[:, step, None]
-        along = np.maximum(along - ahead_m, -along) - car.length_m / 2
-        aside = np.abs(aside) - car.width_m / 2
-        inner = np.maximum(along, aside).min(axis=1)
-        outer = np.sqrt((np.maximum(along, 0) ** 2 + np.maximum(aside, 0) ** 2).min(axis=1))
-        found[:, step] = np.minimum(np.where(inner < 0, inner, outer) - CELL_M / 2, _FAR_M)
+        # This is where all time goes: one product of matrices and few passes, in half the bytes.
+        beyond = lines[step] @ cells
+        np.subtract(np.abs(beyond, out=beyond), half_m[step], out=beyond)
+        along, aside = beyond[:count], beyond[count:]
+        inside = np.maximum(along, aside).min(axis=1)
+        np.square(np.maximum(beyond, 0, out=beyond), out=beyond)
+        outside = np.sqrt(np.add(along, aside, out=along).min(axis=1))
+        found[:, step] = np.minimum(np.where(inside < 0, inside, outside) - CELL_M / 2, _FAR_M)
     return found
+
+
+def _rectangles(
+    drives: _Drives, car: Footprint, longer_m: Float[np.ndarray, "k s"]
+) -> tuple[Float[np.ndarray, "s 2*k 3"], Float[np.ndarray, "s 2*k 1"]]:
+    """Middle lines of cars, across and along, by coefficients of x, y and 1, and half the extent beside."""
+    right = np.stack([drives.ahead[..., 1], -drives.ahead[..., 0]], axis=-1)
+    axes = np.concatenate([drives.ahead, right])
+    middle_m = (np.concatenate([drives.places_m, drives.places_m]) * axes).sum(-1)
+    middle_m[: len(right)] += car.ahead_m + longer_m / 2
+    half_m = np.concatenate([(car.length_m + longer_m) / 2, np.full_like(longer_m, car.width_m / 2)])
+    lines = np.concatenate([axes, -middle_m[..., None]], axis=-1)
+    return (
+        np.ascontiguousarray(lines.swapaxes(0, 1), np.float32),
+        np.ascontiguousarray(half_m.T[..., None], np.float32),
+    )
+
+
+def _cells(taken_m: Float[np.ndarray, "n 2"]) -> _Cells:
+    return np.vstack([taken_m.T, np.ones(len(taken_m))]).astype(np.float32)
