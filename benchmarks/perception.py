@@ -25,7 +25,7 @@ from dreamdrive.perception import QUICK
 from perception.making import make_scene, make_sets, make_street
 from perception.picture import picture
 from perception.protocol import PROTOCOL, Places, read_protocol
-from perception.tables import tables
+from perception.tables import published, tables
 from perception.trials import Trial, train_and_test
 
 _SHOWN = 11
@@ -59,7 +59,7 @@ def main(doc: str | None) -> int:
     trials = [Trial(arm, seed, args.runs, protocol) for seed in protocol.seeds for arm in protocol.arms]
     failed = train_and_test([each for each in trials if not each.is_done()], args.workers, cuda=args.cuda)
     rows = [row for each in trials if (row := load(each.result)) is not None]
-    report = {"machine": describe_machine(), "trials": rows}
+    report = {"machine": describe_machine(), "trials": [published(row) for row in rows]}
     return publish(args, report, tables(rows, protocol), failed)
 
 

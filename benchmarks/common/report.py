@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,8 +17,9 @@ def write(path: Path | None, text: str) -> None:
 
 
 def as_json(report: dict[str, Any]) -> str:
-    """JSON with six digits of every number: more is noise, and makes the file long."""
-    return json.dumps(rounded(report), indent=1) + "\n"
+    """JSON with six digits of every number, as more is noise, and each list of numbers on one line."""
+    text = json.dumps(rounded(report), indent=1) + "\n"
+    return re.sub(r"\[[^][{}\"]*\]", lambda numbers: " ".join(numbers[0].split()), text)
 
 
 def rounded(value: Any) -> Any:

@@ -31,6 +31,17 @@ def _at_one_half(counts: Mapping[str, Sequence[float]]) -> list[float]:
     return [counts[name][at] for name in ("hits", "false_alarms", "misses")]
 
 
+def published(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a row what its figures follow from: hits, false alarms and misses of each street."""
+    kept: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, Mapping):
+            kept[name] = {s: {what: _at_one_half(of[what]) for what in CLASSES} for s, of in value.items()}
+        elif name != "key":
+            kept[name] = value
+    return kept
+
+
 def iou(counts: Counts) -> float:
     """Mean over seeds of intersection over union of all streets together, in percent."""
     pooled = counts.sum(axis=1)

@@ -6,12 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from common.report import publish, rounded
+from common.report import as_json, publish, rounded
 
 
 def test_numbers_keep_six_digits() -> None:
     found = rounded({"a": [1 / 3, 2, None, True, "x"], "b": 123456789.0})
     assert found == {"a": [0.333333, 2, None, True, "x"], "b": 123457000.0}
+
+
+def test_numbers_of_a_list_share_a_line() -> None:
+    report = {"rows": [{"found": [1, 2.5]}], "names": ["a [1,\n 2]"]}
+    assert '"found": [ 1, 2.5 ]' in as_json(report)
+    assert json.loads(as_json(report)) == report
 
 
 def test_a_report_is_printed_and_written_and_failures_are_named(
