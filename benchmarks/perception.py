@@ -10,7 +10,7 @@ paths. Arms: all training streets as recorded (oracle), few of them (real), thes
 (generated), with as many pictures that were warped without a scene (warped), and rendered samples of all
 streets alone (only). All networks are tested on streets that nothing was made of. Everything is kept and
 goes on where it was stopped. Networks are trained on a core each, ``--workers`` at a time, or with ``--cuda``
-those of one seed together on a GPU.
+eight together on a GPU.
 """
 
 import sys

@@ -16,6 +16,9 @@ from dreamdrive.run import digest
 from perception.protocol import Places, Protocol
 from perception.together import Held, Student, held, train_together
 
+_SIDE_BY_SIDE = 8
+"""Networks on a GPU: a step of one takes 6 ms then, 10 alone, and 8 of 25."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -87,8 +90,8 @@ def train_and_test(trials: Sequence[Trial], workers: int, *, cuda: bool) -> list
         return [each.name for each in work_off(trials, _on_a_core, workers)]
     device = torch.device("cuda")
     samples = {each.arm: held(each.sets, each.regime, device) for each in {t.arm: t for t in trials}.values()}
-    for seed in sorted({each.seed for each in trials}):
-        _train([each for each in trials if each.seed == seed], samples)
+    for first in range(0, len(trials), _SIDE_BY_SIDE):
+        _train(trials[first : first + _SIDE_BY_SIDE], samples)
     return []
 
 
