@@ -74,6 +74,7 @@ def test_a_unit_that_is_the_metre_is_kept(drive, clip: Clip):
     assert any("m above the road" in note for note in found.detected)
 
 
+@pytest.mark.slow
 def test_a_random_network_gives_a_geometry_that_says_what_it_is_worth(clip: Clip, weights: Path):
     told: list[tuple[int, int]] = []
     found = reconstruct(
