@@ -104,9 +104,12 @@ def _left_out(name: str, others: list[str], asked: Control, args: Any) -> dict[s
         view = render_scene(scene, camera, float(times_s[frame]))
         colour, covered = view.colour.numpy(), view.alpha.numpy() > 0.5
         here = clip.valid[frame]
-        seen, all_of_it = (likeness(colour, clip.frames[frame], mask) for mask in (here & covered, here))
-        found.append((seen.psnr, float(covered[here].mean()), all_of_it.psnr))
-    psnr, share, whole = np.mean(found, axis=0).tolist()
+        seen, all_of_it = (
+            likeness(colour, clip.frames[frame], mask).psnr if mask.any() else np.nan
+            for mask in (here & covered, here)
+        )
+        found.append((seen, float(covered[here].mean()), all_of_it))
+    psnr, share, whole = np.nanmean(found, axis=0).tolist()  # at times nothing is covered
     return {"camera": name, "frames": len(found), "psnr": psnr, "covered": share, "psnr_all": whole}
 
 
