@@ -78,7 +78,7 @@ def test_areas_are_polygons_that_a_layout_file_takes(kind: StreetKind, tmp_path)
 
 
 def test_streets_are_of_many_kinds() -> None:
-    layouts = [street(seed) for seed in range(TRAINING, TRAINING + 40)]
+    layouts = [street(seed) for seed in range(TRAINING, TRAINING + 60)]
     kinds = Counter(box.kind for layout in layouts for box in layout.boxes)
     assert set(kinds) == {"car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"}
     props = Counter(prop.kind for layout in layouts for prop in layout.props)
@@ -98,7 +98,7 @@ def test_streets_are_of_many_kinds() -> None:
     assert all(
         any(getattr(light, name) > 0 for light in lights) for name in ("night", "rain", "snow", "glare")
     )
-    assert sum(max(light.night, light.rain, light.snow) == 0 for light in lights) > 20
+    assert sum(max(light.night, light.rain, light.snow) == 0 for light in lights) > 30
     # Where traffic keeps to the left, the recording car is left of the middle of the road.
     assert any(layout.ego.track[0].y_m > 1 for layout in layouts)
 
@@ -120,7 +120,7 @@ def test_as_many_boxes_as_asked_for() -> None:
 
 def test_a_queue_fills_most_of_the_picture_and_moves() -> None:
     shares = []
-    for seed in (1000, 1001):
+    for seed in (1000, 1001, 1002, 1003):
         layout = draw_street(seed, StreetOptions(1.2, edition=2, traffic="queue"))
         seen = drive(layout, 3, fps=2.5, size=(96, 56), antialiased=False)
         shares.append(seen.moving.mean())
