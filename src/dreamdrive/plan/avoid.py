@@ -105,6 +105,8 @@ def avoid(
 ) -> Avoided:
     """The best drive near a planned one; the same one where it touches nothing, even with a car longer ahead.
 
+    A planned drive that touches nothing is moved for room ahead alone, and never into what is in the way.
+
     Args:
         plan: What is planned.
         speed_m_s: Of the car now.
@@ -136,6 +138,8 @@ def avoid(
     drive = path.drives(np.array([change]), np.array([aside]), options)
     waypoints_m = drive.places_m[0, every - 1 :: every]
     after_m = float(_clearance(drive, taken, options.footprint).min())
+    if after_m < 0 <= before_m:
+        return Avoided(plan, False, before_m, before_m)
     return Avoided(replace(plan, waypoints_m=waypoints_m), True, before_m, after_m)
 
 
