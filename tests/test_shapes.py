@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import torch
-from jaxtyping import TypeCheckError
+from jaxtyping import Float, TypeCheckError, jaxtyped
 
 from dreamdrive.run.held_out import likeness
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.trajectory import Trajectory
+from tests import checked
 
 
 def test_a_dataclass_refuses_a_wrong_shape() -> None:
@@ -37,6 +38,16 @@ def test_a_function_refuses_shapes_that_disagree() -> None:
 def test_a_function_refuses_a_wrong_dtype() -> None:
     with pytest.raises(TypeCheckError, match="frame"):
         likeness(np.zeros((4, 6, 3)), np.zeros((4, 6, 3), np.float32), np.ones((4, 6), bool))
+
+
+def test_a_result_is_refused_whose_shape_disagrees_with_the_parameters() -> None:
+    @jaxtyped(typechecker=checked)
+    def without_last(values: Float[np.ndarray, " n"], *, count: int = 1) -> Float[np.ndarray, " n"]:
+        return values[:-count]
+
+    with pytest.raises(TypeCheckError, match="return value"):
+        without_last(np.zeros(3), count=1)
+    assert len(without_last(np.zeros(3), count=-3)) == 3
 
 
 def test_good_shapes_pass() -> None:

@@ -6,15 +6,17 @@ captured once as a CUDA graph, which also chooses its samples and its rate, and 
 run side by side, each in a stream of its own.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from itertools import accumulate, islice
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
+from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.perception import (
     BevSet,
     CrossViewTransformer,
@@ -33,6 +35,7 @@ _WARM_UP = 3
 """Steps before a capture, in which libraries choose their kernels."""
 _AT_ONCE = 16
 """Samples whose features are found at once."""
+_SAID_EACH = 100
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,33 @@ class Student:
             for value in state.values():
                 value.zero_()
 
+    def save(self, folder: Path, data: Mapping[str, str]) -> None:
+        """Write a checkpoint; ``data`` tells trainings apart."""
+        folder.mkdir(parents=True, exist_ok=True)
+        networks = self.network, nn.Module()  # no average is kept beside the network
+        save_checkpoint(folder, int(self._done), 0.0, networks, self._optimiser, self._options, data)
+
+    def go_on(self, folder: Path, data: Mapping[str, str]) -> None:
+        """Go back to the checkpoint of a folder, if there is one."""
+        networks = self.network, nn.Module()
+        done, _ = load_checkpoint(folder, networks, self._optimiser, self._options, data)
+        for group in self._optimiser.param_groups:
+            group["lr"] = self._rate  # the optimiser took a copy
+        self._done.fill_(done)
+
+    def learn(self) -> Iterator[int]:
+        """Take all steps that are left; says the steps done."""
+        for step in range(int(self._done), len(self.losses)):
+            self.step()
+            if (step + 1) % _SAID_EACH == 0:
+                yield step + 1
+        self.check()
+
+    def check(self) -> None:
+        """Raise an error where a loss was not finite."""
+        if not torch.isfinite(self.losses).all():
+            raise ArithmeticError("a loss is not finite")
+
     def capture(self) -> "Captured":
         """The step as a graph of a stream of its own."""
         stream, first = torch.cuda.Stream(), {k: v.clone() for k, v in self.network.state_dict().items()}
@@ -184,19 +214,11 @@ class Captured:
 
 
 def train_together(students: Sequence[Student]) -> Iterator[int]:
-    """Train all of them on their GPU, or one after another on cores; says the steps done."""
-    if students[0].losses.is_cuda:
-        torch.backends.cudnn.benchmark = True
-        yield from _replayed([each.capture() for each in students])
-    else:
-        for each in students:
-            for step in range(len(each.losses)):
-                each.step()
-                if step % 100 == 99:
-                    yield step + 1
+    """Train all of them on their GPU; says the steps done."""
+    torch.backends.cudnn.benchmark = True
+    yield from _replayed([each.capture() for each in students])
     for each in students:
-        if not torch.isfinite(each.losses).all():
-            raise ArithmeticError("a loss is not finite")
+        each.check()
 
 
 def _replayed(captured: Sequence["Captured"]) -> Iterator[int]:
@@ -205,7 +227,7 @@ def _replayed(captured: Sequence["Captured"]) -> Iterator[int]:
             if step < each.steps:
                 with torch.cuda.stream(each.stream):
                     each.graph.replay()
-        if step % 100 == 99:
+        if (step + 1) % _SAID_EACH == 0:
             torch.cuda.synchronize()
             yield step + 1
     torch.cuda.synchronize()

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import torch
@@ -96,8 +97,16 @@ def train_and_test(trials: Sequence[Trial], workers: int, *, cuda: bool) -> list
 
 
 def _on_a_core(task: Task) -> None:
+    """Train and test one; it goes on where it was stopped."""
     assert isinstance(task, Trial)
-    _train([task], {task.arm: held(task.sets, task.regime, CPU)})
+    student = Student(held(task.sets, task.regime, CPU), task.regime)
+    kept, data = task.result.with_suffix(""), {"trial": task.key}
+    student.go_on(kept, data)
+    for done in student.learn():
+        print(f"{task.name}: {done} of {len(student.losses)} steps", flush=True)
+        student.save(kept, data)
+    save(task.result, task.key, _counts(task, student.network))
+    rmtree(kept, ignore_errors=True)
 
 
 def _train(trials: Sequence[Trial], samples: Mapping[str, Held]) -> None:

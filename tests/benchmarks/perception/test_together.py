@@ -54,6 +54,24 @@ def test_a_student_learns_as_a_training_does(bev_set, tmp_path, frozen_layers):
     torch.testing.assert_close(student.losses, torch.tensor(wanted), rtol=2e-3, atol=1e-5)
 
 
+def test_a_stopped_student_goes_on_as_if_it_had_not_been(bev_set, tmp_path):
+    asked, data = replace(regime(2), trunk=SHIPPED), {"trial": "one"}
+    samples = held([bev_set], asked, torch.device("cpu"))
+    whole, first, second = (Student(samples, asked) for _ in range(3))
+    assert list(whole.learn()) == []  # too few steps to tell of
+    second.go_on(tmp_path, data)  # nothing is there yet
+    for _ in range(2):
+        first.step()
+    first.save(tmp_path, data)
+    second.go_on(tmp_path, data)
+    list(second.learn())
+    assert torch.equal(second.losses[2:], whole.losses[2:])
+    for one, other in zip(second.network.parameters(), whole.network.parameters(), strict=True):
+        assert torch.equal(one, other)
+    with pytest.raises(InputError, match="other options or data"):
+        first.go_on(tmp_path, {"trial": "two"})
+
+
 def test_what_learns_early_is_not_held(bev_set):
     with pytest.raises(InputError, match="two frozen layers or more"):
         held([bev_set], regime(1), torch.device("cpu"))
