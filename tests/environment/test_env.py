@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import shapely
+import torch
 from gymnasium.utils.env_checker import check_env
 from tests.environment.scenes import AHEAD, BEHIND, ONCOMING, SPEED_M_S, scene, two_cameras
 
@@ -299,6 +300,22 @@ def test_many_at_once(mode: str, folder: Path) -> None:
         assert after in made.observation_space
     finally:
         made.close()
+
+
+def test_forked_ones_do_not_wait_for_threads_that_torch_had(folder: Path) -> None:
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        torch.zeros(1 << 20).abs()  # begins the threads
+        made = gymnasium.make_vec(
+            "DreamDrive-v0", num_envs=2, vectorization_mode="async", scenes=folder, cameras=()
+        )
+        assert isinstance(made, gymnasium.vector.AsyncVectorEnv)
+        made.reset_async(seed=3)
+        made.reset_wait(timeout=60)
+        made.close(terminate=True)
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_what_is_given_is_not_changed_by_who_keeps_it() -> None:

@@ -1,12 +1,14 @@
 """DreamDrive-v0: drive in generated scenes in a closed loop."""
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import gymnasium
 import numpy as np
+import torch
 from jaxtyping import Float, UInt8
 
 from dreamdrive.environment.above import draw_above
@@ -27,6 +29,7 @@ _TRIES = 20
 _RESET = ("scene", "start_s", "aside_m", "turned_rad", "speed_m_s")
 _EDGE_S = 1e-6
 _DEFAULT = EnvironmentOptions()
+_LOADED_BY = os.getpid()
 
 
 class DreamDriveEnv(gymnasium.Env[Any, np.ndarray]):
@@ -59,6 +62,9 @@ class DreamDriveEnv(gymnasium.Env[Any, np.ndarray]):
         render_mode: str | None = None,
         options: EnvironmentOptions = _DEFAULT,
     ) -> None:
+        if os.getpid() != _LOADED_BY:
+            # Forked, as by AsyncVectorEnv: torch would wait for ever for threads that stayed with the parent.
+            torch.set_num_threads(1)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode {render_mode!r}; expected rgb_array, above or None")
         if traffic not in ("recorded", "react"):
