@@ -182,6 +182,7 @@ class Student:
         for step in range(int(self._done), len(self.losses)):
             self.step()
             if (step + 1) % _SAID_EACH == 0:
+                self.check()  # before it is kept, as who goes on from there sees no earlier loss
                 yield step + 1
         self.check()
 

@@ -100,12 +100,13 @@ def _on_a_core(task: Task) -> None:
     """Train and test one; it goes on where it was stopped."""
     assert isinstance(task, Trial)
     student = Student(held(task.sets, task.regime, CPU), task.regime)
-    kept, data = task.result.with_suffix(""), {"trial": task.key}
+    key = task.key  # reads all sets
+    kept, data = task.result.with_suffix(""), {"trial": key}
     student.go_on(kept, data)
     for done in student.learn():
         print(f"{task.name}: {done} of {len(student.losses)} steps", flush=True)
         student.save(kept, data)
-    save(task.result, task.key, _counts(task, student.network))
+    save(task.result, key, _counts(task, student.network))
     rmtree(kept, ignore_errors=True)
 
 

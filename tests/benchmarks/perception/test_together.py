@@ -72,6 +72,15 @@ def test_a_stopped_student_goes_on_as_if_it_had_not_been(bev_set, tmp_path):
         first.go_on(tmp_path, {"trial": "two"})
 
 
+def test_a_network_that_broke_is_not_kept(bev_set, monkeypatch):
+    monkeypatch.setattr("perception.together._SAID_EACH", 1)
+    asked = replace(regime(2), trunk=SHIPPED)
+    student = Student(held([bev_set], asked, torch.device("cpu")), asked)
+    student.losses[3] = torch.nan
+    with pytest.raises(ArithmeticError, match="not finite"):
+        next(student.learn())
+
+
 def test_what_learns_early_is_not_held(bev_set):
     with pytest.raises(InputError, match="two frozen layers or more"):
         held([bev_set], regime(1), torch.device("cpu"))
