@@ -1,0 +1,1 @@
+"""Recorded drives: which, what is known of them, and what a scene of each is worth."""
