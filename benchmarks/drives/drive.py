@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from common.places import DATA, ROOT
+from common.places import DATA
 from dreamdrive.prior import choose_prior
 from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
 
 HOLD_OUT = 8
-BROUGHT = ROOT / "runs/data"
-"""Where ``bring.py`` puts the drives that do not lie in ``DATA``."""
+BROUGHT = Path("runs/data")
+"""Where ``bring.py`` puts the drives that do not lie in ``DATA``, from the working folder."""
 
 
 @dataclass(frozen=True)
