@@ -5,7 +5,7 @@ from math import ceil
 
 from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName
 from dreamdrive.decompose import ActorOptions, DriftOptions, GroupOptions, ScoreOptions
-from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions
+from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions, TrialOptions
 from dreamdrive.geometry import GeometryOptions
 from dreamdrive.knowledge import SHIPPED
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
@@ -24,6 +24,7 @@ class Options:
         group: The vote.
         cast: The actors' tracks.
         drift: The street, where no path of the camera explains the frames.
+        trial: The small fit by which frames judge.
         densify: Growing and pruning in the joint fit.
         network: Size of the deformation field; its width is that of every representation.
         representation: ``"hybrid"``, or one of its baselines.
@@ -41,6 +42,7 @@ class Options:
     group: GroupOptions = field(default_factory=GroupOptions)
     cast: ActorOptions = field(default_factory=ActorOptions)
     drift: DriftOptions = field(default_factory=DriftOptions)
+    trial: TrialOptions = field(default_factory=TrialOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
     representation: RepresentationName = "hybrid"

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
 
 from dreamdrive.choices import BACKENDS, QualityName
 from dreamdrive.decompose import (
@@ -16,19 +15,21 @@ from dreamdrive.decompose import (
     cast,
     drifting,
     error_maps,
-    explained,
     group,
     outside,
     pixels_of,
     score,
+    stands,
+    with_between,
+    without_sky,
 )
 from dreamdrive.device import computing_on
-from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise
+from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise, trial
 from dreamdrive.geometry import reconstruct
 from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, weights_of, with_looks
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options
-from dreamdrive.progress import StageProgress
+from dreamdrive.progress import StageProgress, Work
 from dreamdrive.run import (
     REPORT,
     Outcome,
@@ -181,10 +182,31 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
         [o.representation, o.fit, o.cast, o.drift, o.motion, o.densify, o.device, given.tracks],
         lambda work: _completed(
             clip,
-            fit(clip, geometry, parts, static, o.fit, o.motion, o.densify, seed["fit"], work, device),
+            _fitted(clip, geometry, parts, static, o, seed["fit"], work, device),
         ),
         check=partial(check.scene, clip),
     )
+
+
+def _fitted(
+    clip: Clip,
+    geometry: Geometry,
+    parts: Parts,
+    static: StaticFit,
+    options: Options,
+    seed: int,
+    work: Work,
+    device: torch.device,
+) -> Scene:
+    """The joint fit; of a street that drifts also to the frames between, with its sky among its surfaces."""
+    o = options
+    if parts.static.velocity is None:
+        return fit(clip, geometry, parts, static, o.fit, o.motion, o.densify, seed, work, device)
+    denser, seen = with_between(clip, without_sky(geometry, o.seeds.far_m))
+    steps = replace(o.fit, steps=round(o.drift.steps * o.fit.steps))
+    scene = fit(denser, seen, parts, static, steps, o.motion, o.densify, seed, work, device)
+    recorded = {"times_s": clip.times_s, "held_out": clip.held_out, "cameras": geometry.cameras}
+    return replace(scene, camera=clip.camera if len(clip.rig) > 1 else None, **recorded)
 
 
 def _completed(clip: Clip, scene: Scene) -> Scene:
@@ -239,24 +261,26 @@ def decompose(
     moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
     # Frames that were drawn from their depth show a street that stands, whatever the fit makes of it.
     may_drift = o.drift.allowed and not (clip.known.generated and clip.known.depth_m is not None)
-    street = _drifting(clip, geometry, seeds, errors, labels, o) if may_drift else None
+    street = _drifting(clip, geometry, seeds, labels, o) if may_drift else None
     standing = fitted.select(labels.static) if street is None else street
+    if street is not None and geometry.fallback is not None:
+        # Where the path is a guess, so are the ways of things on it: all moves as the picture does.
+        return Parts(street, seeds.select(nothing), None, ())
     return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
 
 
 def _drifting(
-    clip: Clip,
-    geometry: Geometry,
-    seeds: Gaussians,
-    errors: Callable[[], Float[np.ndarray, "f h w"]],
-    labels: Grouping,
-    options: Options,
+    clip: Clip, geometry: Geometry, seeds: Gaussians, labels: Grouping, options: Options
 ) -> Gaussians | None:
-    """A street that drifts, beside what moves; None where one that stands explains the frames."""
-    moving = np.flatnonzero(labels.dynamic.numpy())
-    moves = pixels_of(geometry, seeds, moving, int(options.seeds.reach_px))
-    if explained(clip, geometry, errors(), moves, options.drift):
+    """A street that drifts, beside what moves; None where one that stands predicts the frames."""
+    found = trial(clip, geometry, options.seeds, options.trial, stage_seed(options.seed, "static"))
+    if found is None or stands(found.clip, found.frames, found.errors, found.solid, options.drift):
         return None
-    every = initialise(clip, replace(geometry, moving=np.ones_like(geometry.moving)), options.seeds)
-    taken = pixels_of(geometry, seeds, moving, options.seeds.moving_stride_px // 2)
-    return drifting(clip, geometry, every.select(outside(geometry, every, taken)), options.drift)
+    filmed = without_sky(geometry, options.seeds.far_m)
+    dense = replace(options.seeds, moving_stride_px=options.drift.stride_px, sky_fringe_px=0)
+    every = initialise(clip, replace(filmed, moving=np.ones_like(geometry.moving)), dense)
+    if geometry.fallback is None:
+        moving = np.flatnonzero(labels.dynamic.numpy())
+        taken = pixels_of(geometry, seeds, moving, options.seeds.moving_stride_px // 2)
+        every = every.select(outside(geometry, every, taken))
+    return drifting(clip, filmed, every, options.drift)

@@ -1,7 +1,8 @@
 """Static and dynamic, told apart without labels."""
 
 from dreamdrive.decompose.actors import ActorOptions, Cast, cast
-from dreamdrive.decompose.drifting import DriftOptions, drifting, explained, outside, pixels_of
+from dreamdrive.decompose.between import with_between
+from dreamdrive.decompose.drifting import DriftOptions, drifting, outside, pixels_of, stands, without_sky
 from dreamdrive.decompose.errors import error_maps
 from dreamdrive.decompose.flow import in_between, neighbour_flow
 from dreamdrive.decompose.glances import Placement, PlacingOptions

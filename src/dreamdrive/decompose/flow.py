@@ -44,7 +44,13 @@ def in_between(clip: Clip, before: int, frame: int, after: int) -> Float[np.ndar
     eq. 4.
     """
     times = clip.times_s
-    t = float((times[frame] - times[before]) / (times[after] - times[before]))
+    return blended(
+        clip, before, after, float((times[frame] - times[before]) / (times[after] - times[before]))
+    )
+
+
+def blended(clip: Clip, before: int, after: int, t: float) -> Float[np.ndarray, "h w 3"]:
+    """What two frames make of one at a share t of the time between them; see ``in_between``."""
     there, back = neighbour_flow(clip, before, after), neighbour_flow(clip, after, before)
     from_first = _warped(clip.frames[before], -(1 - t) * t * there + t * t * back)
     from_second = _warped(clip.frames[after], (1 - t) * (1 - t) * there - t * (1 - t) * back)

@@ -15,7 +15,9 @@ from dreamdrive.geometry.depth import (
     fill_flanks,
     fused,
     make_view,
+    preferred,
     settled_in_time,
+    shifted_users,
     single_threaded_opencv,
     sky_mask,
     sweep_frames,
@@ -39,9 +41,9 @@ from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
-PASSES, LOOK_PASSES = 7, 4
+PASSES, LOOK_PASSES = 7, 6
 """How often the frames are gone through one by one: the sweep, six times for what moves, and with a look
-four times for depth that the street network has a part in."""
+six times for depth that the street network has a part in."""
 _FAR_INVERSE = 1e-3  # 1/m; farther than 1 km there is no depth
 _BACKDROP_M = 40.0
 _PLANE_CONFIDENCE = 0.3
@@ -108,9 +110,13 @@ def densify(
             nearer = too_near(found.inverse, inverse, confidence, options.users)
             moving, users = whole_users(view, look, flows, moving, nearer, found.inverse)
             still = moving < FLAGGED
-            found = with_stereo(view, found, still & (users > 0), inverse, confidence)
-            inverse, confidence = settled_in_time(view, found.inverse, found.spread, still), found.confidence
-            inverse = with_outlines(view, inverse, still & ~np.isin(look.classes, PAVED))
+            standing = still & (users > 0)
+            found = shifted_users(view, look.instances, found, inverse, confidence, standing)
+            found = with_stereo(view, found, standing, inverse, confidence)
+            seen = settled_in_time(view, found.inverse, found.spread, still)
+            seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
+            inverse = preferred(view, seen, inverse, confidence, still)
+            confidence = found.confidence
         elif look is not None:
             moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:

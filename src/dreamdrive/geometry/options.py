@@ -14,18 +14,22 @@ class GateOptions:
 
     Attributes:
         registered: Share of the frames that have to be placed.
-        points: Points that have to be there ...
+        least_points: Points that have to be there, and ...
+        least_seen: ... in the poorest frame.
+        points: Points from which on there are enough, else more are looked for ...
         points_a_frame: ... or so many for each frame, if these are fewer ...
         seen: ... or else so many in the poorest frame.
         little: Part of these numbers that is enough, of both, where traffic leaves little of the picture.
         wobbling_px: Mean reprojection error above which frames are not quite pictures of one street, as
             generated ones are not: recorded drives stay below 0.4.
         reprojection_px: Mean reprojection error above which the model is refused.
-        forward: Least cosine between a step and the optical axis.
+        forward: Least cosine between a step and the usual direction of the drive, as the camera sees both.
         variation: Standard deviation of the lengths of the steps about their trend, over their mean.
     """
 
     registered: float = 0.9
+    least_points: int = 100
+    least_seen: int = 8
     points: int = 600
     points_a_frame: int = 25
     seen: int = 60
@@ -77,6 +81,9 @@ class FusionOptions:
         user_reach: Part of the image width over which the pixels between follow it: without it standing cars
             are more than 10 % off in 0.125 of their pixels on drawn streets 0-3, with it in 0.109.
         user_spread: Of such stereo.
+        preferred: By how much the correlation with neighbours has to be better at the swept depth, for it to
+            be taken against all others. On recorded drives held-out frames win 0.2 to 0.8 dB.
+        supported: Confidence from which on it may be.
     """
 
     sure: float = 0.5
@@ -93,6 +100,8 @@ class FusionOptions:
     user_stereo: float = 0.12
     user_reach: float = 0.01
     user_spread: float = 0.05
+    preferred: float = 0.1
+    supported: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ MIN_FRAMES = 3
 MIN_FEATURES = 60
 STEPS = 3
 """Steps that are told of."""
+ASIDE_DEG = 30.0
+"""From which on a camera looks aside."""
 STARTS = 6
 """Random starting positions of global mapping that are tried."""
 
@@ -30,7 +32,7 @@ class Outcome:
     """What structure from motion gave: an accepted model, or why and in what kind there is none.
 
     Notes are sentences on what else was noticed; figures those of the gate and the focal test, as JSON
-    values.
+    values. ``sure`` says that points are enough.
     """
 
     settled: Settled | None
@@ -38,6 +40,7 @@ class Outcome:
     notes: tuple[str, ...]
     figures: dict[str, Any]
     refusal: Fallback | None = None
+    sure: bool = False
 
 
 def reconstruct(
@@ -45,23 +48,54 @@ def reconstruct(
 ) -> Outcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
-    Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
-    before incremental mapping. ``tell`` is called after features, after matches, and with the model.
+    Where points are few, and where frames show little of the street from the start, the frames are looked at
+    more closely. The model with the most points that the gate does not refuse is taken. ``tell`` is called
+    after features, after matches, and with the model.
     """
     if len(clip) < MIN_FRAMES:
         return _refused(f"{len(clip)} frames are too few for structure from motion", "few")
-    found = find_features(clip, evidence)
-    tell()
-    typical = int(np.median([len(entry.keypoints_px) for entry in found]))
-    if typical < MIN_FEATURES:
-        return _refused(f"the frames show too little: {typical} features in a typical one", "blank")
-    square, found = _square_pixels(evidence.working, found)
     little = shows_little(clip, evidence)
+    best: Outcome | None = None
+    for closer in (True,) if little else (False, True):
+        found = find_features(clip, evidence, closer)
+        typical = int(np.median([len(entry.keypoints_px) for entry in found]))
+        if typical < MIN_FEATURES:
+            outcome = _refused(f"the frames show too little: {typical} features in a typical one", "blank")
+        else:
+            outcome = _mapped(clip, evidence, found, options, seed, little=little, tell=tell)
+        best = outcome if best is None or _points(outcome) > _points(best) else best
+        if outcome.sure:
+            break
+    assert best is not None
+    return best
+
+
+def _points(outcome: Outcome) -> int:
+    return 0 if outcome.settled is None else len(outcome.settled.model.points)
+
+
+def _mapped(
+    clip: Clip,
+    evidence: Evidence,
+    found: list[Features],
+    options: GateOptions,
+    seed: int,
+    *,
+    little: bool,
+    tell: Tell,
+) -> Outcome:
+    """What comes of some features.
+
+    Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
+    before incremental mapping.
+    """
+    square, found = _square_pixels(evidence.working, found)
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
-    figures: dict[str, Any] = {"features": typical}
+    figures: dict[str, Any] = {"features": int(np.median([len(entry.keypoints_px) for entry in found]))}
     with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
         database = Path(folder) / "matches.db"
+        tell()
         sfm.match(database, found, square, seed)
         tell()
         for name, again, start in _attempts(seed):
@@ -77,12 +111,21 @@ def reconstruct(
                 if not failed:
                     tell()
                     notes += [settled.note] if settled.note else []
-                    notes += ["the camera drives backwards"] if verdict.backwards else []
-                    notes += [_wobbling(settled.model)] if verdict.wobbling else []
+                    notes += _noticed(verdict, settled.model)
                     notes += [f"{reasons[0]}: mapped again, {again}"] if reasons else []
-                    return Outcome(settled, (), tuple(notes), figures)
+                    return Outcome(settled, (), tuple(notes), figures, sure=verdict.few is None)
             reasons = reasons or failed
     return Outcome(None, reasons, (), figures, "refused")
+
+
+def _noticed(verdict: gate.Verdict, model: Model) -> list[str]:
+    """What is unusual about a drive, a sentence each."""
+    notes = ["the camera drives backwards"] if verdict.backwards and verdict.aside_deg < ASIDE_DEG else []
+    if verdict.aside_deg >= ASIDE_DEG:
+        notes.append(f"the camera looks {verdict.aside_deg:.0f} degrees away from where it goes")
+    if verdict.few is not None:
+        notes.append(f"{verdict.few}: the path is as sure as these are")
+    return notes + ([_wobbling(model)] if verdict.wobbling else [])
 
 
 def _attempts(seed: int) -> list[tuple[str, str, int]]:

@@ -1,0 +1,118 @@
+"""How well a geometry predicts frames that a fit has not seen: what frames themselves say of it."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+
+from dreamdrive.fit.initialise import SeedOptions, initialise
+from dreamdrive.fit.static import fit_static
+from dreamdrive.fit.trainer import FitOptions
+from dreamdrive.progress import silent
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.splat import one_torch_thread, render
+
+
+@dataclass(frozen=True)
+class TrialOptions:
+    """A small static fit to some of the frames.
+
+    Attributes:
+        withheld: Every so many of the frames that may be seen are withheld from it.
+        width_px: Width of its pictures at most.
+        visits: Steps for each frame that it sees.
+    """
+
+    withheld: int = 4
+    width_px: int = 240
+    visits: float = 5.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a trial fit makes of the frames that were withheld from it.
+
+    Attributes:
+        clip: The clip at the size of the trial; what the trial did not see is held out.
+        frames: The withheld frames.
+        errors: Mean absolute difference over colours, in [0, 1], of each of them (K, h, w).
+        solid: Pixels that show something solid and not known to move (K, h, w).
+    """
+
+    clip: Clip
+    frames: tuple[int, ...]
+    errors: Float[np.ndarray, "k h w"]
+    solid: Bool[np.ndarray, "k h w"]
+
+    @property
+    def psnr(self) -> float:
+        """Mean over the frames, of the solid pixels, in dB."""
+        each = [
+            np.square(error[mask]).mean()
+            for error, mask in zip(self.errors, self.solid, strict=True)
+            if mask.any()
+        ]
+        return float(np.mean(-10 * np.log10(np.maximum(each, 1e-8)))) if each else 0.0
+
+
+@one_torch_thread()
+def trial(
+    clip: Clip, geometry: Geometry, seeds: SeedOptions, options: TrialOptions, seed: int
+) -> Trial | None:
+    """Fit a street that stands to most of the frames that may be seen, small and short; judge the others.
+
+    None where that leaves too few to fit.
+    """
+    seen = np.flatnonzero(~clip.held_out)
+    frames = tuple(seen[options.withheld // 2 :: options.withheld].tolist())
+    small, shown = _reduced(clip, geometry, options.width_px)
+    held_out = small.held_out.copy()
+    held_out[list(frames)] = True
+    if (~held_out).sum() < 2:
+        return None
+    small = replace(small, held_out=held_out)
+    gaussians = initialise(small, shown, seeds)
+    steps = ceil(options.visits * (~held_out).sum())
+    fitted = fit_static(small, shown, gaussians, FitOptions(steps=steps), seed, silent)
+    errors, solid = [], []
+    with torch.no_grad():
+        for i in frames:
+            drawn = render(fitted.gaussians, shown.cameras[i])
+            image = drawn.colour + (1 - drawn.alpha)[..., None] * fitted.sky.colour(shown.cameras[i])
+            image = fitted.exposure.apply(image, float(small.times_s[i]), int(small.camera[i])).clamp(0, 1)
+            errors.append(np.abs(image.numpy() - small.frames[i] / np.float32(255)).mean(axis=2))
+            free = small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0)
+            solid.append(free & ~shown.sky[i] & (shown.moving[i] < 0.5))
+    return Trial(small, frames, np.stack(errors), np.stack(solid))
+
+
+def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geometry]:
+    """Clip and geometry with pictures of at most that width; what no fit reads is left out."""
+    width, height = clip.size
+    size = min(width_px, width), max(1, round(height * min(width_px, width) / width))
+
+    def near(maps: np.ndarray) -> np.ndarray:
+        kind = np.uint8 if maps.dtype == bool else maps.dtype
+        resized = [cv2.resize(each.astype(kind), size, interpolation=cv2.INTER_NEAREST) for each in maps]
+        return np.stack(resized).astype(maps.dtype)
+
+    frames = np.stack([cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in clip.frames])
+    small = replace(
+        clip,
+        frames=frames,
+        valid=near(clip.valid),
+        rig=tuple(camera.resized(*size) for camera in clip.rig),
+        features={},
+        latents=None,
+        known=type(clip.known)(),
+        set_in_motion=None,
+        looks=(),
+    )
+    maps = {name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky", "moving")}
+    regions = near(geometry.fixed_regions.astype(np.int32))
+    cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
+    return small, replace(geometry, cameras=cameras, fixed_regions=regions, spread=None, users=None, **maps)
