@@ -60,7 +60,7 @@ def test_the_same_clip_and_options_give_the_same_scene() -> None:
 def test_a_street_that_was_drawn_from_its_depth_never_drifts(monkeypatch: pytest.MonkeyPatch) -> None:
     street = small_street(frames=6)
     clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
-    monkeypatch.setattr(pipeline, "explained", lambda *_: False)
+    monkeypatch.setattr(pipeline, "stands", lambda *_: False)
     assert build_scene(clip, TINY, given=Given(geometry)).drifts
     poses = np.stack([each.world_from_camera for each in geometry.cameras])
     known = Known(poses, depth_m=street.depth_m, generated=True)

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.cameras.gate import judge
 from dreamdrive.geometry.cameras.sfm import Model
@@ -44,16 +45,37 @@ def test_a_wobbling_path_is_judged_over_stretches(sideways_m: float, jumps: bool
     assert any("jumps" in reason for reason in wobbling.reasons) == jumps
 
 
+def sparse(points: int, in_each: int, in_one: int | None = None) -> Model:
+    """The drive with fewer points, of which each frame sees some."""
+    seen = np.zeros((FRAMES, points), bool)
+    seen[:, :in_each] = True
+    if in_one is not None:
+        seen[3] = np.arange(points) < in_one
+    return replace(drive(0.2), points=np.zeros((points, 3)), seen=seen)
+
+
+def test_few_points_are_told_of_and_refused_only_where_they_are_next_to_none() -> None:
+    few = judge(sparse(200, 40), MOVING)
+    assert few.reasons == ()
+    assert few.few == "only 200 points, 40 in the poorest frame"
+    assert judge(sparse(700, 100), MOVING).few is None
+    assert judge(sparse(90, 40), MOVING).reasons == ("only 90 points, 40 in the poorest frame",)
+    assert judge(sparse(200, 40, 5), MOVING).reasons == ("only 200 points, 5 in the poorest frame",)
+
+
 def test_what_shows_little_of_the_street_needs_fewer_points_but_some_in_each_frame() -> None:
-    seen = np.zeros((FRAMES, 200), bool)
-    seen[:, :40] = True
-    sparse = replace(drive(0.2), points=np.zeros((200, 3)), seen=seen)
-    assert any("only 200 points, 40 in" in reason for reason in judge(sparse, MOVING).reasons)
-    assert judge(sparse, MOVING, little=True).reasons == ()
-    seen = seen.copy()
-    seen[3, 10:] = False
-    poorer = replace(sparse, seen=seen)
-    assert any("10 in the poorest" in reason for reason in judge(poorer, MOVING, little=True).reasons)
+    assert judge(sparse(200, 40), MOVING, little=True).few is None
+    assert judge(sparse(200, 40, 10), MOVING, little=True).few is not None
+
+
+@pytest.mark.parametrize("aside_deg", [0.0, 60.0, 90.0])
+def test_a_camera_may_look_aside(aside_deg: float) -> None:
+    model = drive(0.2)
+    turned = model.world_from_camera.copy()
+    turned[:, :3, :3] = Rotation.from_euler("y", aside_deg, degrees=True).as_matrix()
+    verdict = judge(replace(model, world_from_camera=turned), MOVING)
+    assert verdict.reasons == ()
+    assert verdict.aside_deg == pytest.approx(aside_deg, abs=1e-3)
 
 
 def test_a_drive_backwards_is_one() -> None:

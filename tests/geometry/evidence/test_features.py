@@ -60,14 +60,12 @@ def test_traffic_leaves_little(traffic: float, little: bool) -> None:
     assert not evidence.motion.standing
 
 
-def test_features_of_a_larger_picture_lie_at_the_same_places(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_closer_look_finds_more_at_the_same_places() -> None:
     clip = noise_clip(0.75)
     evidence = observe(clip)
-    larger = find_features(clip, evidence)[1]
-    monkeypatch.setattr(features, "LITTLE", 0.0)
-    plain = find_features(clip, evidence)[1]
-    assert len(plain.keypoints_px) < len(larger.keypoints_px) < features.MAX_FEATURES
-    assert larger.keypoints_px[:, 0].min() > 0.75 * WIDTH
-    assert larger.keypoints_px[:, 0].max() < WIDTH
-    apart = np.linalg.norm(plain.keypoints_px[:, None] - larger.keypoints_px[None], axis=2).min(axis=1)
+    plain, closer = (find_features(clip, evidence, each)[1] for each in (False, True))
+    assert len(plain.keypoints_px) < len(closer.keypoints_px) < features.MAX_FEATURES
+    assert closer.keypoints_px[:, 0].min() > 0.75 * WIDTH
+    assert closer.keypoints_px[:, 0].max() < WIDTH
+    apart = np.linalg.norm(plain.keypoints_px[:, None] - closer.keypoints_px[None], axis=2).min(axis=1)
     assert np.median(apart) < 0.25

@@ -1,0 +1,69 @@
+"""The small fit by which frames judge, on the sliding wall and on a wall that stands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.decompose.test_drifting import DEPTH_M, wall
+
+from dreamdrive.fit import SeedOptions, TrialOptions, trial
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.geometry import Geometry
+
+OPTIONS = TrialOptions(visits=8.0)
+
+
+def standing_wall() -> tuple[Clip, Geometry]:
+    """The same pictures, and cameras that move as they do: 3 px a frame to the right."""
+    clip, geometry = wall(held_out=None)
+    cameras: list[Camera] = []
+    for frame, camera in enumerate(geometry.cameras):
+        pose = np.eye(4)
+        pose[0, 3] = 3 * frame * DEPTH_M / camera.fx_px
+        cameras.append(camera.at(pose))
+    return clip, replace(geometry, cameras=tuple(cameras))
+
+
+def test_a_right_path_predicts_withheld_frames_and_a_wrong_one_does_not() -> None:
+    errors = []
+    for clip, geometry in (standing_wall(), wall(held_out=None)):
+        found = trial(clip, geometry, SeedOptions(), OPTIONS, 0)
+        assert found is not None
+        assert found.frames == (2, 6)
+        assert found.clip.held_out.nonzero()[0].tolist() == [2, 6]
+        errors.append(found.errors[:, 8:-8, 20:-20].mean())
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_withheld_frames_are_not_read() -> None:
+    clip, geometry = standing_wall()
+    first = trial(clip, geometry, SeedOptions(), OPTIONS, 0)
+    frames = clip.frames.copy()
+    frames[2] = 255 - frames[2]
+    second = trial(replace(clip, frames=frames), geometry, SeedOptions(), OPTIONS, 0)
+    assert first is not None
+    assert second is not None
+    assert second.errors[1] == pytest.approx(first.errors[1], abs=1e-6)
+    assert second.errors[0].mean() > 2 * first.errors[0].mean()
+
+
+def test_pictures_of_a_trial_are_small_and_what_moves_or_is_sky_does_not_count() -> None:
+    clip, geometry = standing_wall()
+    moving, sky = np.zeros_like(geometry.moving), np.zeros_like(geometry.sky)
+    moving[:, 40:], sky[:, :8] = 1, True
+    found = trial(
+        clip, replace(geometry, moving=moving, sky=sky), SeedOptions(), replace(OPTIONS, width_px=48), 0
+    )
+    assert found is not None
+    assert found.clip.size == (48, 32)
+    assert found.errors.shape == found.solid.shape == (2, 32, 48)
+    assert found.solid[:, 5:19].all()
+    assert not found.solid[:, :3].any()
+    assert not found.solid[:, 21:].any()
+
+
+def test_too_few_frames_say_nothing() -> None:
+    clip, geometry = wall(held_out=None)
+    alone = replace(clip, held_out=np.arange(len(clip)) > 1)
+    assert trial(alone, geometry, SeedOptions(), replace(OPTIONS, withheld=2), 0) is None
