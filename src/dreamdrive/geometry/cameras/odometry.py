@@ -22,7 +22,7 @@ STEPS = 40
 JUMP_COST = 0.6
 ZERO_COST = 0.02
 MIN_CLEAR = 0.03
-STEADY_S = 1.0
+STEADY_S = 2.0
 
 
 @dataclass(frozen=True)
