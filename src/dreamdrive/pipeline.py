@@ -274,10 +274,10 @@ def _drifting(
 ) -> Gaussians | None:
     """A street that drifts, beside what moves; None where one that stands predicts the frames."""
     found = trial(clip, geometry, options.seeds, options.trial, stage_seed(options.seed, "static"))
-    if found is None or stands(found.clip, found.frames, found.errors, found.solid, options.drift):
+    if found is None or stands(found.clip, found.frames, found.errors, found.judged, options.drift):
         return None
     filmed = without_sky(geometry, options.seeds.far_m)
-    dense = replace(options.seeds, moving_stride_px=options.drift.stride_px, sky_fringe_px=0)
+    dense = replace(options.seeds, moving_stride_px=options.drift.spacing_px, sky_fringe_px=0)
     every = initialise(clip, replace(filmed, moving=np.ones_like(geometry.moving)), dense)
     if geometry.fallback is None:
         moving = np.flatnonzero(labels.dynamic.numpy())

@@ -48,19 +48,16 @@ def test_withheld_frames_are_not_read() -> None:
     assert second.errors[0].mean() > 2 * first.errors[0].mean()
 
 
-def test_pictures_of_a_trial_are_small_and_what_moves_or_is_sky_does_not_count() -> None:
+def test_pictures_of_a_trial_are_small_and_what_moves_does_not_count() -> None:
     clip, geometry = standing_wall()
-    moving, sky = np.zeros_like(geometry.moving), np.zeros_like(geometry.sky)
-    moving[:, 40:], sky[:, :8] = 1, True
-    found = trial(
-        clip, replace(geometry, moving=moving, sky=sky), SeedOptions(), replace(OPTIONS, width_px=48), 0
-    )
+    moving = np.zeros_like(geometry.moving)
+    moving[:, 40:] = 1
+    found = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, width_px=48), 0)
     assert found is not None
     assert found.clip.size == (48, 32)
-    assert found.errors.shape == found.solid.shape == (2, 32, 48)
-    assert found.solid[:, 5:19].all()
-    assert not found.solid[:, :3].any()
-    assert not found.solid[:, 21:].any()
+    assert found.errors.shape == found.judged.shape == (2, 32, 48)
+    assert found.judged[:, :19].all()
+    assert not found.judged[:, 21:].any()
 
 
 def test_too_few_frames_say_nothing() -> None:

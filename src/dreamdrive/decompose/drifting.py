@@ -35,7 +35,7 @@ class DriftOptions:
         lifespan_frames: Standard deviation of the life spans at the start, in intervals between training
             frames; the fit goes on from there. On the motorway 1.0 and 2.0 lose 0.3 dB; 0.7 lost more, as
             what lies between two frames fades.
-        stride_px: Distance between seeds.
+        spacing_px: Distance between seeds.
         footprint: Standard deviation of a seed over their distance.
         opacity: Opacity to start from.
         steps: Steps of the joint fit, for one of a street that stands: it sees the frames between as well.
@@ -46,11 +46,11 @@ class DriftOptions:
 
     allowed: bool = True
     lifespan_frames: float = 1.4
-    stride_px: int = 3
+    spacing_px: int = 3
     footprint: float = 0.5
     opacity: float = 0.8
     steps: float = 1.35
-    margin_db: float = 1.5
+    margin_db: float = 1.2
     finest_db: float = 34.0
 
 
@@ -58,7 +58,7 @@ def stands(
     clip: Clip,
     frames: Sequence[int],
     errors: Float[np.ndarray, "k h w"],
-    solid: Bool[np.ndarray, "k h w"],
+    judged: Bool[np.ndarray, "k h w"],
     options: DriftOptions,
 ) -> bool:
     """Whether a street that stands predicts frames about as well as the frames beside each do.
@@ -67,7 +67,7 @@ def stands(
         clip: Of which the frames were withheld from a fit of a street that stands; they are held out in it.
         frames: These frames.
         errors: By how much the fit misses each of them, mean absolute difference over colours, in [0, 1].
-        solid: The pixels that count.
+        judged: The pixels that count.
         options: Constants.
 
     Every frame is also made from its neighbours, carried along optical flow; no better than a street of
@@ -75,15 +75,15 @@ def stands(
     against the margin.
     """
     behind: list[float] = []
-    for frame, error, judged in zip(frames, errors, solid, strict=True):
+    for frame, error, counts in zip(frames, errors, judged, strict=True):
         seen = np.array(clip.seen_of(int(clip.camera[frame])))
         before, after = seen[seen < frame], seen[seen > frame]
-        if judged.sum() < _LEAST_PIXELS or not len(before) or not len(after):
+        if counts.sum() < _LEAST_PIXELS or not len(before) or not len(after):
             continue
         carried_on = in_between(clip, int(before[-1]), frame, int(after[0]))
         beside = np.abs(carried_on - clip.frames[frame] / np.float32(255)).mean(axis=2)
-        best = np.square(beside[judged]).mean() + 10 ** (-options.finest_db / 10)
-        behind.append(float(10 * np.log10(max(np.square(error[judged]).mean(), 1e-8) / best)))
+        best = np.square(beside[counts]).mean() + 10 ** (-options.finest_db / 10)
+        behind.append(float(10 * np.log10(max(np.square(error[counts]).mean(), 1e-8) / best)))
     return not behind or float(np.mean(behind)) <= options.margin_db
 
 
@@ -115,7 +115,7 @@ def _log_size(geometry: Geometry, seeds: Gaussians, options: DriftOptions) -> Fl
     for frame in np.unique(frames).tolist():
         rows, camera = frames == frame, geometry.cameras[frame]
         depth_m = camera.project(seeds.means.numpy()[rows].astype(np.float64))[:, 2]
-        size_m[rows] = depth_m / camera.fx_px * options.stride_px * options.footprint
+        size_m[rows] = depth_m / camera.fx_px * options.spacing_px * options.footprint
     return np.log(np.maximum(size_m, 1e-6))[:, None].repeat(3, axis=1)
 
 

@@ -40,13 +40,14 @@ class Trial:
         clip: The clip at the size of the trial; what the trial did not see is held out.
         frames: The withheld frames.
         errors: Mean absolute difference over colours, in [0, 1], of each of them (K, h, w).
-        solid: Pixels that show something solid and not known to move (K, h, w).
+        judged: Pixels that are not known to move (K, h, w); the sky is among them, since what is taken for
+            it may be the roof of a tunnel.
     """
 
     clip: Clip
     frames: tuple[int, ...]
     errors: Float[np.ndarray, "k h w"]
-    solid: Bool[np.ndarray, "k h w"]
+    judged: Bool[np.ndarray, "k h w"]
 
     @property
     def psnr(self) -> float:
@@ -78,7 +79,7 @@ def trial(
     gaussians = initialise(small, shown, seeds)
     steps = ceil(options.visits * (~held_out).sum())
     fitted = fit_static(small, shown, gaussians, FitOptions(steps=steps), seed, silent)
-    errors, solid = [], []
+    errors, judged = [], []
     with torch.no_grad():
         for i in frames:
             drawn = render(fitted.gaussians, shown.cameras[i])
@@ -86,8 +87,8 @@ def trial(
             image = fitted.exposure.apply(image, float(small.times_s[i]), int(small.camera[i])).clamp(0, 1)
             errors.append(np.abs(image.numpy() - small.frames[i] / np.float32(255)).mean(axis=2))
             free = small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0)
-            solid.append(free & ~shown.sky[i] & (shown.moving[i] < 0.5))
-    return Trial(small, frames, np.stack(errors), np.stack(solid))
+            judged.append(free & (shown.moving[i] < 0.5))
+    return Trial(small, frames, np.stack(errors), np.stack(judged))
 
 
 def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geometry]:

@@ -5,7 +5,7 @@ from tests.geometry.depth.test_in_time import Maps
 
 from dreamdrive.geometry.depth import Fused, preferred, shifted_users
 
-FACTOR, FAR_OFF = np.float32(1.15), np.float32(1.6)
+FACTOR, FAR_OFF = np.float32(1.15), np.float32(1.3)
 
 
 def sure(maps: Maps) -> np.ndarray:
@@ -15,13 +15,19 @@ def sure(maps: Maps) -> np.ndarray:
 def test_right_stereo_takes_the_place_of_a_wrong_guess() -> None:
     maps = Maps()
     found = preferred(maps.view, maps.inverse * FAR_OFF, maps.inverse, sure(maps), maps.inverse > 0)
-    assert (found == maps.inverse)[3][maps.near].mean() > 0.7
+    assert (found == maps.inverse)[3][maps.near].mean() > 0.5
 
 
 def test_wrong_stereo_does_not_take_the_place_of_a_right_guess() -> None:
     maps = Maps()
     found = preferred(maps.view, maps.inverse, maps.inverse * FAR_OFF, sure(maps), maps.inverse > 0)
     assert (found == maps.inverse)[3][maps.near].mean() > 0.98
+
+
+def test_stereo_that_is_far_off_is_left_alone() -> None:
+    maps = Maps()
+    wrong = maps.inverse * np.float32(1.6)
+    assert np.array_equal(preferred(maps.view, wrong, maps.inverse, sure(maps), maps.inverse > 0), wrong)
 
 
 def test_stereo_without_support_and_what_moves_are_left_alone() -> None:

@@ -35,6 +35,8 @@ def preferred(
     def one(frame: int) -> Float[np.ndarray, "h w"]:
         both = free[frame] & (swept_inverse[frame] > 0) & (inverse[frame] > 0)
         both &= confidence[frame] >= options.supported
+        ratio = np.where(both, swept_inverse[frame], 1) / np.where(both, inverse[frame], 1)
+        both &= np.abs(np.log(ratio)) < options.preferred_within
         sources = _sources(view, frame)
         if not sources or not both.any():
             return inverse[frame]
