@@ -49,16 +49,6 @@ class Trial:
     errors: Float[np.ndarray, "k h w"]
     judged: Bool[np.ndarray, "k h w"]
 
-    @property
-    def psnr(self) -> float:
-        """Mean over the frames, of the solid pixels, in dB."""
-        each = [
-            np.square(error[mask]).mean()
-            for error, mask in zip(self.errors, self.solid, strict=True)
-            if mask.any()
-        ]
-        return float(np.mean(-10 * np.log10(np.maximum(each, 1e-8)))) if each else 0.0
-
 
 @one_torch_thread()
 def trial(
