@@ -179,7 +179,7 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     parts = decompose(clip, geometry, seeds, static, o, given=given, run=run)
     return run(
         "fit",
-        [o.representation, o.fit, o.cast, o.drift, o.motion, o.densify, o.device, given.tracks],
+        [o.representation, o.fit, o.cast, o.drift, o.trial, o.motion, o.densify, o.device, given.tracks],
         lambda work: _completed(
             clip,
             _fitted(clip, geometry, parts, static, o, seed["fit"], work, device),
@@ -258,14 +258,14 @@ def decompose(
         )
     else:
         run("group", o.group, lambda _: labels, given=labels)
-    moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
     # Frames that were drawn from their depth show a street that stands, whatever the fit makes of it.
     may_drift = o.drift.allowed and not (clip.known.generated and clip.known.depth_m is not None)
     street = _drifting(clip, geometry, seeds, labels, o) if may_drift else None
-    standing = fitted.select(labels.static) if street is None else street
     if street is not None and geometry.fallback is not None:
         # Where the path is a guess, so are the ways of things on it: all moves as the picture does.
         return Parts(street, seeds.select(nothing), None, ())
+    standing = fitted.select(labels.static) if street is None else street
+    moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
     return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
 
 
