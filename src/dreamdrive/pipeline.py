@@ -24,7 +24,7 @@ from dreamdrive.decompose import (
     without_sky,
 )
 from dreamdrive.device import computing_on
-from dreamdrive.fit import Parts, StaticFit, fit, fit_static, initialise, trial
+from dreamdrive.fit import Parts, StaticFit, better_depth, fit, fit_static, initialise, trial
 from dreamdrive.geometry import reconstruct
 from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, weights_of, with_looks
 from dreamdrive.motion import REPRESENTATIONS
@@ -158,8 +158,14 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     clip = with_looks(clip, looks)
     geometry = run(
         "geometry",
-        [o.geometry, BACKENDS.package(o.geometry.method), o.seed],
-        lambda work: reconstruct(clip, o.geometry, seed=seed["geometry"], work=work),
+        [o.geometry, BACKENDS.package(o.geometry.method), o.seeds, o.trial, o.seed],
+        lambda work: better_depth(
+            clip,
+            reconstruct(clip, o.geometry, seed=seed["geometry"], work=work),
+            o.seeds,
+            o.trial,
+            seed["static"],
+        ),
         check=partial(check.geometry, clip),
         given=given.geometry,
     )

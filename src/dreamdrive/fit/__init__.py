@@ -6,4 +6,4 @@ from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.losses import LossName, render_loss
 from dreamdrive.fit.static import StaticFit, fit_static
 from dreamdrive.fit.trainer import FitOptions
-from dreamdrive.fit.trial import Trial, TrialOptions, trial
+from dreamdrive.fit.trial import Trial, TrialOptions, better_depth, trial

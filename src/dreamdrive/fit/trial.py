@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,11 +26,15 @@ class TrialOptions:
         withheld: Every so many of the frames that may be seen are withheld from it.
         width_px: Width of its pictures at most.
         visits: Steps for each frame that it sees.
+        stereo_db: By how much depth of stereo alone predicts withheld frames better where it takes the place
+            of depth that a network has a part in. On nine of twenty recorded drives it is better by 0.5 to
+            1.8 dB, and then by 0.3 to 2.3 in the whole fit; where it is 0.2 better, lidar contradicts it.
     """
 
     withheld: int = 4
     width_px: int = 240
     visits: float = 5.0
+    stereo_db: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,32 @@ class Trial:
     frames: tuple[int, ...]
     errors: Float[np.ndarray, "k h w"]
     judged: Bool[np.ndarray, "k h w"]
+
+    @property
+    def psnr_db(self) -> float:
+        """Of what is judged, over all withheld frames, from absolute differences."""
+        return -10 * np.log10(max(float((self.errors[self.judged] ** 2).mean()), 1e-10))
+
+
+def better_depth(
+    clip: Clip, geometry: Geometry, seeds: SeedOptions, options: TrialOptions, seed: int
+) -> Geometry:
+    """The geometry with that of its two depths which predicts withheld frames better, and no other.
+
+    What a network makes of a street is a guess, which frames check; what both scored stands in its details.
+    """
+    fused = replace(geometry, by_stereo=None)
+    if geometry.by_stereo is None:
+        return fused
+    depth_m, confidence = geometry.by_stereo
+    stereo = replace(fused, depth_m=depth_m, confidence=confidence)
+    first, second = (trial(clip, each, seeds, options, seed) for each in (fused, stereo))
+    if first is None or second is None:
+        return fused
+    scores = {"fused": round(first.psnr_db, 2), "stereo": round(second.psnr_db, 2)}
+    taken = "stereo" if scores["stereo"] > scores["fused"] + options.stereo_db else "fused"
+    chosen = stereo if taken == "stereo" else fused
+    return replace(chosen, details={**chosen.details, "depth_trial_db": scores, "depth": taken})
 
 
 @one_torch_thread()
@@ -103,7 +134,11 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
         set_in_motion=None,
         looks=(),
     )
-    maps = {name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky", "moving")}
+    maps: dict[str, Any] = {
+        name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky", "moving")
+    }
     regions = near(geometry.fixed_regions.astype(np.int32))
     cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
-    return small, replace(geometry, cameras=cameras, fixed_regions=regions, spread=None, users=None, **maps)
+    return small, replace(
+        geometry, cameras=cameras, fixed_regions=regions, spread=None, users=None, by_stereo=None, **maps
+    )

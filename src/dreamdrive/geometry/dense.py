@@ -1,5 +1,7 @@
 """The dense half of the classical reconstruction: depth, confidence, sky and motion of posed frames."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt16
@@ -71,13 +73,14 @@ def densify(
     m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
     the place of the backdrop. What moves is found against the parallax of a moving camera or against the
     temporal median of a standing one, and with a look road users move as wholes; from fallback poses no such
-    evidence is drawn. ``tell`` is called for each frame of at most ``PASSES``, and with a look of
+    evidence is drawn. Where depth is fused, that of stereo alone is beside it, for who can tell which is
+    better. ``tell`` is called for each frame of at most ``PASSES``, and with a look of
     ``LOOK_PASSES`` more, where depth was not given.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
     given = clip.known.depth_m is not None
     rough = posed.standing or posed.fallback is not None
-    look, found, users = clip.look, None, None
+    look, found, users, alone = clip.look, None, None, None
     with single_threaded_opencv():
         sky = _sky(clip, view)
         if clip.known.depth_m is not None:
@@ -115,13 +118,17 @@ def densify(
             found = with_stereo(view, found, standing, inverse, confidence)
             seen = settled_in_time(view, found.inverse, found.spread, still)
             seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
-            inverse = preferred(view, seen, inverse, confidence, still)
-            confidence = found.confidence
+            taken = preferred(view, seen, inverse, confidence, still)
+            if not rough:
+                matched = still & (inverse > 0)
+                alone = np.where(matched, inverse, taken), np.where(matched, confidence, found.confidence)
+            inverse, confidence = taken, found.confidence
         elif look is not None:
             moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    return _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)
+    geometry = _geometry(posed, view, (inverse, confidence), sky, moving, found and found.spread, users)
+    return geometry if alone is None else replace(geometry, by_stereo=_depth(view, *alone, sky))
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -211,20 +218,30 @@ def upright_depth(
     return inverse
 
 
-def _geometry(
-    posed: Posed,
+def _depth(
     view: View,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
+    sky: Bool[np.ndarray, "f h w"],
+) -> DepthMaps:
+    """Depth in metres and trust in it, 0 in the sky and farther than 1 km."""
+    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
+    depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
+    return depth_m, np.where(shown, confidence, 0).astype(np.float32)
+
+
+def _geometry(
+    posed: Posed,
+    view: View,
+    found: DepthMaps,
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"] | None,
     users: UInt16[np.ndarray, "f h w"] | None,
 ) -> Geometry:
     """What both halves found, as the next stages take it."""
-    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
-    depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
-    confidence = np.where(shown, confidence, 0).astype(np.float32)
+    depth_m, confidence = _depth(view, *found, sky)
+    shown = depth_m > 0
     sky = sky & view.usable
     moving = np.where(view.usable, moving, 0).astype(np.float32)
     shares = {

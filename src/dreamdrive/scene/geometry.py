@@ -92,6 +92,8 @@ class Geometry:
             none; None where nothing tells it.
         users: The road user that a pixel belongs to (F, H, W), one number over all frames in which it was
             followed, from 1; 0 where there is none. None where nobody looked for them.
+        by_stereo: Depth and trust by stereo alone of what does not move, each (F, H, W), where ``depth_m``
+            and ``confidence`` also hold what a network makes of the frames; None where there is one depth.
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
             camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
             clip's rig (K, H, W).
@@ -125,6 +127,7 @@ class Geometry:
     metres_per_unit: float | None = 1.0
     spread: Float[np.ndarray, "f h w"] | None = None
     users: UInt16[np.ndarray, "f h w"] | None = None
+    by_stereo: tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]] | None = None
 
     @property
     def at_one_place(self) -> bool:

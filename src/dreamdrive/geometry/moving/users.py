@@ -10,6 +10,7 @@ from dreamdrive.geometry.depth import View
 from dreamdrive.geometry.moving.evidence import FLAGGED
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.moving.following import Sighting, follow
+from dreamdrive.geometry.moving.riders import with_riders
 from dreamdrive.geometry.options import UserOptions
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.look import Look
@@ -47,17 +48,19 @@ def whole_users(
     With it the number of the road user of each pixel, from 1, the same in all frames.
 
     A road user moves if enough of its pixels are flagged or nearer than they can be if it stands; less is
-    enough if its distances (inverse depth in 1/m) belong to no one place. What surely is no road user does
-    not move.
+    enough if its distances (inverse depth in 1/m) belong to no one place. Who sits on a two-wheeler is one
+    with it, and rides: at the camera's own speed neither flow nor distance tells. What surely is no road user
+    does not move.
     """
     options = view.options.users
+    look, ridden = with_riders(look, view.frames)
     whole, users = evidence.copy(), np.zeros(evidence.shape, np.uint16)
     for frame in view.frames:
         street = (look.instances[frame] == 0) & (look.confidence[frame] >= options.sure)
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
     tracks = follow(view, look, flows, (evidence >= FLAGGED) | nearer)
     for number, track in enumerate(tracks, start=1):
-        moves = _moves(view, look, inverse, track, options)
+        moves = _rides(look, ridden, track) or _moves(view, look, inverse, track, options)
         for seen in track:
             own = look.instances[seen.frame] == seen.label
             users[seen.frame][own] = number
@@ -90,6 +93,12 @@ def _moves(
     if share > options.moving_share:
         return True
     return share > options.doubtful_share and off_place(view, look, inverse, track) > options.off_place
+
+
+def _rides(look: Look, ridden: Bool[np.ndarray, "f h w"], track: Sequence[Sighting]) -> bool:
+    """Whether most sightings are of a two-wheeler and its rider."""
+    both = [ridden[seen.frame][look.instances[seen.frame] == seen.label].any() for seen in track]
+    return sum(both) > 0.5 * len(both)
 
 
 def telling_share(track: Sequence[Sighting]) -> float:
