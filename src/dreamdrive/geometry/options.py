@@ -158,6 +158,8 @@ class UserOptions:
             streets 0-15 the same one has 0.48 to 1 of them from frame to frame, but for once in 1,700 times;
             without it a car that has left the picture goes on as the next one on streets 2, 3, 9 and 13, and
             what moves on 9, seen 2 m aside, loses 1.4 dB.
+        leap: Nor as one whose distance from one frame to the next is larger by this logarithm of their ratio:
+            on a village street one parked car after another was one that moves.
     """
 
     sure: float = 0.8
@@ -168,6 +170,7 @@ class UserOptions:
     off_place: float = 0.25
     rim: float = 0.02
     alike: float = 0.45
+    leap: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,8 @@ def whole_users(
     for frame in view.frames:
         street = (look.instances[frame] == 0) & (look.confidence[frame] >= options.sure)
         whole[frame][street] = np.minimum(whole[frame][street], 0.9 * FLAGGED)
-    tracks = follow(view, look, flows, (evidence >= FLAGGED) | nearer)
+    followed = follow(view, look, flows, (evidence >= FLAGGED) | nearer)
+    tracks = [part for track in followed for part in _unbroken(look, inverse, track, options.leap)]
     for number, track in enumerate(tracks, start=1):
         moves = _rides(look, ridden, track) or _moves(view, look, inverse, track, options)
         for seen in track:
@@ -93,6 +94,21 @@ def _moves(
     if share > options.moving_share:
         return True
     return share > options.doubtful_share and off_place(view, look, inverse, track) > options.off_place
+
+
+def _unbroken(
+    look: Look, inverse: Float[np.ndarray, "f h w"], track: Sequence[Sighting], leap: float
+) -> list[list[Sighting]]:
+    """The parts of a track between leaps away: where a parked car has left the picture comes the next one."""
+    parts: list[list[Sighting]] = []
+    before_m = 0.0
+    for seen in track:
+        depth_m = float(_seen_at(look, inverse, seen)[2])
+        if not parts or (before_m < 1 / _FARTHEST_INVERSE and depth_m > before_m * np.exp(leap)):
+            parts.append([])
+        parts[-1].append(seen)
+        before_m = depth_m
+    return parts
 
 
 def _rides(look: Look, ridden: Bool[np.ndarray, "f h w"], track: Sequence[Sighting]) -> bool:
