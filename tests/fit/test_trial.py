@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.decompose.test_drifting import DEPTH_M, wall
 
-from dreamdrive.fit import SeedOptions, TrialOptions, trial
+from dreamdrive.fit import SeedOptions, TrialOptions, better_depth, trial
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -64,3 +64,31 @@ def test_too_few_frames_say_nothing() -> None:
     clip, geometry = wall(held_out=None)
     alone = replace(clip, held_out=np.arange(len(clip)) > 1)
     assert trial(alone, geometry, SeedOptions(), replace(OPTIONS, withheld=2), 0) is None
+
+
+def with_two_depths(first: float, second: float) -> tuple[Clip, Geometry]:
+    """The standing wall, at depths that are so many times the true one."""
+    clip, geometry = standing_wall()
+    depth_m = geometry.depth_m
+    by_stereo = (second * depth_m, np.full_like(depth_m, 0.9))
+    return clip, replace(geometry, depth_m=first * depth_m, by_stereo=by_stereo)
+
+
+@pytest.mark.parametrize(("fused", "stereo", "taken"), [(1.0, 2.0, "fused"), (2.0, 1.0, "stereo")])
+def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: float, taken: str) -> None:
+    clip, geometry = with_two_depths(fused, stereo)
+    chosen = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0)
+    assert chosen.by_stereo is None
+    assert chosen.details["depth"] == taken
+    scores = chosen.details["depth_trial_db"]
+    other = "fused" if taken == "stereo" else "stereo"
+    assert scores[taken] > scores[other] + OPTIONS.stereo_db
+    np.testing.assert_allclose(chosen.depth_m, standing_wall()[1].depth_m, rtol=1e-6)
+    assert (chosen.confidence == np.float32(0.9)).all() == (taken == "stereo")
+
+
+def test_without_a_clear_gain_or_a_second_depth_nothing_changes() -> None:
+    clip, geometry = with_two_depths(1.0, 1.0)
+    assert better_depth(clip, geometry, SeedOptions(), OPTIONS, 0).details["depth"] == "fused"
+    alone = replace(geometry, by_stereo=None)
+    assert better_depth(clip, alone, SeedOptions(), OPTIONS, 0).details == geometry.details

@@ -116,6 +116,20 @@ def test_a_user_that_stereo_sees_before_its_foot_moves() -> None:
     assert (flagged[list(scene.view.frames)] == scene.block[list(scene.view.frames)]).all()
 
 
+def test_a_parked_car_does_not_go_on_as_the_next_one_farther_away() -> None:
+    scene = Scene()
+    used = np.array(scene.view.frames)
+    half = FRAMES // 2
+    evidence = np.zeros(scene.block.shape, np.float32)
+    evidence[half:][scene.block[half:]] = 0.8
+    scene.depth_m[:half], scene.depth_m[half:] = 6.0, 24.0
+    flagged = scene.found(evidence)
+    assert not flagged[used[used < half]].any()
+    assert flagged[used[used >= half]].any(axis=(1, 2)).all()
+    scene.depth_m[half:] = 7.0
+    assert scene.found(evidence)[used].any(axis=(1, 2)).all()
+
+
 def test_stereo_contradicts_contact_where_it_is_sure_and_near() -> None:
     metres = np.array([[[20.0, 20.0, 20.0, 90.0]]], np.float32)
     stereo = np.array([[[10.0, 15.0, 10.0, 45.0]]], np.float32)
@@ -164,3 +178,20 @@ def test_nothing_goes_on_in_other_colours(repainted: bool) -> None:
     used = np.array(scene.view.frames)
     assert flagged[used[used < half]].any(axis=(1, 2)).all()
     assert flagged[used[used >= half]].any(axis=(1, 2)).all() != repainted
+
+
+def test_who_rides_moves_without_any_evidence() -> None:
+    scene = Scene()
+    row, column = np.argwhere(scene.block[0])[0].tolist()
+    instances = scene.look.instances.copy()
+    instances[:, row : row + 10, column : column + 20] = 2
+    wheel = replace(scene.look.road_users[0][0], kind=StreetClass.TWO_WHEELER)
+    wheel = replace(wheel, box_px=(column, row + 10, column + 20, row + 20))
+    rider = replace(wheel, kind=StreetClass.PERSON, box_px=(column, row, column + 20, row + 10))
+    scene.look = replace(scene.look, instances=instances, road_users=((wheel, rider),) * FRAMES)
+    nothing = np.zeros(scene.block.shape, np.float32)
+    used = list(scene.view.frames)
+    assert (scene.found(nothing)[used] == scene.block[used]).all()
+    afoot = replace(rider, kind=StreetClass.VEHICLE)
+    scene.look = replace(scene.look, road_users=((wheel, afoot),) * FRAMES)
+    assert not scene.found(nothing).any()

@@ -113,7 +113,7 @@ def _unbroken(
 
 def _rides(look: Look, ridden: Bool[np.ndarray, "f h w"], track: Sequence[Sighting]) -> bool:
     """Whether most sightings are of a two-wheeler and its rider."""
-    both = [ridden[seen.frame][look.instances[seen.frame] == seen.label].any() for seen in track]
+    both = [bool(ridden[seen.frame][look.instances[seen.frame] == seen.label].any()) for seen in track]
     return sum(both) > 0.5 * len(both)
 
 
