@@ -120,3 +120,30 @@ def test_with_given_depth_a_road_user_moves_as_a_whole():
     assert not (whole.moving[~street.box] >= FLAGGED).any()
     shown = parts.depth_m > 0
     np.testing.assert_array_equal(whole.depth_m[shown], parts.depth_m[shown])
+
+
+def test_depth_of_stereo_alone_stands_beside_depth_that_a_network_has_a_part_in(held):
+    zeros = np.zeros(held.box.shape, np.float32)
+    look = toy.replace(
+        small_look(len(held.clip)),
+        depth=np.full(held.box.shape, 3.0, np.float32),
+        spread=np.full(held.box.shape, 0.2, np.float16),
+        classes=np.full(held.box.shape, StreetClass.STRUCTURE, np.uint8),
+        confidence=np.ones(held.box.shape, np.float16),
+        instances=zeros.astype(np.uint16),
+        road_users=((),) * len(held.clip),
+    )
+    camera = held.clip.rig[0]
+    size = {"width_px": camera.width_px, "height_px": camera.height_px, "focal_px": camera.fx_px}
+    seen = toy.replace(look.camera, **size)
+    look = toy.replace(look, camera=seen, cameras=(seen,) * len(held.clip))
+    fused = densify(toy.replace(held.clip, looks=(look,)), held.posed)
+    stereo = densify(held.clip, held.posed)
+    assert stereo.by_stereo is None
+    assert fused.by_stereo is not None
+    depth_m, confidence = fused.by_stereo
+    still = (fused.moving < FLAGGED) & (stereo.moving < FLAGGED) & (stereo.depth_m > 0) & ~fused.sky
+    # Not to the last pixel: the sky that the sweep leaves out is the look's.
+    assert (np.abs(np.log(depth_m[still] / stereo.depth_m[still])) < 0.05).mean() > 0.8
+    assert (np.abs(confidence - stereo.confidence)[still] < 0.05).mean() > 0.8
+    assert (np.abs(np.log(fused.depth_m[still] / depth_m[still])) > 0.05).mean() > 0.02
