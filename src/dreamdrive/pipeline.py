@@ -24,7 +24,7 @@ from dreamdrive.decompose import (
     without_sky,
 )
 from dreamdrive.device import computing_on
-from dreamdrive.fit import Parts, StaticFit, better_depth, fit, fit_static, initialise, trial
+from dreamdrive.fit import Parts, StaticFit, Trial, better_depth, fit, fit_static, initialise, trial
 from dreamdrive.geometry import reconstruct
 from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, weights_of, with_looks
 from dreamdrive.motion import REPRESENTATIONS
@@ -158,13 +158,14 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     clip = with_looks(clip, looks)
     geometry = run(
         "geometry",
-        [o.geometry, BACKENDS.package(o.geometry.method), o.seeds, o.trial, o.seed],
+        [o.geometry, BACKENDS.package(o.geometry.method), o.seeds, o.trial, o.drift, o.seed],
         lambda work: better_depth(
             clip,
             reconstruct(clip, o.geometry, seed=seed["geometry"], work=work),
             o.seeds,
             o.trial,
             seed["static"],
+            partial(_stands, o),
         ),
         check=partial(check.geometry, clip),
         given=given.geometry,
@@ -275,12 +276,17 @@ def decompose(
     return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
 
 
+def _stands(options: Options, found: Trial) -> bool:
+    """Whether a street that stands predicts withheld frames."""
+    return stands(found.clip, found.frames, found.errors, found.judged, options.drift)
+
+
 def _drifting(
     clip: Clip, geometry: Geometry, seeds: Gaussians, labels: Grouping, options: Options
 ) -> Gaussians | None:
     """A street that drifts, beside what moves; None where one that stands predicts the frames."""
     found = trial(clip, geometry, options.seeds, options.trial, stage_seed(options.seed, "static"))
-    if found is None or stands(found.clip, found.frames, found.errors, found.judged, options.drift):
+    if found is None or _stands(options, found):
         return None
     filmed = without_sky(geometry, options.seeds.far_m)
     dense = replace(options.seeds, moving_stride_px=options.drift.spacing_px, sky_fringe_px=0)

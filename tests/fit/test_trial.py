@@ -52,7 +52,8 @@ def test_pictures_of_a_trial_are_small_and_what_moves_does_not_count() -> None:
     clip, geometry = standing_wall()
     moving = np.zeros_like(geometry.moving)
     moving[:, 40:] = 1
-    found = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, width_px=48), 0)
+    small = replace(OPTIONS, width_px=48, most_moving=1.0)
+    found = trial(clip, replace(geometry, moving=moving), SeedOptions(), small, 0)
     assert found is not None
     assert found.clip.size == (48, 32)
     assert found.errors.shape == found.judged.shape == (2, 32, 48)
@@ -77,7 +78,7 @@ def with_two_depths(first: float, second: float) -> tuple[Clip, Geometry]:
 @pytest.mark.parametrize(("fused", "stereo", "taken"), [(1.0, 2.0, "fused"), (2.0, 1.0, "stereo")])
 def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: float, taken: str) -> None:
     clip, geometry = with_two_depths(fused, stereo)
-    chosen = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0)
+    chosen = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
     assert chosen.by_stereo is None
     assert chosen.details["depth"] == taken
     scores = chosen.details["depth_trial_db"]
@@ -89,6 +90,28 @@ def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: 
 
 def test_without_a_clear_gain_or_a_second_depth_nothing_changes() -> None:
     clip, geometry = with_two_depths(1.0, 1.0)
-    assert better_depth(clip, geometry, SeedOptions(), OPTIONS, 0).details["depth"] == "fused"
+    found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
+    assert found.details["depth"] == "fused"
     alone = replace(geometry, by_stereo=None)
-    assert better_depth(clip, alone, SeedOptions(), OPTIONS, 0).details == geometry.details
+    assert (
+        better_depth(clip, alone, SeedOptions(), OPTIONS, 0, lambda found: True).details == geometry.details
+    )
+
+
+def test_where_no_street_stands_stereo_is_not_taken() -> None:
+    clip, geometry = with_two_depths(2.0, 1.0)
+    found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: False)
+    assert found.details["depth"] == "fused"
+    np.testing.assert_array_equal(found.depth_m, geometry.depth_m)
+
+
+def test_what_fills_much_of_the_pictures_counts_though_it_moves() -> None:
+    clip, geometry = standing_wall()
+    moving = np.zeros_like(geometry.moving)
+    moving[:, :, 80:] = 1
+    few = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, most_moving=0.2), 0)
+    many = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, most_moving=0.1), 0)
+    assert few is not None
+    assert many is not None
+    assert not few.judged[:, :, 81:].any()
+    assert many.judged.all()
