@@ -71,15 +71,16 @@ def with_two_depths(first: float, second: float) -> tuple[Clip, Geometry]:
     """The standing wall, at depths that are so many times the true one."""
     clip, geometry = standing_wall()
     depth_m = geometry.depth_m
-    by_stereo = (second * depth_m, np.full_like(depth_m, 0.9))
-    return clip, replace(geometry, depth_m=first * depth_m, by_stereo=by_stereo)
+    ratio, trust = np.full_like(depth_m, second / first), np.full_like(depth_m, 0.9)
+    return clip, replace(geometry, depth_m=first * depth_m, stereo_ratio=ratio, stereo_confidence=trust)
 
 
 @pytest.mark.parametrize(("fused", "stereo", "taken"), [(1.0, 2.0, "fused"), (2.0, 1.0, "stereo")])
 def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: float, taken: str) -> None:
     clip, geometry = with_two_depths(fused, stereo)
     chosen = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
-    assert chosen.by_stereo is None
+    assert chosen.stereo_ratio is None
+    assert chosen.stereo_confidence is None
     assert chosen.details["depth"] == taken
     scores = chosen.details["depth_trial_db"]
     other = "fused" if taken == "stereo" else "stereo"
@@ -92,7 +93,7 @@ def test_without_a_clear_gain_or_a_second_depth_nothing_changes() -> None:
     clip, geometry = with_two_depths(1.0, 1.0)
     found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
     assert found.details["depth"] == "fused"
-    alone = replace(geometry, by_stereo=None)
+    alone = replace(geometry, stereo_ratio=None)
     assert (
         better_depth(clip, alone, SeedOptions(), OPTIONS, 0, lambda found: True).details == geometry.details
     )

@@ -139,9 +139,10 @@ def test_depth_of_stereo_alone_stands_beside_depth_that_a_network_has_a_part_in(
     look = toy.replace(look, camera=seen, cameras=(seen,) * len(held.clip))
     fused = densify(toy.replace(held.clip, looks=(look,)), held.posed)
     stereo = densify(held.clip, held.posed)
-    assert stereo.by_stereo is None
-    assert fused.by_stereo is not None
-    depth_m, confidence = fused.by_stereo
+    assert stereo.stereo_ratio is None
+    assert fused.stereo_ratio is not None
+    assert fused.stereo_confidence is not None
+    depth_m, confidence = fused.stereo_ratio * fused.depth_m, fused.stereo_confidence
     still = (fused.moving < FLAGGED) & (stereo.moving < FLAGGED) & (stereo.depth_m > 0) & ~fused.sky
     # Not to the last pixel: the sky that the sweep leaves out is the look's.
     assert (np.abs(np.log(depth_m[still] / stereo.depth_m[still])) < 0.05).mean() > 0.8

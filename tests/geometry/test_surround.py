@@ -57,6 +57,25 @@ def test_what_is_fixed_to_a_camera_stays_with_it() -> None:
     assert found.detected == ("something", "camera 1: something")
 
 
+def test_depth_of_stereo_alone_is_that_of_each_camera() -> None:
+    method = Method()
+
+    def with_stereo(clip: Clip) -> Geometry:
+        found = method(clip)
+        camera = np.float32(len(method.asked))
+        ratio, trust = np.full_like(found.depth_m, camera), np.full_like(found.depth_m, 0.1 * camera)
+        return replace(found, stereo_ratio=ratio, stereo_confidence=trust)
+
+    clip = rig_clip()
+    found = reconstruct_cameras(clip, with_stereo)
+    assert found.stereo_ratio is not None
+    assert found.stereo_confidence is not None
+    for camera in range(len(MOUNTED)):
+        rows = clip.of_camera(camera)
+        assert (found.stereo_ratio[rows] == camera + 1).all()
+        assert (found.stereo_confidence[rows] == np.float32(0.1) * (camera + 1)).all()
+
+
 def test_known_poses_are_kept_in_metres() -> None:
     clip = rig_clip(poses=True)
     assert clip.known.world_from_camera is not None

@@ -78,11 +78,11 @@ def better_depth(
     Stereo takes its place only where the street then ``stands``: where no street explains the frames it is
     noise.
     """
-    fused = replace(geometry, by_stereo=None)
-    if geometry.by_stereo is None:
+    ratio, trust = geometry.stereo_ratio, geometry.stereo_confidence
+    fused = replace(geometry, stereo_ratio=None, stereo_confidence=None)
+    if ratio is None or trust is None:
         return fused
-    depth_m, confidence = geometry.by_stereo
-    stereo = replace(fused, depth_m=depth_m, confidence=confidence)
+    stereo = replace(fused, depth_m=ratio * geometry.depth_m, confidence=trust)
     first, second = (trial(clip, each, seeds, options, seed) for each in (fused, stereo))
     if first is None or second is None:
         return fused
@@ -99,7 +99,7 @@ def trial(
 ) -> Trial | None:
     """Fit a street that stands to most of the frames that may be seen, small and short; judge the others.
 
-    None where that leaves too few to fit.
+    None where that leaves too few to fit, or nothing to judge.
     """
     seen = np.flatnonzero(~clip.held_out)
     frames = tuple(seen[options.withheld // 2 :: options.withheld].tolist())
@@ -123,7 +123,7 @@ def trial(
             errors.append(np.abs(image.numpy() - small.frames[i] / np.float32(255)).mean(axis=2))
             free = small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0)
             judged.append(free & ~moves[i])
-    return Trial(small, frames, np.stack(errors), np.stack(judged))
+    return Trial(small, frames, np.stack(errors), np.stack(judged)) if np.any(judged) else None
 
 
 def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geometry]:
@@ -153,6 +153,5 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
     }
     regions = near(geometry.fixed_regions.astype(np.int32))
     cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
-    return small, replace(
-        geometry, cameras=cameras, fixed_regions=regions, spread=None, users=None, by_stereo=None, **maps
-    )
+    maps |= dict.fromkeys(("spread", "users", "stereo_ratio", "stereo_confidence"))
+    return small, replace(geometry, cameras=cameras, fixed_regions=regions, **maps)

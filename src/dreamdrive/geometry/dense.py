@@ -128,7 +128,7 @@ def densify(
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     geometry = _geometry(posed, view, (inverse, confidence), sky, moving, found and found.spread, users)
-    return geometry if alone is None else replace(geometry, by_stereo=_depth(view, *alone, sky))
+    return geometry if alone is None else _with_stereo_alone(geometry, *_depth(view, *alone, sky))
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -228,6 +228,16 @@ def _depth(
     shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
     depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
     return depth_m, np.where(shown, confidence, 0).astype(np.float32)
+
+
+def _with_stereo_alone(
+    geometry: Geometry, depth_m: Float[np.ndarray, "f h w"], confidence: Float[np.ndarray, "f h w"]
+) -> Geometry:
+    """The geometry with another depth beside its own: as a ratio, which holds in any unit."""
+    both = (geometry.depth_m > 0) & (depth_m > 0)
+    ratio = np.where(both, depth_m, 1) / np.where(both, geometry.depth_m, 1)
+    trust = np.where(both, confidence, geometry.confidence)
+    return replace(geometry, stereo_ratio=ratio, stereo_confidence=trust)
 
 
 def _geometry(

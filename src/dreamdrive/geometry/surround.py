@@ -131,7 +131,8 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
 def _maps_of(parts: dict[int, Geometry]) -> dict[str, dict[int, Any]]:
     """Maps of each camera by their names; road users of two cameras have no number in common."""
     found: dict[str, dict[int, Any]] = {}
-    for name in ("depth_m", "confidence", "sky", "moving", "spread", "users"):
+    always = ("depth_m", "confidence", "sky", "moving")
+    for name in (*always, "spread", "users", "stereo_ratio", "stereo_confidence"):
         maps = {camera: getattr(part, name) for camera, part in parts.items()}
         if all(each is not None for each in maps.values()):
             found[name] = maps

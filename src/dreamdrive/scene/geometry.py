@@ -92,8 +92,9 @@ class Geometry:
             none; None where nothing tells it.
         users: The road user that a pixel belongs to (F, H, W), one number over all frames in which it was
             followed, from 1; 0 where there is none. None where nobody looked for them.
-        by_stereo: Depth and trust by stereo alone of what does not move, each (F, H, W), where ``depth_m``
-            and ``confidence`` also hold what a network makes of the frames; None where there is one depth.
+        stereo_ratio: Depth by stereo alone over ``depth_m`` (F, H, W), 1 where stereo says nothing; None
+            where no network has a part in ``depth_m``, or stereo none.
+        stereo_confidence: Trust in that depth (F, H, W), as ``confidence``; None where there is none.
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
             camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
             clip's rig (K, H, W).
@@ -127,7 +128,8 @@ class Geometry:
     metres_per_unit: float | None = 1.0
     spread: Float[np.ndarray, "f h w"] | None = None
     users: UInt16[np.ndarray, "f h w"] | None = None
-    by_stereo: tuple[Float[np.ndarray, "f h w"], Float[np.ndarray, "f h w"]] | None = None
+    stereo_ratio: Float[np.ndarray, "f h w"] | None = None
+    stereo_confidence: Float[np.ndarray, "f h w"] | None = None
 
     @property
     def at_one_place(self) -> bool:
