@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, UInt16
 from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
     PAVED,
+    Fused,
     Tell,
     View,
     above_horizon,
@@ -41,6 +42,7 @@ from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.look import Look
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
 PASSES, LOOK_PASSES = 7, 6
@@ -113,22 +115,38 @@ def densify(
             nearer = too_near(found.inverse, inverse, confidence, options.users)
             moving, users = whole_users(view, look, flows, moving, nearer, found.inverse)
             still = moving < FLAGGED
-            standing = still & (users > 0)
-            found = shifted_users(view, look.instances, found, inverse, confidence, standing)
-            found = with_stereo(view, found, standing, inverse, confidence)
-            seen = settled_in_time(view, found.inverse, found.spread, still)
-            seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
-            taken = preferred(view, seen, inverse, confidence, still)
+            found = _settled(view, look, found, (inverse, confidence), still, still & (users > 0))
             if not rough:
-                matched = still & (inverse > 0)
-                alone = np.where(matched, inverse, taken), np.where(matched, confidence, found.confidence)
-            inverse, confidence = taken, found.confidence
+                alone = _over((inverse, confidence), (found.inverse, found.confidence), still)
+            inverse, confidence = found.inverse, found.confidence
         elif look is not None:
             moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
     geometry = _geometry(posed, view, (inverse, confidence), sky, moving, found and found.spread, users)
     return geometry if alone is None else _with_stereo_alone(geometry, *_depth(view, *alone, sky))
+
+
+def _settled(
+    view: View,
+    look: Look,
+    found: Fused,
+    stereo: DepthMaps,
+    still: Bool[np.ndarray, "f h w"],
+    standing: Bool[np.ndarray, "f h w"],
+) -> Fused:
+    """What was fused, after stereo and neighbouring frames had their say on what stands."""
+    found = shifted_users(view, look.instances, found, *stereo, standing)
+    found = with_stereo(view, found, standing, *stereo)
+    seen = settled_in_time(view, found.inverse, found.spread, still)
+    seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
+    return replace(found, inverse=preferred(view, seen, *stereo, still))
+
+
+def _over(first: DepthMaps, second: DepthMaps, where: Bool[np.ndarray, "f h w"]) -> DepthMaps:
+    """The first inverse depth and trust there, where it has any, else the second."""
+    there = where & (first[0] > 0)
+    return np.where(there, first[0], second[0]), np.where(there, first[1], second[1])
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
