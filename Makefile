@@ -13,7 +13,7 @@ PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
 PARALLEL ?= -n 2
 
 # Where the demo's results go, and what is reconstructed; nothing means the built-in street.
-OUT ?= out/demo
+OUT ?= $(if $(INPUT),out/clip,out/demo)
 INPUT ?=
 OPTIONS ?=
 
