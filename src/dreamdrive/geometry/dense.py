@@ -117,14 +117,14 @@ def densify(
             still = moving < FLAGGED
             found = _settled(view, look, found, (inverse, confidence), still, still & (users > 0))
             if not rough:
-                alone = _over((inverse, confidence), (found.inverse, found.confidence), still)
+                alone = np.where(still, inverse, 0), confidence
             inverse, confidence = found.inverse, found.confidence
         elif look is not None:
             moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    geometry = _geometry(posed, view, (inverse, confidence), sky, moving, found and found.spread, users)
-    return geometry if alone is None else _with_stereo_alone(geometry, *_depth(view, *alone, sky))
+    geometry = _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)
+    return geometry if alone is None else _with_stereo_alone(geometry, *alone)
 
 
 def _settled(
@@ -141,12 +141,6 @@ def _settled(
     seen = settled_in_time(view, found.inverse, found.spread, still)
     seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
     return replace(found, inverse=preferred(view, seen, *stereo, still))
-
-
-def _over(first: DepthMaps, second: DepthMaps, where: Bool[np.ndarray, "f h w"]) -> DepthMaps:
-    """The first inverse depth and trust there, where it has any, else the second."""
-    there = where & (first[0] > 0)
-    return np.where(there, first[0], second[0]), np.where(there, first[1], second[1])
 
 
 def _plane_and_backdrop(view: View) -> DepthMaps:
@@ -236,24 +230,12 @@ def upright_depth(
     return inverse
 
 
-def _depth(
-    view: View,
-    inverse: Float[np.ndarray, "f h w"],
-    confidence: Float[np.ndarray, "f h w"],
-    sky: Bool[np.ndarray, "f h w"],
-) -> DepthMaps:
-    """Depth in metres and trust in it, 0 in the sky and farther than 1 km."""
-    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
-    depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
-    return depth_m, np.where(shown, confidence, 0).astype(np.float32)
-
-
 def _with_stereo_alone(
-    geometry: Geometry, depth_m: Float[np.ndarray, "f h w"], confidence: Float[np.ndarray, "f h w"]
+    geometry: Geometry, inverse: Float[np.ndarray, "f h w"], confidence: Float[np.ndarray, "f h w"]
 ) -> Geometry:
-    """The geometry with another depth beside its own: as a ratio, which holds in any unit."""
-    both = (geometry.depth_m > 0) & (depth_m > 0)
-    ratio = np.where(both, depth_m, 1) / np.where(both, geometry.depth_m, 1)
+    """The geometry with another inverse depth beside its own: as a ratio, which holds in any unit."""
+    both = (geometry.depth_m > 0) & (inverse > _FAR_INVERSE)
+    ratio = 1 / np.where(both, geometry.depth_m * inverse, 1)
     trust = np.where(both, confidence, geometry.confidence)
     return replace(geometry, stereo_ratio=ratio, stereo_confidence=trust)
 
@@ -261,15 +243,17 @@ def _with_stereo_alone(
 def _geometry(
     posed: Posed,
     view: View,
-    found: DepthMaps,
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"] | None,
     users: UInt16[np.ndarray, "f h w"] | None,
 ) -> Geometry:
     """What both halves found, as the next stages take it."""
-    depth_m, confidence = _depth(view, *found, sky)
-    shown = depth_m > 0
+    shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
+    depth_m = np.where(shown, 1 / np.maximum(inverse, _FAR_INVERSE), 0).astype(np.float32)
+    confidence = np.where(shown, confidence, 0).astype(np.float32)
     sky = sky & view.usable
     moving = np.where(view.usable, moving, 0).astype(np.float32)
     shares = {

@@ -131,8 +131,8 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
 def _maps_of(parts: dict[int, Geometry]) -> dict[str, dict[int, Any]]:
     """Maps of each camera by their names; road users of two cameras have no number in common."""
     found: dict[str, dict[int, Any]] = {}
-    always = ("depth_m", "confidence", "sky", "moving")
-    for name in (*always, "spread", "users", "stereo_ratio", "stereo_confidence"):
+    kinds = "depth_m", "confidence", "sky", "moving", "spread", "users", "stereo_ratio", "stereo_confidence"
+    for name in kinds:
         maps = {camera: getattr(part, name) for camera, part in parts.items()}
         if all(each is not None for each in maps.values()):
             found[name] = maps
