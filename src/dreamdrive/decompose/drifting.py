@@ -38,7 +38,8 @@ class DriftOptions:
         spacing_px: Distance between seeds.
         footprint: Standard deviation of a seed over their distance.
         opacity: Opacity to start from.
-        steps: Steps of the joint fit, for one of a street that stands: it sees the frames between as well.
+        steps: Steps of the joint fit, for one of a street that stands: it sees the frames between as well. On
+            a motorway and in a winter street 1.35 lose 0.3 and 0.5 dB, and 2.7 win another 0.1.
         margin_db: How far, in dB of PSNR, a small fit of a street that stands may fall behind the frames
             beside each frame: a whole fit is better by about as much, and from aside one street shows best.
         finest_db: PSNR to which a street of single frames can be fitted to pictures at best.
@@ -49,7 +50,7 @@ class DriftOptions:
     spacing_px: int = 3
     footprint: float = 0.5
     opacity: float = 0.8
-    steps: float = 1.35
+    steps: float = 2.0
     margin_db: float = 1.2
     finest_db: float = 34.0
 

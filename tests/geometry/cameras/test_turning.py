@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.geometry.cameras.turning import turned
+from dreamdrive.geometry.cameras.turning import shaken, turned
 from dreamdrive.scene.camera import Camera
 
 WIDTH, HEIGHT = 320, 180
@@ -56,3 +56,30 @@ def test_a_frame_that_shows_nothing_keeps_the_pose_before(usable: bool) -> None:
     poses = turned(frames, street, CAMERA)
     np.testing.assert_array_equal(poses[2], poses[1])
     assert bool(np.array_equal(poses[1], np.eye(4))) is not usable
+
+
+def test_turns_to_and_fro_are_seen_beside_a_steady_one() -> None:
+    rng, count = np.random.default_rng(1), 12
+    shakes = [Rotation.from_rotvec(np.radians(rng.normal(0, 0.15, 3))) for _ in range(count)]
+    steady = [Rotation.from_rotvec(np.radians([0.0, 0.3 * k, 0.0])) for k in range(count)]
+    frames = np.stack(
+        [seen(texture(), there * shake) for there, shake in zip(steady, shakes, strict=True)]
+    )
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, :3] = np.stack([each.as_matrix() for each in steady])
+    found = shaken(poses, frames, np.ones(frames.shape, bool), CAMERA)
+    true = np.stack([shake.as_rotvec() for shake in shakes])
+    off = Rotation.from_matrix(poses[:, :3, :3]).inv() * Rotation.from_matrix(found[:, :3, :3])
+    left = off.as_rotvec() - true
+    between = slice(1, -1)
+    curved = (left[between] - (left[:-2] + left[2:]) / 2) * CAMERA.fx_px
+    assert np.abs(true * CAMERA.fx_px).max() > 1
+    assert np.sqrt(np.square(curved).mean()) < 0.1
+
+
+def test_too_few_frames_or_corners_show_no_shaking() -> None:
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    blank = np.full((4, HEIGHT, WIDTH), 128, np.uint8)
+    for count in (1, 2, 4):
+        found = shaken(poses[:count], blank[:count], np.ones((count, HEIGHT, WIDTH), bool), CAMERA)
+        np.testing.assert_array_equal(found, poses[:count])

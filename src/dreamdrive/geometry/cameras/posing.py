@@ -205,7 +205,9 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
     poses = path.world_from_camera
     if clip.look is not None:
         poses = odometry.levelled(poses, metric.ground.normal_world)
-    poses, _ = rebase(odometry.steadied(poses, clip.times_s), np.zeros((0, 3)))
+    poses = odometry.steadied(poses, clip.times_s)
+    poses = turning.shaken(poses, evidence.grey, evidence.street, evidence.small)
+    poses, _ = rebase(poses, np.zeros((0, 3)))
     reason = "structure from motion was refused: " + "; ".join(outcome.reasons)
     notes = [reason, "the path comes from frame-to-frame odometry and is rough", *metric.notes]
     if not path.measured:
