@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 
 Features = dict[str, Float[np.ndarray, "n d"]]
 """Of each network and view, by ``NETWORK/VIEW``."""

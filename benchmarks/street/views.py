@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 from dreamdrive.run.stages import digest
 from dreamdrive.scene.camera import Camera
 from dreamdrive.world import Drive, WorldBox

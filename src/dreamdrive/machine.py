@@ -1,10 +1,19 @@
-"""What this machine offers: cores and memory."""
+"""What this machine offers: cores, memory, and processes that work beside this one."""
 
 import os
+import signal
+import threading
+from collections.abc import Generator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import torch
+
+_LOOKS_S = 0.5
 
 
 def available_cores() -> int:
@@ -26,3 +35,38 @@ def free_bytes(device: "torch.device | None" = None) -> int | None:
         return int(lines["MemAvailable"].split()[0]) * 1024
     except (OSError, KeyError, ValueError):
         return None
+
+
+@contextmanager
+def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
+    """So many processes with a thread each.
+
+    They end at once where the work fails or is stopped, or where this process is killed; what they write has
+    to appear whole or not at all.
+    """
+    context = get_context("spawn")
+    stopped = context.Event()
+    pool = ProcessPoolExecutor(count, context, _begin, (os.getpid(), stopped))
+    try:
+        yield pool
+    except BaseException:
+        stopped.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin(parent: int, stopped: Event) -> None:
+    """What a worker does first."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    # Ctrl-C reaches all processes of a terminal; the one that was started decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_watch, args=(parent, stopped), daemon=True).start()
+
+
+def _watch(parent: int, stopped: Event) -> None:
+    while os.getppid() == parent and not stopped.wait(_LOOKS_S):
+        pass
+    os._exit(1)

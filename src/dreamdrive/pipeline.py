@@ -25,7 +25,7 @@ from dreamdrive.decompose import (
 )
 from dreamdrive.device import computing_on
 from dreamdrive.fit import Parts, StaticFit, Trial, better_depth, fit, fit_static, initialise, trial
-from dreamdrive.geometry import reconstruct
+from dreamdrive.geometry import calmed, reconstruct
 from dreamdrive.knowledge import NO_KNOWLEDGE, look_at, weights_of, with_looks
 from dreamdrive.motion import REPRESENTATIONS
 from dreamdrive.options import Options
@@ -159,13 +159,8 @@ def build_scene(clip: Clip, options: Options, *, given: Given = Given(), run: Ru
     geometry = run(
         "geometry",
         [o.geometry, BACKENDS.package(o.geometry.method), o.seeds, o.trial, o.drift, o.seed],
-        lambda work: better_depth(
-            clip,
-            reconstruct(clip, o.geometry, seed=seed["geometry"], work=work),
-            o.seeds,
-            o.trial,
-            seed["static"],
-            partial(_stands, o),
+        lambda work: _as_frames_say(
+            clip, reconstruct(clip, o.geometry, seed=seed["geometry"], work=work), o, seed["static"]
         ),
         check=partial(check.geometry, clip),
         given=given.geometry,
@@ -265,15 +260,29 @@ def decompose(
         )
     else:
         run("group", o.group, lambda _: labels, given=labels)
-    # Frames that were drawn from their depth show a street that stands, whatever the fit makes of it.
-    may_drift = o.drift.allowed and not (clip.known.generated and clip.known.depth_m is not None)
-    street = _drifting(clip, geometry, seeds, labels, o) if may_drift else None
+    street = _drifting(clip, geometry, seeds, labels, o) if _may_drift(clip, o) else None
     if street is not None and geometry.fallback is not None:
         # Where the path is a guess, so are the ways of things on it: all moves as the picture does.
         return Parts(street, seeds.select(nothing), None, ())
     standing = fitted.select(labels.static) if street is None else street
     moving = given.tracks or cast(clip, geometry, seeds, labels, o.cast, o.seeds.reach_px)
     return Parts(standing, moving.gaussians, moving.tracks, moving.actors)
+
+
+def _as_frames_say(clip: Clip, geometry: Geometry, options: Options, seed: int) -> Geometry:
+    """The geometry with the better of two depths; on a calm path where no street stands on the one found."""
+    o = options
+    chosen, found = better_depth(clip, geometry, o.seeds, o.trial, seed, partial(_stands, o))
+    sure = chosen.fallback is not None or clip.known.world_from_camera is not None or len(clip.rig) > 1
+    if sure or not _may_drift(clip, o):
+        return chosen
+    found = found or trial(clip, chosen, o.seeds, o.trial, seed)
+    return chosen if found is None or _stands(o, found) else calmed(clip, chosen)
+
+
+def _may_drift(clip: Clip, options: Options) -> bool:
+    """Not where frames were drawn from their depth: they show a street that stands, whatever the fit says."""
+    return options.drift.allowed and not (clip.known.generated and clip.known.depth_m is not None)
 
 
 def _stands(options: Options, found: Trial) -> bool:

@@ -30,7 +30,7 @@ def test_a_car_brakes_before_a_wall(run: Run, tmp_path: Path) -> None:
     assert result.code == 0, result
     assert "was in the way" in result.out
     folder = out / "video" / "plan_current"
-    assert sorted(file.name for file in folder.iterdir()) == NAMES
+    assert sorted(file.name for file in folder.glob("[!.]*")) == NAMES
     found = json.loads((folder / "plan.json").read_text())
     assert found["changed"]
     assert found["clear_before_m"] < 0 < found["clear_after_m"]

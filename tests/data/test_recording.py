@@ -41,7 +41,7 @@ def clip() -> Clip:
 def test_replay_takes_up_what_was_written(clip: Clip, tmp_path: Path) -> None:
     write_recording(clip, tmp_path / "made", {"prior": "street-world"})
     made = tmp_path / "made"
-    names = {path.name for path in made.iterdir()}
+    names = {path.name for path in made.glob("[!.]*")}
     assert names == {
         *("frames", "video.mp4", "intrinsics.json", "poses.json", "requested.json"),
         *("features.safetensors", "provenance.json"),
@@ -87,7 +87,7 @@ def test_what_holds_no_picture_stays_so(clip: Clip, tmp_path: Path) -> None:
 def test_only_what_is_known_is_written(clip: Clip, tmp_path: Path) -> None:
     known = replace(clip.known, intrinsics=False, metric=False)
     write_recording(replace(clip, known=known, requested=None, features={}), tmp_path / "made", {})
-    names = {path.name for path in (tmp_path / "made").iterdir()}
+    names = {path.name for path in (tmp_path / "made").glob("[!.]*")}
     assert names == {"frames", "video.mp4", "provenance.json"}
 
 
@@ -106,7 +106,7 @@ def test_other_folders_are_left_alone(clip: Clip, tmp_path: Path) -> None:
 def test_several_cameras_are_taken_up_as_a_rig(tmp_path: Path) -> None:
     clip, made = rig_clip(poses=True), tmp_path / "made"
     write_recording(clip, made, {})
-    assert {path.name for path in made.iterdir()} == {
+    assert {path.name for path in made.glob("[!.]*")} == {
         *("camera0", "camera1", "rig.json", "poses.json", "video.mp4", "provenance.json"),
     }
     size = clip.size

@@ -144,7 +144,7 @@ def test_lidar_points_lie_where_depth_says(drawn: Sequence) -> None:
 
 def test_the_same_bytes_again(street: Path, tmp_path: Path) -> None:
     world_to_ncore(drives(), tmp_path / "street")
-    names = sorted(each.name for each in street.iterdir())
+    names = sorted(each.name for each in street.glob("[!.]*"))
     archives = ("", "-CAM_FRONT", "-CAM_FRONT_LEFT", "-LIDAR_TOP")
     assert names == sorted(["sequence.json", *(f"street.ncore4{each}.zarr.itar" for each in archives)])
     assert all((tmp_path / "street" / name).read_bytes() == (street / name).read_bytes() for name in names)
@@ -154,7 +154,7 @@ def test_a_sequence_is_replaced_only_where_that_is_asked_for(street: Path) -> No
     with pytest.raises(InputError, match="exists already"):
         world_to_ncore(drives(), street)
     world_to_ncore(drives(), street, replace=True)
-    assert len(list(street.iterdir())) == 5
+    assert len(list(street.glob("[!.]*"))) == 5
 
 
 def test_poses_and_pixels_are_those_of_the_scene(scene: Scene, made: Sequence) -> None:

@@ -78,7 +78,9 @@ def with_two_depths(first: float, second: float) -> tuple[Clip, Geometry]:
 @pytest.mark.parametrize(("fused", "stereo", "taken"), [(1.0, 2.0, "fused"), (2.0, 1.0, "stereo")])
 def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: float, taken: str) -> None:
     clip, geometry = with_two_depths(fused, stereo)
-    chosen = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
+    chosen, found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
+    assert found is not None
+    assert found.psnr_db >= max(chosen.details["depth_trial_db"].values()) - 0.01
     assert chosen.stereo_ratio is None
     assert chosen.stereo_confidence is None
     assert chosen.details["depth"] == taken
@@ -91,17 +93,18 @@ def test_the_depth_that_predicts_withheld_frames_is_taken(fused: float, stereo: 
 
 def test_without_a_clear_gain_or_a_second_depth_nothing_changes() -> None:
     clip, geometry = with_two_depths(1.0, 1.0)
-    found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
+    found, tried = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: True)
+    assert tried is not None
     assert found.details["depth"] == "fused"
     alone = replace(geometry, stereo_ratio=None)
-    assert (
-        better_depth(clip, alone, SeedOptions(), OPTIONS, 0, lambda found: True).details == geometry.details
-    )
+    same, untried = better_depth(clip, alone, SeedOptions(), OPTIONS, 0, lambda found: True)
+    assert same.details == geometry.details
+    assert untried is None
 
 
 def test_where_no_street_stands_stereo_is_not_taken() -> None:
     clip, geometry = with_two_depths(2.0, 1.0)
-    found = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: False)
+    found, _ = better_depth(clip, geometry, SeedOptions(), OPTIONS, 0, lambda found: False)
     assert found.details["depth"] == "fused"
     np.testing.assert_array_equal(found.depth_m, geometry.depth_m)
 

@@ -1,5 +1,6 @@
 """The scene folder: round trip, equal bytes, refusal of what is damaged, nothing lost on failure."""
 
+import hashlib
 import json
 import os
 from dataclasses import replace
@@ -13,13 +14,14 @@ from tests.scene.scenes import drifting_scene, make_baseline, make_scene
 from tests.stored.test_hostile_folder import change
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.output import MARK
 from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.scene import Provenance
 from dreamdrive.stored import load_scene, save_scene
 
 
 def contents(path: Path) -> dict[str, bytes]:
-    return {p.name: p.read_bytes() for p in sorted(path.iterdir())}
+    return {p.name: p.read_bytes() for p in sorted(path.iterdir()) if p.name != MARK}
 
 
 @pytest.mark.parametrize(("dynamic", "full"), [(4, True), (0, True), (0, False)])
@@ -178,7 +180,7 @@ def test_a_failing_rename_puts_the_old_scene_back(tmp_path: Path, monkeypatch: p
     replace = os.replace
 
     def failing(source: Path, target: Path) -> None:
-        if Path(source).name == ".s.partial":
+        if Path(source).name == "new":
             raise OSError(5, "Input/output error")
         replace(source, target)
 
@@ -191,7 +193,10 @@ def test_a_failing_rename_puts_the_old_scene_back(tmp_path: Path, monkeypatch: p
 def test_a_kill_between_the_renames_is_repaired(tmp_path: Path) -> None:
     save_scene(make_scene(), tmp_path / "s")
     before = contents(tmp_path / "s")
-    os.replace(tmp_path / "s", tmp_path / ".s.retired")
+    key = hashlib.sha256(b"s").hexdigest()[:12]
+    aside = tmp_path / f".dreamdrive-{key}-0123456789abcdef"
+    aside.mkdir()
+    os.replace(tmp_path / "s", aside / "retired")
     with pytest.raises(InputError, match="exists already"):
         save_scene(make_scene(full=False), tmp_path / "s")
     assert contents(tmp_path / "s") == before

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from dreamdrive.files.atomic import remove
+from dreamdrive.files.output import remove
 from dreamdrive.files.paths import inside
 
 

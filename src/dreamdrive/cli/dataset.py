@@ -61,10 +61,10 @@ def make(
         force: Replace a set that is there already.
     """
     use_all_cores()
-    from dreamdrive.files.atomic import check_free
-    from dreamdrive.perception import MANIFEST, PathOptions, write_bev_set
+    from dreamdrive.files.output import check_free
+    from dreamdrive.perception import KIND, PathOptions, write_bev_set
 
-    check_free(out, force, MANIFEST)
+    check_free(out, force, KIND)
     image, grid = _sizes(size, cells)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     made = _Maker(image, grid, PathOptions(aside_m=aside, turned_deg=turned), per_scene, seed)

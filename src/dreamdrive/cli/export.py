@@ -37,7 +37,7 @@ def export(
         output: For ply NAME.ply for everything at the first recorded time; else a folder for static.ply and,
             with everything at each recorded time, frames/NNNN.ply. For nuscenes and ncore a folder, for mcap
             NAME.mcap.
-        force: Replace a data set, sequence or recording that is there already.
+        force: Replace what is there already, if dreamdrive wrote it.
     """
     console = Console(highlight=False, markup=False, soft_wrap=True)
     if to == "nuscenes":
@@ -50,21 +50,22 @@ def export(
         said = _export_mcap(out, output, force)
         console.print(f"{output}\n{said}")
     else:
-        from dreamdrive.export import export_ply, left_out_of_ply
+        from dreamdrive.export import check_ply, export_ply, left_out_of_ply
 
+        check_ply(output, force)
         scene = open_scene(out)
-        export_ply(scene, output)
+        export_ply(scene, output, replace=force)
         console.print(str(output))
         console.print(left_out_of_ply(scene, output))
 
 
 def _export_nuscenes(out: Path, output: Path, force: bool) -> None:
-    from dreamdrive.data.nuscenes import MARK
+    from dreamdrive.data.nuscenes import KIND
     from dreamdrive.export import export_scene, export_world
-    from dreamdrive.files.atomic import check_free
+    from dreamdrive.files.output import check_free
     from dreamdrive.world import is_world, read_drives
 
-    check_free(output, force, MARK)
+    check_free(output, force, KIND)
     with Bars(Console()) as bars:
         said = partial(bars, "nuscenes")
         if is_world(out):
@@ -75,12 +76,12 @@ def _export_nuscenes(out: Path, output: Path, force: bool) -> None:
 
 def _export_ncore(out: Path, output: Path, force: bool) -> str:
     """Write it, and say what its pictures are."""
-    from dreamdrive.export import NCORE_MARK, need_ncore, scene_to_ncore, world_to_ncore
-    from dreamdrive.files.atomic import check_free
+    from dreamdrive.export import NCORE_KIND, need_ncore, scene_to_ncore, world_to_ncore
+    from dreamdrive.files.output import check_free
     from dreamdrive.world import is_world, read_drives
 
     need_ncore()
-    check_free(output, force, NCORE_MARK)
+    check_free(output, force, NCORE_KIND)
     with Bars(Console()) as bars:
         said = partial(bars, "ncore")
         if is_world(out):

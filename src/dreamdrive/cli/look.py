@@ -61,13 +61,13 @@ def look(
         force: Replace what is there already from an earlier look.
     """
     use_all_cores()
-    from dreamdrive.files.atomic import check_free
-    from dreamdrive.knowledge import MARK, load_knowledge, write_look
+    from dreamdrive.files.output import check_free
+    from dreamdrive.knowledge import KIND, load_knowledge, write_look
     from dreamdrive.knowledge import look as see
     from dreamdrive.show import draw_look
 
     stop_like_an_interruption()
-    check_free(out, force, MARK)
+    check_free(out, force, KIND)
     network = load_knowledge(knowledge)
     given = _read(input, frames, None if size is None else parse_size(size), intrinsics, hfov)
     _check_memory(given)

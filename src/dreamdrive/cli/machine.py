@@ -21,20 +21,26 @@ def use_all_cores() -> None:
     set_threads(available_cores())
 
 
+_ENDS = (signal.SIGTERM, signal.SIGHUP)
+
+
 class Terminated(KeyboardInterrupt):
     """Asked to terminate (SIGTERM), which ends the work as Ctrl-C does."""
 
 
 def stop_like_an_interruption() -> None:
-    """Let a request to terminate end the work as Ctrl-C does.
+    """Let a request to terminate, or a terminal that goes away, end the work as Ctrl-C does.
 
-    To be called after pycolmap is imported: it installs a handler that prints the stack and dies.
+    To be called again after pycolmap is imported: it installs a handler that prints the stack and dies.
     """
 
     def stop(number: int, frame: FrameType | None) -> None:
         raise Terminated
 
-    signal.signal(signal.SIGTERM, stop)
+    for number in _ENDS:
+        # Under nohup the terminal may go away.
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, stop)
 
 
 class Stop:
@@ -55,14 +61,14 @@ class Stop:
 
     def end(self) -> None:
         """End the command as its signal would have."""
-        raise Terminated if self._signal == signal.SIGTERM else KeyboardInterrupt
+        raise Terminated if self._signal in _ENDS else KeyboardInterrupt
 
 
 @contextmanager
 def asked_to_stop() -> Generator[Stop, None, None]:
     """Take Ctrl-C and requests to terminate as requests to stop at the next safe point."""
     stop = Stop()
-    before = {number: signal.signal(number, stop.ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, stop.ask) for number in (signal.SIGINT, *_ENDS)}
     try:
         yield stop
     finally:

@@ -18,7 +18,7 @@ from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
 from dreamdrive.cli.look import look
-from dreamdrive.cli.machine import Terminated
+from dreamdrive.cli.machine import Terminated, stop_like_an_interruption
 from dreamdrive.cli.plan import plan
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
@@ -59,6 +59,7 @@ def main() -> None:
 
     Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted, 143 terminated.
     """
+    stop_like_an_interruption()
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     if sys.argv[1:] == ["--version"]:
         Console(highlight=False).print(f"dreamdrive {dreamdrive.__version__}")

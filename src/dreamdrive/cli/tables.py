@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 
 _UNLIMITED = 1000
 """Characters that no table is wide."""

@@ -48,6 +48,7 @@ def street(
     from dreamdrive.device import computing_on
     from dreamdrive.knowledge.training import WEIGHTS, LoaderOptions, StreetTraining, TrainingOptions
     from dreamdrive.knowledge.training import train_street as run
+    from dreamdrive.run import only_run
 
     if not data:
         raise InputError("--data is missing; expected a folder with records.jsonl")
@@ -59,7 +60,7 @@ def street(
     options = TrainingOptions(steps=steps, seed=seed, rate=rate, loader=LoaderOptions(batch=batch))
     training = StreetTraining(data, out, options, validate, _weights(mix), encoder, init, licence)
     console = Console(highlight=False)
-    with computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
+    with only_run(out), computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
         figures = run(
             training, device=where, stop=stop, progress=lambda done, total: bars("street", done, total)
         )
@@ -122,6 +123,7 @@ def photo(
         make_pairs,
         train_photo,
     )
+    from dreamdrive.run import only_run
 
     if min(steps, batch, each) < 1 or seed < 0 or not 0 < rate < 1:
         raise InputError(
@@ -137,7 +139,7 @@ def photo(
         )
     options = PhotoTraining(steps=steps, seed=seed, rate=rate, batch=batch)
     console = Console(highlight=False)
-    with asked_to_stop() as stop, Bars(console) as bars:
+    with only_run(out), asked_to_stop() as stop, Bars(console) as bars:
         pairs = make_pairs(
             found,
             range(FIRST_SEED, FIRST_SEED + streets),
@@ -145,18 +147,23 @@ def photo(
             knowledge,
             PairOptions(each=each),
             processes=available_cores(),
+            stop=stop,
             progress=lambda done, total: bars("pairs", done, total),
         )
-        weights = train_photo(
-            pairs,
-            out,
-            knowledge,
-            options,
-            licence=licence,
-            stop=stop,
-            progress=lambda done, total, _: bars("photo", done, total),
+        weights = (
+            None
+            if pairs is None
+            else train_photo(
+                pairs,
+                out,
+                knowledge,
+                options,
+                licence=licence,
+                stop=stop,
+                progress=lambda done, total, _: bars("photo", done, total),
+            )
         )
-    if weights is None:
+    if weights is None or pairs is None:
         stop.end()
         return
     console.print(f"{weights}: {steps} steps on {len(pairs)} pairs", soft_wrap=True, markup=False)

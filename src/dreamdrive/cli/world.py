@@ -52,10 +52,10 @@ def make(
     """
     use_all_cores()
     from dreamdrive.data.layout_file import read_layout
-    from dreamdrive.files.atomic import check_free
+    from dreamdrive.files.output import check_free
     from dreamdrive.machine import free_bytes
     from dreamdrive.world import (
-        MARK,
+        KIND,
         MOUNTS,
         StreetOptions,
         World,
@@ -67,7 +67,7 @@ def make(
 
     wanted = parse_size(size)
     _check_numbers(frames, fps, seed, wanted)
-    check_free(out, force, MARK)
+    check_free(out, force, KIND)
     count = frames * (len(MOUNTS) if cameras == "surround" else 1)
     _check_memory(count, wanted, free_bytes())
     drawn = StreetOptions(frames / fps, edition=edition)

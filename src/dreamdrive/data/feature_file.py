@@ -19,8 +19,8 @@ from safetensors.numpy import save
 from dreamdrive.data.lens import Lens
 from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
 from dreamdrive.files.json_file import parse_json
+from dreamdrive.files.output import new_file
 from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
 
 MAX_CHANNELS = 128

@@ -7,8 +7,8 @@ import msgspec
 import shapely
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
 from dreamdrive.files.json_file import of_type, read_json
+from dreamdrive.files.output import new_file
 from dreamdrive.scene.layout import Layout, Ring
 
 MOST_BOXES = 255

@@ -71,9 +71,18 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     return _upright(np.asarray(picture), header.orientation)
 
 
-def write_picture(path: Path, picture: Shaped[np.ndarray, "h w *c"]) -> None:
-    """Write a PNG of what ``read_picture`` gives."""
-    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+def write_picture(
+    path: Path, picture: Shaped[np.ndarray, "h w *c"], *, quality: int = 95, compression: int | None = None
+) -> None:
+    """Write a PNG or JPEG, as the name ends, of what ``read_picture`` gives; ``OSError`` where it cannot be.
+
+    ``quality`` is that of a JPEG, ``compression`` that of a PNG, from 0 to 9. OpenCV's own writer tells
+    nobody that a disk is full.
+    """
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality]
+    if path.suffix.lower() == ".png":
+        options = [] if compression is None else [cv2.IMWRITE_PNG_COMPRESSION, compression]
+    path.write_bytes(cv2.imencode(path.suffix, np.ascontiguousarray(picture), options)[1].tobytes())
 
 
 def _check(header: Header, data: bytes, where: str) -> None:

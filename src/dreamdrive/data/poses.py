@@ -18,8 +18,8 @@ from dreamdrive.data.formats.pose_lists import (
 )
 from dreamdrive.data.formats.rigid import PoseRows
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
 from dreamdrive.files.json_file import read_json
+from dreamdrive.files.output import new_file
 from dreamdrive.files.paths import read_text
 from dreamdrive.scene.trajectory import Trajectory
 

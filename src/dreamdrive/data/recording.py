@@ -23,12 +23,13 @@ from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.poses import write_trajectory
 from dreamdrive.data.rig import write_rig
 from dreamdrive.data.video_writer import write_video
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import write_json
+from dreamdrive.files.output import new_folder
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.trajectory import Trajectory
 
 ABOUT = "provenance.json"
+KIND = "recording"
 """By this file a folder of this kind is known."""
 _INTRINSICS = "intrinsics.json"
 
@@ -52,7 +53,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
         "log": None if clip.log is None else asdict(clip.log),
         "provenance": clip.provenance,
     }
-    with new_folder(folder, replace=replace, mark=ABOUT) as made:
+    with new_folder(folder, replace=replace, kind=KIND) as made:
         if len(clip.rig) == 1:
             _write_camera(clip, made)
         else:

@@ -12,7 +12,7 @@ from av.video.reformatter import Colorspace
 from jaxtyping import Float, UInt8
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 
 Frame = UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"]
 

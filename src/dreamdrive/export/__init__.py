@@ -11,10 +11,10 @@ from dreamdrive.export.mcap_words import RecordedBox
 from dreamdrive.export.mcap_writer import DriveRecording, check_mcap, ground_pose
 from dreamdrive.export.ncore import scene_to_ncore, world_to_ncore
 from dreamdrive.export.ncore_words import need_ncore
-from dreamdrive.export.ncore_writer import MARK as NCORE_MARK
+from dreamdrive.export.ncore_writer import KIND as NCORE_KIND
 from dreamdrive.export.ncore_writer import write_ncore
 from dreamdrive.export.nuscenes import export_scene, export_world
-from dreamdrive.export.ply import export_ply, left_out_of_ply, write_ply
+from dreamdrive.export.ply import check_ply, export_ply, left_out_of_ply, write_ply
 from dreamdrive.scene.scene import Scene
 
 KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {

@@ -4,12 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.data.nuscenes import write_points
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
+from dreamdrive.files.output import plain_name
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, box_corners
@@ -122,9 +123,9 @@ def _key_steps(times_s: Float[np.ndarray, " t"]) -> list[int]:
 
 
 def _write_picture(folder: Path, camera: str, step: int, picture: UInt8[np.ndarray, "h w 3"]) -> Path:
-    place = folder / "pictures" / camera / f"{step:06d}.jpg"
+    place = folder / "pictures" / plain_name(camera) / f"{step:06d}.jpg"
     place.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(place), picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG])
+    write_picture(place, picture[..., ::-1], quality=_JPEG)
     return place
 
 

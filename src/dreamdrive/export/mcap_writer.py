@@ -31,7 +31,7 @@ from dreamdrive.export.mcap_words import (
     number_topic,
     transforms_of,
 )
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import check_new_file, new_file
 from dreamdrive.scene.camera import Camera, check_rigid
 from dreamdrive.world import upright
 
@@ -50,12 +50,7 @@ def check_mcap(file: Path, replace: bool) -> None:
     """
     if file.suffix.lower() != SUFFIX:
         raise InputError(f"{file}: expected a name that ends in {SUFFIX}, such as {file.stem}{SUFFIX}")
-    if file.is_dir():
-        raise InputError(f"{file} is a folder, expected a file or a new name; choose another place")
-    if file.exists() and not replace:
-        raise InputError(
-            f"{file} exists already; choose another place or ask for it to be replaced (--force)"
-        )
+    check_new_file(file, replace)
 
 
 def ground_pose(x_m: float, y_m: float, yaw_rad: float, up_m: float = 0.0) -> Float[np.ndarray, "4 4"]:

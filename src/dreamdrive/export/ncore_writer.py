@@ -6,6 +6,7 @@ they are, each as taken at one moment by a pinhole. NCore counts pixels as we do
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace as replace_fields
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,12 +18,13 @@ from dreamdrive.data.lidar_file import read_points
 from dreamdrive.errors import InputError
 from dreamdrive.export.log_parts import path_of, picture_of, stamps
 from dreamdrive.export.ncore_words import RIG, WORLD, Origin, cuboids_of, model_of, need_ncore, rigid
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import write_json
+from dreamdrive.files.output import new_folder, plain_name
 from dreamdrive.scene.log import LidarSweep, Log, LogCamera
 from dreamdrive.scene.trajectory import Trajectory
 
 MARK = "sequence.json"
+KIND = "NCore sequence"
 """By this file a folder that was written here is known."""
 LIDAR = "LIDAR_TOP"
 HIDDEN = "ego"
@@ -64,7 +66,10 @@ def write_ncore(
         InputError: The package is missing, a picture is not of its pinhole's size, or there is one time only.
     """
     need_ncore()
-    with new_folder(folder, replace=replace, mark=MARK) as made:
+    hidden = {plain_name(name): mask for name, mask in hidden.items()}
+    plain = tuple(replace_fields(camera, name=plain_name(camera.name)) for camera in log.cameras)
+    log = replace_fields(log, name=plain_name(log.name), cameras=plain)
+    with new_folder(folder, replace=replace, kind=KIND) as made:
         writer = _Writer(log, made)
         for camera in log.cameras:
             writer.camera(camera, hidden.get(camera.name))

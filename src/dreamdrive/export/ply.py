@@ -4,9 +4,12 @@ from pathlib import Path
 
 import torch
 
-from dreamdrive.files.atomic import new_file, new_folder
+from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
+
+KIND = "folder of PLY files"
+"""What ``export_ply`` writes to a name without an ending."""
 
 
 def write_ply(gaussians: Gaussians, path: Path) -> None:
@@ -21,22 +24,31 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
         partial.write_bytes(data)
 
 
-def export_ply(scene: Scene, path: Path) -> None:
+def export_ply(scene: Scene, path: Path, *, replace: bool = False) -> None:
     """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
 
     The single file holds everything as it is at the first recorded time. The folder holds ``static.ply``
     (what never moves) and ``frames/NNNN.ply``, everything as it is at each recorded time: a numbered sequence
     that viewers play. PLY has no place for sky and exposure. One Gaussian takes 68 bytes, with spherical
-    harmonics of degree 1 104.
+    harmonics of degree 1 104. What is there already is replaced only if that is asked for.
     """
+    check_ply(path, replace)
     if path.suffix.lower() == ".ply":
         write_ply(scene.at(float(scene.times_s[0])), path)
         return
-    with new_folder(path, replace=True, mark="static.ply") as folder:
+    with new_folder(path, replace=replace, kind=KIND) as folder:
         (folder / "static.ply").write_bytes(_encode(scene.static_at(float(scene.times_s[0]))))
         (folder / "frames").mkdir()
         for i, t_s in enumerate(scene.times_s):
             (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
+
+
+def check_ply(path: Path, replace: bool) -> None:
+    """Fail before the work where ``export_ply``, of the same arguments, would fail after it."""
+    if path.suffix.lower() == ".ply":
+        check_new_file(path, replace)
+    else:
+        check_free(path, replace, KIND)
 
 
 def left_out_of_ply(scene: Scene, path: Path) -> str:

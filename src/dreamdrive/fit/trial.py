@@ -71,26 +71,26 @@ def better_depth(
     options: TrialOptions,
     seed: int,
     stands: Callable[[Trial], bool],
-) -> Geometry:
-    """The geometry with that of its two depths which predicts withheld frames better, and no other.
+) -> tuple[Geometry, Trial | None]:
+    """The geometry with that of its two depths which predicts withheld frames better, and its trial.
 
     What a network makes of a street is a guess, which frames check; what both scored stands in its details.
     Stereo takes its place only where the street then ``stands``: where no street explains the frames it is
-    noise.
+    noise. Without a second depth, or where too little is seen to judge, there is no trial.
     """
     ratio, trust = geometry.stereo_ratio, geometry.stereo_confidence
     fused = replace(geometry, stereo_ratio=None, stereo_confidence=None)
     if ratio is None or trust is None:
-        return fused
+        return fused, None
     stereo = replace(fused, depth_m=ratio * geometry.depth_m, confidence=trust)
     first, second = (trial(clip, each, seeds, options, seed) for each in (fused, stereo))
     if first is None or second is None:
-        return fused
+        return fused, None
     scores = {"fused": round(first.psnr_db, 2), "stereo": round(second.psnr_db, 2)}
     better = scores["stereo"] > scores["fused"] + options.stereo_db
     taken = "stereo" if better and stands(second) else "fused"
-    chosen = stereo if taken == "stereo" else fused
-    return replace(chosen, details={**chosen.details, "depth_trial_db": scores, "depth": taken})
+    chosen, found = (stereo, second) if taken == "stereo" else (fused, first)
+    return replace(chosen, details={**chosen.details, "depth_trial_db": scores, "depth": taken}), found
 
 
 @one_torch_thread()

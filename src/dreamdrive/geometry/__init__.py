@@ -7,7 +7,7 @@ import numpy as np
 
 from dreamdrive.choices import BACKENDS
 from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
-from dreamdrive.geometry.cameras import Posed, refined
+from dreamdrive.geometry.cameras import Posed, calmed, refined
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.options import DepthOptions, GateOptions, GeometryOptions, MovingOptions
 from dreamdrive.geometry.protocol import GeometryBackend

@@ -10,13 +10,14 @@ from jaxtyping import Float, UInt8, UInt16
 
 from dreamdrive.data.formats.cameras import indexed_pinhole
 from dreamdrive.data.picture_file import write_picture
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import write_json
+from dreamdrive.files.output import new_folder
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.look import CameraEstimate, Look
 from dreamdrive.scene.street_class import StreetClass
 
 MARK = "look.json"
+KIND = "look"
 """By this file a folder of this kind is known."""
 STEPS = 256
 """What a depth of one metre, or camera height, is in a 16-bit PNG."""
@@ -44,7 +45,7 @@ def write_look(
     """
     metric = look.camera_height_m is not None
     depth = look.depth_m if metric else look.depth
-    with new_folder(folder, replace=replace, mark=MARK) as made:
+    with new_folder(folder, replace=replace, kind=KIND) as made:
         for name in _FOLDERS:
             (made / name).mkdir()
         for index, picture in enumerate(pictures):

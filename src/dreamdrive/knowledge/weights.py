@@ -9,7 +9,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
 from dreamdrive.knowledge.network import StreetNetwork
 from dreamdrive.models import fill_network, read_state

@@ -2,7 +2,7 @@
 
 from dreamdrive.perception.backbone import EfficientNetFront
 from dreamdrive.perception.batch import BevBatch, BevTruth, as_truth
-from dreamdrive.perception.bev_set import MANIFEST, BevSet, PictureFormat, SampleNote, write_bev_set
+from dreamdrive.perception.bev_set import KIND, BevSet, PictureFormat, SampleNote, write_bev_set
 from dreamdrive.perception.grid import BevGrid
 from dreamdrive.perception.inputs import BevSample, as_batch, camera_from_level_ego, prepare_picture
 from dreamdrive.perception.losses import LossOptions, bev_losses, focal_loss

@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import cv2
 import msgspec
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -23,8 +22,8 @@ from dreamdrive.data.array_file import read_npz
 from dreamdrive.data.images import read_image
 from dreamdrive.data.picture_file import read_picture, write_picture
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import of_type, read_json
+from dreamdrive.files.output import new_folder, plain_name
 from dreamdrive.files.paths import inside
 from dreamdrive.perception.grid import BevGrid
 from dreamdrive.perception.inputs import BevSample
@@ -33,6 +32,7 @@ from dreamdrive.perception.raster import LAYERS, BevLabels
 from dreamdrive.progress import Progress, silent
 
 MANIFEST = "manifest.json"
+KIND = "set of samples"
 PictureFormat = Literal["jpg", "png"]
 _JPEG = 95
 _Row3 = tuple[float, float, float]
@@ -120,10 +120,8 @@ class BevSet:
     def __getitem__(self, index: int) -> BevSample:
         """A sample with its pictures and labels."""
         note = self.notes[index]
-        pictures = [
-            read_image(inside(self.folder, f"pictures/{note.id}/{camera.name}.{self.suffix}")).rgb
-            for camera in note.cameras
-        ]
+        names = [f"pictures/{plain_name(note.id)}/{plain_name(each.name)}" for each in note.cameras]
+        pictures = [read_image(inside(self.folder, f"{name}.{self.suffix}")).rgb for name in names]
         size = self.image.height_px, self.image.width_px
         for camera, picture in zip(note.cameras, pictures, strict=True):
             if picture.shape[:2] != size:
@@ -135,7 +133,7 @@ class BevSet:
             pictures=np.stack(pictures).transpose(0, 3, 1, 2),
             pixel_from_camera=np.array([each.pixel_from_camera for each in note.cameras], np.float32),
             camera_from_ego=np.array([each.camera_from_ego for each in note.cameras], np.float32),
-            labels=self._labels(note.id),
+            labels=self._labels(plain_name(note.id)),
         )
 
     def _labels(self, name: str) -> BevLabels:
@@ -181,14 +179,14 @@ def write_bev_set(
         progress: Told of samples done.
     """
     notes: list[SampleNote] = []
-    with new_folder(folder, replace=replace, mark=MANIFEST) as made:
+    with new_folder(folder, replace=replace, kind=KIND) as made:
         (made / "labels").mkdir()
         for note, sample in samples:
-            place = made / "pictures" / note.id
+            place = made / "pictures" / plain_name(note.id)
             place.mkdir(parents=True)
             for camera, picture in zip(note.cameras, sample.pictures, strict=True):
-                _write_picture(place / f"{camera.name}.{suffix}", picture)
-            _write_labels(made / "labels", note.id, sample.labels)
+                _write_picture(place / f"{plain_name(camera.name)}.{suffix}", picture)
+            _write_labels(made / "labels", plain_name(note.id), sample.labels)
             notes.append(note)
             progress(len(notes), max(count, len(notes)))
         manifest = _Manifest(asdict(image), asdict(grid), suffix, notes, left_out or {})
@@ -221,11 +219,7 @@ def _plain(value: Any) -> Any:
 
 
 def _write_picture(path: Path, picture: UInt8[np.ndarray, "3 h w"]) -> None:
-    image = np.ascontiguousarray(picture.transpose(1, 2, 0)[..., ::-1])
-    if path.suffix == ".png":
-        write_picture(path, image)
-    else:
-        cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG])
+    write_picture(path, picture.transpose(1, 2, 0)[..., ::-1], quality=_JPEG)
 
 
 def _write_labels(folder: Path, name: str, labels: BevLabels) -> None:

@@ -15,6 +15,7 @@ from torch import nn
 
 from dreamdrive.device import CPU
 from dreamdrive.errors import InputError
+from dreamdrive.files.output import claim_folder
 from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.perception.batch import BevBatch
 from dreamdrive.perception.losses import LossOptions
@@ -87,7 +88,7 @@ def train_cvt(
         InputError: The checkpoint is damaged or of another training, or there are too few batches.
         ArithmeticError: A loss is not finite.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    claim_folder(folder, "training")
     _check_replicas(options.replicas, device)
     set_learning(network.to(device), options.frozen_layers)
     optimiser = make_optimiser(network, options.schedule)

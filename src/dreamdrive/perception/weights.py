@@ -12,7 +12,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 from dreamdrive.files.tensor_file import briefly
 from dreamdrive.knowledge import SHIPPED, weights_of
 from dreamdrive.models import as_state, check_sizes, fill, read_state, read_torch

@@ -14,9 +14,9 @@ from safetensors.numpy import load, save
 
 from dreamdrive.decompose import Grouping
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
 from dreamdrive.files.checked import build, check_finite
 from dreamdrive.files.json_file import read_json
+from dreamdrive.files.output import new_file
 from dreamdrive.files.tensor_file import DAMAGE, read_own
 from dreamdrive.fit import StaticFit
 from dreamdrive.geometry import Measured, Posed

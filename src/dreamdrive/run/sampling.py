@@ -7,10 +7,10 @@ from typing import Any
 from dreamdrive import __version__
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import INDEX, MAX_CHANNELS, FeatureFile, write_features
-from dreamdrive.data.recording import ABOUT, write_recording
+from dreamdrive.data.recording import KIND, write_recording
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import check_free
+from dreamdrive.files.output import check_free
 from dreamdrive.models import find_weights
 from dreamdrive.prior import Choice, auto_prior, choose_prior
 from dreamdrive.progress import Progress, silent
@@ -48,7 +48,7 @@ def sample(
             raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
     if control.path is not None and out.resolve() == control.path.resolve():
         raise InputError(f"{out} is the input itself; choose another output folder")
-    check_free(out, force, ABOUT)
+    check_free(out, force, KIND)
     clip = chosen(control, progress)
     if clip.step[-1] < 1:
         raise InputError(f"--frames {control.frames}: a single frame is no recording; choose two or more")

@@ -19,8 +19,8 @@ import torch
 from dreamdrive import _native
 from dreamdrive.choices import Stage
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import remove
 from dreamdrive.files.json_file import of_type
+from dreamdrive.files.output import remove
 from dreamdrive.files.paths import inside, open_file
 from dreamdrive.progress import Progress, StageProgress, Work
 from dreamdrive.run import codec

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file, remove
 from dreamdrive.files.json_file import read_json
+from dreamdrive.files.output import new_file, remove
 from dreamdrive.files.paths import inside, is_inside
 from dreamdrive.run.stages import digest
 

@@ -9,8 +9,8 @@ from jaxtyping import UInt8
 
 from dreamdrive.data.poses import write_trajectory
 from dreamdrive.data.video_writer import write_video
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import write_json
+from dreamdrive.files.output import new_folder
 from dreamdrive.plan import Avoided, Instant, Plan
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
@@ -40,7 +40,7 @@ def write_planned(
     Waypoints are in the planning frame: x right, y ahead of the car at the moment of planning, in metres. The
     trajectory is that of the camera in the world of the scene, as ``render --trajectory`` takes it.
     """
-    with new_folder(folder, replace=force, mark=NOTE) as partial:
+    with new_folder(folder, replace=force, kind="plan") as partial:
         write_json(partial / NOTE, _figures(planned))
         write_trajectory(planned.path, partial / "trajectory.json")
         plans = [(planned.before, PLANNED), (planned.after.plan, MOVED)]

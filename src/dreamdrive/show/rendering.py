@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from dreamdrive.data.size import MIN_SIDE_PX, check_largest
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import RATES_HZ, Drive, frame_rate
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.output import new_folder
 from dreamdrive.files.paths import inside
 from dreamdrive.machine import free_bytes
 from dreamdrive.scene.camera import Camera
@@ -29,7 +28,7 @@ from dreamdrive.show.videos import write_png
 from dreamdrive.splat import SceneView, render_scene
 
 NOTE = "render.json"
-"""What lies beside pictures and arrays: calibration, poses and times; a folder without it is not replaced."""
+"""What lies beside pictures and arrays: calibration, poses and times."""
 PER_METRE = 256
 """What a depth of one metre is in a 16-bit PNG, as in KITTI: up to 256 m in steps of 4 mm."""
 _BYTES_PER_PX = 200
@@ -93,8 +92,7 @@ def write_drive(
     if options.format == "mp4":
         write_video(path, (_picture(view, options.show) for view in views()), video_rate(drive, options))
         return
-    _check_replaceable(path)
-    with new_folder(path, replace=True, mark=NOTE) as folder:
+    with new_folder(path, replace=True, kind="rendered drive") as folder:
         for i, view in enumerate(views()):
             _write_frame(folder / f"{i:04d}.{options.format}", view, options.show)
         (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, options), allow_nan=False) + "\n")
@@ -162,14 +160,6 @@ def _note(camera: Camera, drive: Trajectory, options: RenderOptions) -> dict[str
         "world_from_camera": drive.world_from_camera.tolist(),
         "times_s": drive.times_s.tolist(),
     }
-
-
-def _check_replaceable(path: Path) -> None:
-    """A folder that was written here may be replaced unless something was put into it since."""
-    names = [p.name for p in path.iterdir()] if path.is_dir() else []
-    foreign = [name for name in names if name != NOTE and not re.fullmatch(r"\d{4,}\.(png|npz)", name)]
-    if foreign:
-        raise InputError(f"{path} holds other files ({', '.join(sorted(foreign)[:3])}); choose another place")
 
 
 def places(out: Path, output: Path | None, drives: Sequence[Drive], options: RenderOptions) -> list[Path]:

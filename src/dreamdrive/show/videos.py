@@ -15,7 +15,7 @@ from dreamdrive.data.picture_file import write_picture
 from dreamdrive.data.video_writer import write_video
 from dreamdrive.drive import frame_rate, manoeuvre, smooth, up_of
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians

@@ -17,9 +17,9 @@ from torch import Tensor
 
 from dreamdrive.data.formats.rigid import JsonPose
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.checked import build, check_finite
 from dreamdrive.files.json_file import of_type, parse_json
+from dreamdrive.files.output import new_folder
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
@@ -160,7 +160,7 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     index = json.loads(json.dumps(index, allow_nan=False))
     index["sha256"] = _checksum(index)
     text = json.dumps(index, indent=1, sort_keys=True, allow_nan=False)
-    with new_folder(path, replace=replace, mark=_INDEX) as folder:
+    with new_folder(path, replace=replace, kind="scene") as folder:
         for name, data in parts.items():
             (folder / name).write_bytes(data)
         (folder / _INDEX).write_text(text + "\n", encoding="utf-8")

@@ -10,7 +10,7 @@ from dreamdrive.world.drive import (
     make_street,
     pictures,
 )
-from dreamdrive.world.files import MARK, is_world, read_drives, read_world, write_world
+from dreamdrive.world.files import KIND, is_world, read_drives, read_world, write_world
 from dreamdrive.world.layout_picture import draw_layout
 from dreamdrive.world.materials import Semantic
 from dreamdrive.world.mesh import upright

@@ -17,8 +17,8 @@ from dreamdrive.data.layout_file import MOST_BOXES, read_layout, write_layout
 from dreamdrive.data.picture_file import read_picture, write_picture
 from dreamdrive.data.rig import write_rig
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_folder
 from dreamdrive.files.json_file import of_type, read_json, write_json
+from dreamdrive.files.output import new_folder
 from dreamdrive.scene.camera import check_rigid
 from dreamdrive.scene.layout import Layout, Size
 from dreamdrive.scene.trajectory import Trajectory
@@ -57,7 +57,8 @@ class _Hulls(msgspec.Struct):
 
 
 MARK = "layout.json"
-"""By this file a world folder is known."""
+"""By this file a world folder is known to readers."""
+KIND = "drawn street"
 
 
 def write_world(
@@ -77,7 +78,7 @@ def write_world(
     first = next(iter(drives.values()))
     if len(first.boxes) > MOST_BOXES:
         raise ValueError(f"world: {len(first.boxes)} boxes do not fit 8-bit labels")
-    with new_folder(path, replace=replace, mark=MARK) as folder:
+    with new_folder(path, replace=replace, kind=KIND) as folder:
         write_layout(first.layout, folder / "layout.json")
         seconds = float(first.times_s[-1])
         write_picture(folder / "layout.png", draw_layout(first.layout, seconds)[..., ::-1])

@@ -62,9 +62,7 @@ def test_turns_to_and_fro_are_seen_beside_a_steady_one() -> None:
     rng, count = np.random.default_rng(1), 12
     shakes = [Rotation.from_rotvec(np.radians(rng.normal(0, 0.15, 3))) for _ in range(count)]
     steady = [Rotation.from_rotvec(np.radians([0.0, 0.3 * k, 0.0])) for k in range(count)]
-    frames = np.stack(
-        [seen(texture(), there * shake) for there, shake in zip(steady, shakes, strict=True)]
-    )
+    frames = np.stack([seen(texture(), there * shake) for there, shake in zip(steady, shakes, strict=True)])
     poses = np.tile(np.eye(4), (count, 1, 1))
     poses[:, :3, :3] = np.stack([each.as_matrix() for each in steady])
     found = shaken(poses, frames, np.ones(frames.shape, bool), CAMERA)

@@ -4,7 +4,7 @@ from dreamdrive.data.dataset import Logs
 from dreamdrive.data.logs import data_set_of_logs
 from dreamdrive.data.nuscenes.log import is_nuscenes, read_nuscenes, scenes_of_nuscenes
 from dreamdrive.data.nuscenes.tables import open_tables
-from dreamdrive.data.nuscenes.write import MARK, write_nuscenes, write_points
+from dreamdrive.data.nuscenes.write import KIND, write_nuscenes, write_points
 
 NUSCENES = data_set_of_logs(
     name="nuscenes",

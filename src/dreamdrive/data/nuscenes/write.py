@@ -14,14 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.data.nuscenes.tables import token
 from dreamdrive.data.nuscenes.write_maps import write_maps
-from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.output import new_folder, plain_name
 from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera
 from dreamdrive.scene.trajectory import Trajectory
 
 VERSION = "v1.0-mini"
 """The devkit takes the versions mini, trainval and test alone."""
-MARK = f"{VERSION}/scene.json"
-"""By this file a folder that was written here is known."""
+KIND = "nuScenes data set"
+"""As what a folder that was written here is known."""
 TABLES = (
     "attribute",
     "calibrated_sensor",
@@ -64,7 +64,7 @@ def write_nuscenes(
     """
     if len({log.name for log in logs}) < len(logs):
         raise ValueError("nuScenes: two drives of one name")
-    with new_folder(folder, replace=replace, mark=f"{version}/scene.json") as made:
+    with new_folder(folder, replace=replace, kind=KIND) as made:
         (made / version).mkdir(parents=True)
         rows: Rows = {name: [] for name in TABLES}
         rows["visibility"] = [
@@ -180,7 +180,7 @@ class _Writer:
         own = token(self.log.name, channel, stamp)
         self.rows["ego_pose"].append({"token": own, "timestamp": stamp, **_pose(ego)})
         near = int(np.abs(self.log.times_s - time_s).argmin())
-        name = f"{self.log.name}__{channel}__{stamp}.{suffix}"
+        name = f"{plain_name(self.log.name)}__{plain_name(channel)}__{stamp}.{plain_name(suffix)}"
         return {
             "token": own,
             "sample_token": self.samples[near],
@@ -189,7 +189,7 @@ class _Writer:
             "timestamp": stamp,
             "fileformat": suffix,
             "is_key_frame": key,
-            "filename": f"{'samples' if key else 'sweeps'}/{channel}/{name}",
+            "filename": f"{'samples' if key else 'sweeps'}/{plain_name(channel)}/{name}",
         }
 
     def _place(self, name: str) -> Path:
@@ -251,7 +251,7 @@ def write_points(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
     """Points as ``.pcd.bin``: five float32 each, the last two intensity and ring, which are 0."""
     five = np.zeros((len(points), 5), np.float32)
     five[:, :3] = points
-    five.tofile(path)
+    path.write_bytes(five.tobytes())
 
 
 def _pose(pose: Float[np.ndarray, "4 4"]) -> dict[str, list[float]]:

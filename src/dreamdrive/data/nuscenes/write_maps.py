@@ -12,6 +12,7 @@ from jaxtyping import Float, UInt8
 from dreamdrive.data.nuscenes.maps import AREAS, LINES
 from dreamdrive.data.nuscenes.tables import token
 from dreamdrive.data.picture_file import write_picture
+from dreamdrive.files.output import plain_name
 from dreamdrive.scene.log import Log, LogMap
 
 _PIXEL_M = 0.1
@@ -36,7 +37,7 @@ def write_maps(logs: Sequence[Log], folder: Path, rows: list[dict[str, Any]]) ->
         rows.append({"token": own, "log_tokens": of, "category": "semantic_prior", "filename": name})
         if merged:
             text = json.dumps(_expansion(merged), allow_nan=False)
-            (folder / "maps" / "expansion" / f"{location}.json").write_text(text + "\n", "utf-8")
+            (folder / "maps" / "expansion" / f"{plain_name(location)}.json").write_text(text + "\n", "utf-8")
 
 
 def _merged(maps: Sequence[LogMap]) -> LogMap:

@@ -1,6 +1,7 @@
 """Structure from motion and its gate, focal length, odometry, known poses, checks of paths."""
 
 from dreamdrive.geometry.cameras import contradiction, odometry, sfm
+from dreamdrive.geometry.cameras.calm import calmed
 from dreamdrive.geometry.cameras.creeping import with_creep
 from dreamdrive.geometry.cameras.focal import settle
 from dreamdrive.geometry.cameras.mapping import STEPS

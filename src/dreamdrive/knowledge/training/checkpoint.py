@@ -14,7 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import new_file
 from dreamdrive.files.paths import read_text
 from dreamdrive.models import read_state
 

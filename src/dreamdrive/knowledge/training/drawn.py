@@ -1,19 +1,19 @@
 """Training pictures of drawn streets: the second edition, seen from many places, with exact truth."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing import get_context
 from pathlib import Path
 
-import cv2
 import msgspec
 import numpy as np
 
-from dreamdrive.files.atomic import new_folder
+from dreamdrive.data.picture_file import write_picture
+from dreamdrive.files.output import new_folder
 from dreamdrive.knowledge.training.records import Record, depth_steps, read_records, write_records
 from dreamdrive.knowledge.training.viewpoints import Viewpoint, Viewpoints
+from dreamdrive.machine import workers
 from dreamdrive.scene.street_class import StreetClass
 from dreamdrive.world import Semantic, StreetOptions, World, WorldView, draw_street, picture_of
 from dreamdrive.world.edition2 import FIRST_TRAINING_SEED, Looks, TextureLibrary, bent, draw_light, photograph
@@ -21,6 +21,7 @@ from dreamdrive.world.edition2 import FIRST_TRAINING_SEED, Looks, TextureLibrary
 EDITION = 2
 _AFTER_S = 1.0
 _MARK = "records.jsonl"
+_FAST = 3  # of the compression of a PNG
 _STREET_CLASS = {
     Semantic.SKY: StreetClass.SKY,
     Semantic.ROAD: StreetClass.ROAD,
@@ -92,7 +93,7 @@ def _drawn(
         for seed in seeds:
             yield draw_street_records(seed, folder / str(seed), options, textures)
         return
-    with ProcessPoolExecutor(processes, get_context("spawn"), cv2.setNumThreads, (1,)) as pool:
+    with workers(processes) as pool:
         jobs = [
             pool.submit(draw_street_records, seed, folder / str(seed), options, textures) for seed in seeds
         ]
@@ -121,7 +122,7 @@ def draw_street_records(
     looks = Looks(rng, kept_out=seed < FIRST_TRAINING_SEED)
     places = Viewpoints(world, rng, looks, options.seconds)
     light, records = layout.light, list[Record]()
-    with new_folder(folder, replace=True, mark=_MARK) as made:
+    with new_folder(folder, replace=True, kind="drawn street to learn from") as made:
         for moment in range(options.moments):
             if moment:
                 places.move_on()
@@ -143,14 +144,9 @@ def _write(view: WorldView, at: Viewpoint, folder: Path, name: str, group: str, 
     labels = np.stack([np.zeros_like(classes), view.instance.astype(np.uint8), classes], axis=-1)
     hidden = (view.semantic == Semantic.OWN_CAR) | (view.semantic == Semantic.SKY)
     depth = depth_steps(np.where(hidden, 0, view.depth_m))
-    fast = [cv2.IMWRITE_PNG_COMPRESSION, 3]
-    written = [
-        cv2.imwrite(str(folder / f"{name}.jpg"), view.frame[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality]),
-        cv2.imwrite(str(folder / f"{name}-labels.png"), labels, fast),
-        cv2.imwrite(str(folder / f"{name}-depth.png"), depth, fast),
-    ]
-    if not all(written):
-        raise OSError(f"pictures could not be written to {folder}")
+    write_picture(folder / f"{name}.jpg", view.frame[..., ::-1], quality=quality)
+    write_picture(folder / f"{name}-labels.png", labels, compression=_FAST)
+    write_picture(folder / f"{name}-depth.png", depth, compression=_FAST)
     horizon_px, roll_rad = horizon_of(at)
     return Record(
         image=f"{name}.jpg",

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from msgspec import Meta
 
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
 from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
 
@@ -152,10 +153,10 @@ def _write(
     stem = picture.image.removesuffix(Path(picture.image).suffix).replace("/", "_")
     names = f"{stem}.jpg", f"{stem}_labels.png", f"{stem}_depth.png"
     encoded = np.stack([np.zeros_like(shown), instances, shown], axis=-1).astype(np.uint8)
-    cv2.imwrite(str(out_dir / names[0]), image, [cv2.IMWRITE_JPEG_QUALITY, 92])
-    cv2.imwrite(str(out_dir / names[1]), encoded)
+    write_picture(out_dir / names[0], image, quality=92)
+    write_picture(out_dir / names[1], encoded)
     if depth_m is not None:
-        cv2.imwrite(str(out_dir / names[2]), depth_steps(depth_m))
+        write_picture(out_dir / names[2], depth_steps(depth_m))
     horizon_px, roll_rad = None, None
     if picture.horizon is not None:
         left, right = picture.horizon

@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from dreamdrive.files.output import claim_folder
 from dreamdrive.knowledge.network import StreetNetwork
 from dreamdrive.knowledge.training.checkpoint import load_checkpoint, save_checkpoint
 from dreamdrive.knowledge.training.judge import judge
@@ -108,7 +109,7 @@ def train(
     Returns:
         Figures of the averaged network, or None where it was stopped.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    claim_folder(folder, "training")
     trainer = Trainer(network, options, device)
     both = trainer.network, trainer.averaged
     first, seconds = load_checkpoint(folder, both, trainer.optimiser, options, data)

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.data.picture_file import read_picture
+from dreamdrive.data.picture_file import read_picture, write_picture
 from dreamdrive.errors import InputError
 from dreamdrive.knowledge.training.records import UNKNOWN, Record, depth_steps
 from dreamdrive.scene.camera import Camera
@@ -115,9 +115,9 @@ def _write_lidar(
         kind = label[points["sem"][order]]
         labels[row, column, 2] = kind
         labels[row, column, 1] = np.where(kind <= StreetClass.POLE, 0, UNKNOWN)
-    cv2.imwrite(f"{out}.jpg", cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
-    cv2.imwrite(f"{out}-labels.png", labels)
-    cv2.imwrite(f"{out}-depth.png", depth)
+    write_picture(Path(f"{out}.jpg"), cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    write_picture(Path(f"{out}-labels.png"), labels)
+    write_picture(Path(f"{out}-depth.png"), depth)
 
 
 def level_line(camera: Camera) -> tuple[float, float]:
@@ -144,8 +144,8 @@ def clip_records(clip: Clip, geometry: Geometry, source: str, group: str, out: P
         camera, name = geometry.cameras[index], f"{group}-{clip.source_index[index]:05d}"
         sure = (geometry.confidence[index] >= _SURE) & (geometry.moving[index] < _STILL)
         depth = np.where(sure, geometry.depth_m[index], 0)
-        cv2.imwrite(str(out / f"{name}.jpg"), clip.frames[index][..., ::-1])
-        cv2.imwrite(str(out / f"{name}-depth.png"), depth_steps(depth))
+        write_picture(out / f"{name}.jpg", clip.frames[index][..., ::-1])
+        write_picture(out / f"{name}-depth.png", depth_steps(depth))
         height_m = None if geometry.ground is None else _height_m(geometry, index)
         records.append(
             Record(

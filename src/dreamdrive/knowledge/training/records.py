@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from dreamdrive.files.output import new_file
 from dreamdrive.scene.street_class import StreetClass
 
 UNKNOWN = 255
@@ -71,9 +72,8 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
 def write_records(records: list[Record], folder: Path) -> None:
     """Write ``records.jsonl``; the pictures are there already."""
     lines = [msgspec.json.encode(record) for record in records]
-    temporary = folder / "records.jsonl.part"
-    temporary.write_bytes(b"\n".join(lines) + b"\n")
-    temporary.replace(folder / "records.jsonl")
+    with new_file(folder / "records.jsonl") as partial:
+        partial.write_bytes(b"\n".join(lines) + b"\n")
 
 
 def read_records(folder: Path) -> Iterator[Record]:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
+from dreamdrive.data.picture_file import write_picture
 from dreamdrive.errors import InputError
 from dreamdrive.world.edition2 import INDEX, Texture, TextureKind
 
@@ -65,7 +66,7 @@ def make_textures(cuts_file: Path, data_dir: Path, out_dir: Path) -> tuple[Textu
         piece = _straight(picture, cut)
         if cut.kind == "vegetation":
             _without_sky(piece, np.random.default_rng(count))
-        cv2.imwrite(str(out_dir / name), piece, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        write_picture(out_dir / name, piece, quality=_QUALITY)
         made.append(Texture(name, cut.kind, cut.number, cut.width_m, cut.picture, _LICENCES[folder]))
     (out_dir / INDEX).write_bytes(msgspec.json.format(msgspec.json.encode(made), indent=1) + b"\n")
     return tuple(made)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from dreamdrive.choices import DtypeName
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_folder
+from dreamdrive.files.output import new_folder
 from dreamdrive.prior.running import counted
 from dreamdrive.prior.vista.configs import Shapes
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
@@ -54,7 +54,7 @@ def convert(
     stored = open_weights(file)
     notes = notes_of(stored)
     tell = counted(progress, sum(len(stored.parts[part].shapes) for part in PARTS))
-    with new_folder(folder, replace=replace, mark=NOTE) as partial:
+    with new_folder(folder, replace=replace, kind="folder of converted weights") as partial:
         for part in PARTS:
             own = stored.parts[part]
             (partial / part).mkdir()

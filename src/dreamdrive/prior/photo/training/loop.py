@@ -14,7 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.knowledge import StreetNetwork, load_knowledge
 from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.prior.photo.network import CHANNELS, PhotoNetwork
@@ -68,7 +68,7 @@ def train_photo(
     """
     if not pairs:
         raise InputError("there are no pairs to train on: no street was seen in any of the pictures")
-    out.mkdir(parents=True, exist_ok=True)
+    claim_folder(out, "training")
     torch.manual_seed(options.seed)
     network = PhotoNetwork()
     averaged = deepcopy(network).requires_grad_(False)

@@ -7,9 +7,8 @@ AdaMPI: Han et al. 2022).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
@@ -18,8 +17,9 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.data.photo import Photo, read_photo
 from dreamdrive.errors import InputError
-from dreamdrive.files.atomic import new_file
+from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.knowledge.training import CLASS_OF
+from dreamdrive.machine import workers
 from dreamdrive.prior.photo.fill import grown
 from dreamdrive.prior.photo.height import USUAL_M
 from dreamdrive.prior.photo.layers import Layers, layers_of
@@ -75,22 +75,27 @@ def make_pairs(
     options: PairOptions = PairOptions(),
     *,
     processes: int = 2,
+    stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Path]:
+) -> list[Path] | None:
     """Write the pairs of pictures and of drawn streets and return all files; those that are there are kept.
 
-    Pictures in which no street is seen give none.
+    Pictures in which no street is seen give none. ``stop`` is asked after each; then the result is None.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    claim_folder(folder, "set of pairs")
     names = {f"{path.parent.name}-{path.stem}": path for path in pictures} | {
         f"street-{seed}": seed for seed in seeds
     }
     left = [name for name in names if not (folder / f"{name}.done").exists()]
-    with ProcessPoolExecutor(processes, get_context("spawn"), cv2.setNumThreads, (1,)) as pool:
+    with workers(processes) as pool:
         jobs = [pool.submit(_write, name, names[name], folder, knowledge, options) for name in left]
         for number, job in enumerate(as_completed(jobs)):
             job.result()
             progress(len(names) - len(left) + number + 1, len(names))
+            if stop():
+                for waiting in jobs:
+                    waiting.cancel()
+                return None
     return sorted(folder.glob("*.npy"))
 
 
