@@ -21,7 +21,7 @@ def out(tmp_path: Path) -> Path:
 
 
 def names(folder: Path) -> list[str]:
-    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("[!.]*") if p.is_file())
 
 
 def test_several_drives_in_one_call(run: Run, out: Path, tmp_path: Path) -> None:

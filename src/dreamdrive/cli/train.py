@@ -1,5 +1,6 @@
 """``dreamdrive train``: networks of our own."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -150,19 +151,8 @@ def photo(
             stop=stop,
             progress=lambda done, total: bars("pairs", done, total),
         )
-        weights = (
-            None
-            if pairs is None
-            else train_photo(
-                pairs,
-                out,
-                knowledge,
-                options,
-                licence=licence,
-                stop=stop,
-                progress=lambda done, total, _: bars("photo", done, total),
-            )
-        )
+        learn = partial(train_photo, licence=licence, stop=stop, progress=lambda n, m, _: bars("photo", n, m))
+        weights = None if pairs is None else learn(pairs, out, knowledge, options)
     if weights is None or pairs is None:
         stop.end()
         return
