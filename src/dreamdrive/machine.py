@@ -41,8 +41,8 @@ def free_bytes(device: "torch.device | None" = None) -> int | None:
 def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
     """So many processes with a thread each.
 
-    They end at once where the work fails or is stopped, or where this process is killed; what they write has
-    to appear whole or not at all.
+    They end at once where the work fails or is interrupted, or where this process is killed; what they write
+    has to appear whole or not at all. Jobs that wait at the end are dropped.
     """
     context = get_context("spawn")
     stopped = context.Event()

@@ -273,8 +273,8 @@ def _as_frames_say(clip: Clip, geometry: Geometry, options: Options, seed: int) 
     """The geometry with the better of two depths; on a calm path where no street stands on the one found."""
     o = options
     chosen, found = better_depth(clip, geometry, o.seeds, o.trial, seed, partial(_stands, o))
-    sure = chosen.fallback is not None or clip.known.world_from_camera is not None or len(clip.rig) > 1
-    if sure or not _may_drift(clip, o):
+    mapped = chosen.fallback is None and clip.known.world_from_camera is None and len(clip.rig) == 1
+    if not mapped or not _may_drift(clip, o):
         return chosen
     found = found or trial(clip, chosen, o.seeds, o.trial, seed)
     return chosen if found is None or _stands(o, found) else calmed(clip, chosen)

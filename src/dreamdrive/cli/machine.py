@@ -8,6 +8,8 @@ from types import FrameType
 
 from dreamdrive.machine import available_cores
 
+_ENDS = (signal.SIGTERM, signal.SIGHUP)
+
 
 def use_all_cores() -> None:
     """Let torch and the native core use every core of this process; to be called before torch is imported."""
@@ -21,11 +23,8 @@ def use_all_cores() -> None:
     set_threads(available_cores())
 
 
-_ENDS = (signal.SIGTERM, signal.SIGHUP)
-
-
 class Terminated(KeyboardInterrupt):
-    """Asked to terminate (SIGTERM), which ends the work as Ctrl-C does."""
+    """Asked to terminate, or left by its terminal (``_ENDS``), which ends the work as Ctrl-C does."""
 
 
 def stop_like_an_interruption() -> None:
@@ -37,10 +36,15 @@ def stop_like_an_interruption() -> None:
     def stop(number: int, frame: FrameType | None) -> None:
         raise Terminated
 
-    for number in _ENDS:
-        # Under nohup the terminal may go away.
-        if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, stop)
+    for number in _ends():
+        signal.signal(number, stop)
+
+
+def _ends() -> list[signal.Signals]:
+    """Signals that ask to terminate; under nohup the terminal may go away."""
+    return [
+        number for number in _ENDS if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN
+    ]
 
 
 class Stop:
@@ -68,7 +72,7 @@ class Stop:
 def asked_to_stop() -> Generator[Stop, None, None]:
     """Take Ctrl-C and requests to terminate as requests to stop at the next safe point."""
     stop = Stop()
-    before = {number: signal.signal(number, stop.ask) for number in (signal.SIGINT, *_ENDS)}
+    before = {number: signal.signal(number, stop.ask) for number in (signal.SIGINT, *_ends())}
     try:
         yield stop
     finally:

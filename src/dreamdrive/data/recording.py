@@ -30,7 +30,7 @@ from dreamdrive.scene.trajectory import Trajectory
 
 ABOUT = "provenance.json"
 KIND = "recording"
-"""By this file a folder of this kind is known."""
+"""As what a folder that was written here is known."""
 _INTRINSICS = "intrinsics.json"
 
 

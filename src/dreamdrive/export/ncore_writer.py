@@ -25,7 +25,7 @@ from dreamdrive.scene.trajectory import Trajectory
 
 MARK = "sequence.json"
 KIND = "NCore sequence"
-"""By this file a folder that was written here is known."""
+"""As what a folder that was written here is known."""
 LIDAR = "LIDAR_TOP"
 HIDDEN = "ego"
 """Readers leave out what a mask of this name covers: in NCore, the car itself."""

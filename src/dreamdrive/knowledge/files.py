@@ -18,7 +18,7 @@ from dreamdrive.scene.street_class import StreetClass
 
 MARK = "look.json"
 KIND = "look"
-"""By this file a folder of this kind is known."""
+"""As what a folder that was written here is known."""
 STEPS = 256
 """What a depth of one metre, or camera height, is in a 16-bit PNG."""
 _FOLDERS = ("overview", "depth", "classes", "instances", "confidence", "arrays")

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras import contradiction, odometry, turning
+from dreamdrive.geometry.cameras.calm import calm_path
 from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
@@ -205,9 +206,7 @@ def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: f
     poses = path.world_from_camera
     if clip.look is not None:
         poses = odometry.levelled(poses, metric.ground.normal_world)
-    poses = odometry.steadied(poses, clip.times_s)
-    poses = turning.shaken(poses, evidence.grey, evidence.street, evidence.small)
-    poses, _ = rebase(poses, np.zeros((0, 3)))
+    poses = calm_path(poses, clip.times_s, evidence)
     reason = "structure from motion was refused: " + "; ".join(outcome.reasons)
     notes = [reason, "the path comes from frame-to-frame odometry and is rough", *metric.notes]
     if not path.measured:

@@ -93,8 +93,6 @@ def make_pairs(
             job.result()
             progress(len(names) - len(left) + number + 1, len(names))
             if stop():
-                for waiting in jobs:
-                    waiting.cancel()
                 return None
     return sorted(folder.glob("*.npy"))
 
