@@ -4,13 +4,13 @@ import os
 import signal
 import threading
 from collections.abc import Generator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
-from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing.synchronize import Event
+
     import torch
 
 _LOOKS_S = 0.5
@@ -38,12 +38,15 @@ def free_bytes(device: "torch.device | None" = None) -> int | None:
 
 
 @contextmanager
-def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
+def workers(count: int) -> Generator["ProcessPoolExecutor", None, None]:
     """So many processes with a thread each.
 
     They end at once where the work fails or is interrupted, or where this process is killed; what they write
     has to appear whole or not at all. Jobs that wait at the end are dropped.
     """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     context = get_context("spawn")
     stopped = context.Event()
     pool = ProcessPoolExecutor(count, context, _begin, (os.getpid(), stopped))
@@ -56,7 +59,7 @@ def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
         pool.shutdown(cancel_futures=True)
 
 
-def _begin(parent: int, stopped: Event) -> None:
+def _begin(parent: int, stopped: "Event") -> None:
     """What a worker does first."""
     import cv2
 
@@ -66,7 +69,7 @@ def _begin(parent: int, stopped: Event) -> None:
     threading.Thread(target=_watch, args=(parent, stopped), daemon=True).start()
 
 
-def _watch(parent: int, stopped: Event) -> None:
+def _watch(parent: int, stopped: "Event") -> None:
     while os.getppid() == parent and not stopped.wait(_LOOKS_S):
         pass
     os._exit(1)

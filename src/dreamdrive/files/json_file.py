@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import msgspec
-import numpy as np
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import TEXT_BYTES, read_bytes
@@ -34,8 +33,15 @@ def read_json(path: Path, option: str = "", *, follow: bool = True) -> dict[str,
 
 def write_json(path: Path, values: dict[str, Any]) -> None:
     """Write values and arrays as readable JSON without NaN."""
-    text = json.dumps(values, indent=1, allow_nan=False, default=np.ndarray.tolist)
+    text = json.dumps(values, indent=1, allow_nan=False, default=_as_list)
     path.write_text(text + "\n", encoding="utf-8")
+
+
+def _as_list(array: Any) -> Any:
+    """An array of NumPy as JSON has it; ``TypeError`` for anything else."""
+    import numpy as np  # where arrays are, it is loaded; to start with, it is slow
+
+    return np.ndarray.tolist(array)
 
 
 def parse_json(data: bytes | str, where: str) -> Any:
