@@ -52,7 +52,7 @@ def test_pictures_of_a_trial_are_small_and_what_moves_does_not_count() -> None:
     clip, geometry = standing_wall()
     moving = np.zeros_like(geometry.moving)
     moving[:, 40:] = 1
-    small = replace(OPTIONS, width_px=48, most_moving=1.0)
+    small = replace(OPTIONS, width_px=48)
     found = trial(clip, replace(geometry, moving=moving), SeedOptions(), small, 0)
     assert found is not None
     assert found.clip.size == (48, 32)
@@ -109,13 +109,31 @@ def test_where_no_street_stands_stereo_is_not_taken() -> None:
     np.testing.assert_array_equal(found.depth_m, geometry.depth_m)
 
 
-def test_what_fills_much_of_the_pictures_counts_though_it_moves() -> None:
+def test_where_road_users_are_known_only_they_are_left_out() -> None:
     clip, geometry = standing_wall()
-    moving = np.zeros_like(geometry.moving)
-    moving[:, :, 80:] = 1
-    few = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, most_moving=0.2), 0)
-    many = trial(clip, replace(geometry, moving=moving), SeedOptions(), replace(OPTIONS, most_moving=0.1), 0)
-    assert few is not None
-    assert many is not None
-    assert not few.judged[:, :, 81:].any()
-    assert many.judged.all()
+    moving, users = np.zeros_like(geometry.moving), np.zeros(geometry.moving.shape, np.uint16)
+    moving[:, :, 60:] = 1
+    users[:, :, 80:] = 1
+    found = trial(clip, replace(geometry, moving=moving, users=users), SeedOptions(), OPTIONS, 0)
+    assert found is not None
+    assert found.judged[:, :, :79].all()
+    assert not found.judged[:, :, 81:].any()
+
+
+def test_what_drives_before_the_street_does_not_hide_it() -> None:
+    clip, geometry = standing_wall()
+    frames, depth_m, moving = clip.frames.copy(), geometry.depth_m.copy(), np.zeros_like(geometry.moving)
+    for i in range(len(clip)):
+        box = np.s_[i, 16:40, 20 + 6 * i : 44 + 6 * i]
+        frames[box], depth_m[box], moving[box] = 255, DEPTH_M / 2, 1
+    plain = trial(clip, geometry, SeedOptions(), OPTIONS, 0)
+    found = trial(
+        replace(clip, frames=frames),
+        replace(geometry, depth_m=depth_m, moving=moving),
+        SeedOptions(),
+        OPTIONS,
+        0,
+    )
+    assert plain is not None
+    assert found is not None
+    assert found.psnr_db > plain.psnr_db - 1

@@ -41,7 +41,8 @@ class DriftOptions:
         steps: Steps of the joint fit, for one of a street that stands: it sees the frames between as well. On
             a motorway and in a winter street 1.35 lose 0.3 and 0.5 dB, and 2.7 win another 0.1.
         margin_db: How far, in dB of PSNR, a small fit of a street that stands may fall behind the frames
-            beside each frame: a whole fit is better by about as much, and from aside one street shows best.
+            beside each frame. On four recorded drives that fall behind by 0.6 to 0.9 a street that drifts is
+            better by 0.3 to 1.5 dB; on one that falls behind by 0.1 it is worse by 1.1.
         finest_db: PSNR to which a street of single frames can be fitted to pictures at best.
     """
 
@@ -51,7 +52,7 @@ class DriftOptions:
     footprint: float = 0.5
     opacity: float = 0.8
     steps: float = 2.0
-    margin_db: float = 1.2
+    margin_db: float = 0.3
     finest_db: float = 34.0
 
 

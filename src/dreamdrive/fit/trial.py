@@ -30,15 +30,12 @@ class TrialOptions:
         stereo_db: By how much depth of stereo alone predicts withheld frames better where it takes the place
             of depth that a network has a part in. On nine of twenty recorded drives it is better by 0.5 to
             1.8 dB, and then by 0.3 to 2.3 in the whole fit; where it is 0.2 better, lidar contradicts it.
-        most_moving: Share of the pixels seen to move from which on they count as well: what fills more of the
-            pictures is no actor but a street that was not understood, as behind a handlebar.
     """
 
     withheld: int = 4
     width_px: int = 240
     visits: float = 5.0
     stereo_db: float = 0.3
-    most_moving: float = 0.15
 
 
 @dataclass(frozen=True)
@@ -49,8 +46,8 @@ class Trial:
         clip: The clip at the size of the trial; what the trial did not see is held out.
         frames: The withheld frames.
         errors: Mean absolute difference over colours, in [0, 1], of each of them (K, h, w).
-        judged: Pixels that are not known to move (K, h, w), or all if too many do; the sky is among them,
-            since what is taken for it may be the roof of a tunnel.
+        judged: Pixels of the street (K, h, w); the sky is among them, since what is taken for it may be the
+            roof of a tunnel.
     """
 
     clip: Clip
@@ -99,7 +96,9 @@ def trial(
 ) -> Trial | None:
     """Fit a street that stands to most of the frames that may be seen, small and short; judge the others.
 
-    None where that leaves too few to fit, or nothing to judge.
+    What moves is no part of it: smeared over the street it would hide what stands. Where road users are known,
+    only they are left out: what else moves, as seen from behind a handlebar, is a street that was not
+    understood. None where that leaves too few frames to fit, or nothing to judge.
     """
     seen = np.flatnonzero(~clip.held_out)
     frames = tuple(seen[options.withheld // 2 :: options.withheld].tolist())
@@ -109,8 +108,6 @@ def trial(
     if (~held_out).sum() < 2:
         return None
     small = replace(small, held_out=held_out)
-    moves = shown.moving >= 0.5
-    moves &= moves[~clip.held_out].mean() <= options.most_moving
     gaussians = initialise(small, shown, seeds)
     steps = ceil(options.visits * (~held_out).sum())
     fitted = fit_static(small, shown, gaussians, FitOptions(steps=steps), seed, silent)
@@ -121,13 +118,12 @@ def trial(
             image = drawn.colour + (1 - drawn.alpha)[..., None] * fitted.sky.colour(shown.cameras[i])
             image = fitted.exposure.apply(image, float(small.times_s[i]), int(small.camera[i])).clamp(0, 1)
             errors.append(np.abs(image.numpy() - small.frames[i] / np.float32(255)).mean(axis=2))
-            free = small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0)
-            judged.append(free & ~moves[i])
+            judged.append(small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0))
     return Trial(small, frames, np.stack(errors), np.stack(judged)) if np.any(judged) else None
 
 
 def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geometry]:
-    """Clip and geometry with pictures of at most that width; what no fit reads is left out."""
+    """Clip and geometry with pictures of at most that width, of the street alone."""
     width, height = clip.size
     size = min(width_px, width), max(1, round(height * min(width_px, width) / width))
 
@@ -136,11 +132,14 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
         resized = [cv2.resize(each.astype(kind), size, interpolation=cv2.INTER_NEAREST) for each in maps]
         return np.stack(resized).astype(maps.dtype)
 
+    moves = geometry.moving >= 0.5
+    if geometry.users is not None:
+        moves &= geometry.users > 0
     frames = np.stack([cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in clip.frames])
     small = replace(
         clip,
         frames=frames,
-        valid=near(clip.valid),
+        valid=near(clip.valid & ~moves),
         rig=tuple(camera.resized(*size) for camera in clip.rig),
         features={},
         latents=None,
@@ -149,9 +148,10 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
         looks=(),
     )
     maps: dict[str, Any] = {
-        name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky", "moving")
+        name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky")
     }
     regions = near(geometry.fixed_regions.astype(np.int32))
     cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
+    maps["moving"] = np.zeros_like(maps["confidence"])
     maps |= dict.fromkeys(("spread", "users", "stereo_ratio", "stereo_confidence"))
     return small, replace(geometry, cameras=cameras, fixed_regions=regions, **maps)
