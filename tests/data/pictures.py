@@ -1,5 +1,10 @@
 """Pictures for tests."""
 
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
 import cv2
 import numpy as np
 
@@ -20,3 +25,26 @@ def approach(seed: int = 0, count: int = 6, size: tuple[int, int] = (160, 96)) -
     return np.stack(
         [cv2.warpAffine(picture, matrix, size, borderMode=cv2.BORDER_REFLECT) for matrix in nearer]
     )
+
+
+def write_video(
+    path: Path,
+    pictures: Sequence[np.ndarray],
+    *,
+    codec: str = "libx264",
+    rate: int = 20,
+    kind: str | None = None,
+    aspect: Fraction | None = None,
+    **options: str,
+) -> Path:
+    """Encode pictures as a video; ``kind`` is its format, ``aspect`` the shape of its pixels."""
+    with av.open(str(path), "w", format=kind) as container:
+        stream = container.add_stream(codec, rate=rate, options=options)
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt = "yuv420p"
+        if aspect is not None:
+            stream.codec_context.sample_aspect_ratio = aspect
+        for picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return path

@@ -7,7 +7,7 @@ import av
 import numpy as np
 import pytest
 from av.stream import Disposition
-from tests.data.pictures import approach
+from tests.data.pictures import approach, write_video
 
 from dreamdrive.data import video
 from dreamdrive.data.clip_reader import read_clip
@@ -253,3 +253,32 @@ def test_pictures_of_an_unknown_kind_are_refused(make_video):
     assert str(caught.value) == (
         f"{path} holds pictures of a kind that cannot be decoded; expected H.264 or the like"
     )
+
+
+@pytest.mark.parametrize(("codec", "kind", "rate_hz"), [("libx264", "h264", 30), ("libsvtav1", "obu", None)])
+def test_a_bare_track_has_the_rate_it_says_and_no_other(tmp_path, codec, kind, rate_hz):
+    path = tmp_path / "a"
+    pictures = [np.ascontiguousarray(picture[:48, :64]) for picture in approach(count=4)]
+    write_video(path, pictures, codec=codec, rate=30, kind=kind)
+    assert Video.open(path).rate_hz == rate_hz
+    if rate_hz is None:
+        with pytest.raises(InputError, match="give its rate with --fps"):
+            read_clip(path)
+    else:
+        assert read_clip(path).times_s[1] == pytest.approx(1 / rate_hz)
+
+
+def test_of_several_tracks_the_first_is_read_and_that_is_said(tmp_path):
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w") as container:
+        streams = [container.add_stream("libx264", rate=10) for _ in range(2)]
+        for stream, size in zip(streams, ((64, 48), (128, 96)), strict=True):
+            stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        for stream in streams:
+            for _ in range(3):
+                picture = np.full((stream.height, stream.width, 3), 90, np.uint8)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+            container.mux(stream.encode())
+    frame = next(Video.open(path).read(ALL))
+    assert frame.size == (64, 48)
+    assert frame.notes[-1] == "The file has 2 tracks of pictures: the first is read."

@@ -3,12 +3,13 @@
 import os
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import av
-import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
 from av.stream import Disposition
@@ -16,6 +17,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from dreamdrive.data.images import RawFrame
+from dreamdrive.data.presentation import AS_STORED, LOOKED_AT, Presentation, presentation_of, untangled
 from dreamdrive.data.select import UNBOUNDED, out_of_range
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import open_file
@@ -31,6 +33,8 @@ _FORMATS = (
     *("dv", "gif", "rm", "dhav", "yuv4mpegpipe", "wav", "mp3", "aac", "flac"),
 )
 """Formats that FFmpeg may take a file for. Others play text, single pictures, or whatever a list names."""
+_BARE = frozenset(("h264", "hevc", "mpegvideo", "m4v", "obu", "vvc", "avs2", "avs3"))
+"""Formats of a track without a container: FFmpeg gives them 25 Hz, which nobody said."""
 _CODEC = {"max_pixels": str(MAX_PIXELS)}
 _OPTIONS = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file", **_CODEC}
 
@@ -43,10 +47,16 @@ _MAX_BOXES = 1_000_000
 
 @dataclass(frozen=True)
 class Video:
-    """The first video track of a file, decoded as a stream, and its mean rate by the file's own account."""
+    """The first track of pictures of a file, decoded as a stream.
+
+    ``rate_hz`` is the mean rate by the file's own account, ``tracks`` the number of tracks of pictures.
+    Without a ``clock`` the times of frames are FFmpeg's invention.
+    """
 
     path: Path
     rate_hz: float | None
+    tracks: int = 1
+    clock: bool = True
 
     @staticmethod
     def open(path: Path) -> "Video":
@@ -61,7 +71,9 @@ class Video:
                         f"{path} holds pictures of a kind that cannot be decoded; expected H.264 or the like"
                     )
                 size = coded.width, coded.height
-                rate = stream.average_rate
+                bare = container.format.name in _BARE
+                rate = coded.framerate if bare else stream.average_rate
+                tracks = len(_tracks(container))
         except FFmpegError as error:
             raise InputError(
                 f"{path} is not a readable video ({error.strerror}): it is cut short, damaged or of another "
@@ -72,7 +84,8 @@ class Video:
                 f"{path} has frames of {size[0]}x{size[1]} pixels; expected at most {MAX_PIXELS // 10**6} "
                 "megapixels: scale it down"
             )
-        return Video(path, float(rate) if rate and RATES_HZ[0] <= rate <= RATES_HZ[1] else None)
+        rate_hz = float(rate) if rate and RATES_HZ[0] <= rate <= RATES_HZ[1] else None
+        return Video(path, rate_hz, tracks, clock=not bare or rate is not None)
 
     def count(self) -> int:
         """Number of frames, by decoding them all: what the file itself claims is often wrong."""
@@ -94,12 +107,23 @@ class Video:
     def read(self, wanted: range) -> Iterator[RawFrame]:
         """The wanted frames in decode order, one at a time; decoding stops behind the last."""
         index, first_s, damaged = -1, None, False
-        for index, frame in enumerate(self._decode(wanted)):
-            first_s = _time_s(frame) if index == 0 else first_s
+        shown = self._presentation()
+        for index, frame in enumerate(self._decode(wanted, shown)):
+            now_s = _time_s(frame) if self.clock else None
+            first_s = now_s if index == 0 else first_s
             # Only the frame that could not be read is marked; those that refer to it are as bad.
             damaged = frame.is_corrupt or (damaged and not frame.key_frame)
             if index in wanted:
-                yield _raw(frame, index, first_s, damaged)
+                time_s = None if now_s is None or first_s is None else now_s - first_s
+                yield RawFrame(
+                    index,
+                    f"frame {index}",
+                    shown.apply(frame.to_ndarray(format="rgb24")),
+                    None,
+                    time_s,
+                    shown.notes,
+                    damaged,
+                )
             if index >= wanted[-1]:
                 return
         if index < 0:
@@ -108,13 +132,29 @@ class Video:
             missing = wanted.start if wanted.stop == UNBOUNDED else wanted[-1]
             raise out_of_range(missing, index + 1, str(self.path))
 
-    def _decode(self, wanted: range | None = None) -> Iterator[VideoFrame]:
+    def _presentation(self) -> Presentation:
+        """How to show the pictures; as they are where none can be read: whoever reads them says why."""
+        frames = list[VideoFrame]()
+        with suppress(FFmpegError), _opened(self.path) as container:
+            stream = _pictures(container, self.path)
+            stream.codec_context.options = _CODEC
+            with suppress(FFmpegError):
+                frames += islice(container.decode(stream), LOOKED_AT)
+            if frames:
+                found = presentation_of(stream, frames, str(self.path))
+                if self.tracks > 1:
+                    said = f"The file has {self.tracks} tracks of pictures: the first is read."
+                    found = replace(found, notes=(*found.notes, said))
+                return found
+        return AS_STORED
+
+    def _decode(self, wanted: range | None = None, shown: Presentation = AS_STORED) -> Iterator[VideoFrame]:
         done = 0
         try:
             with _opened(self.path) as container:
                 stream = _pictures(container, self.path)
                 stream.codec_context.options = _CODEC
-                for frame in container.decode(stream):
+                for frame in untangled(container.decode(stream), shown.untangler(stream)):
                     yield frame
                     done += 1
         except FFmpegError as error:
@@ -187,22 +227,13 @@ def _opened(path: Path) -> InputContainer:
 
 def _pictures(container: InputContainer, path: Path) -> VideoStream:
     """The first track of pictures that is no cover."""
-    for stream in container.streams.video:
-        if not stream.disposition & Disposition.attached_pic:
-            return stream
+    for stream in _tracks(container):
+        return stream
     raise InputError(f"{path} holds no picture track; expected a video")
 
 
-def _raw(frame: VideoFrame, index: int, first_s: float | None, damaged: bool) -> RawFrame:
-    rgb = frame.to_ndarray(format="rgb24")
-    quarters = round(frame.rotation / 90) % 4
-    notes: list[str] = []
-    if quarters:
-        rgb = np.ascontiguousarray(np.rot90(rgb, quarters))
-        notes.append("The video is turned upright as its header asks.")
-    now_s = _time_s(frame)
-    time_s = None if now_s is None or first_s is None else now_s - first_s
-    return RawFrame(index, f"frame {index}", rgb, None, time_s, tuple(notes), damaged)
+def _tracks(container: InputContainer) -> list[VideoStream]:
+    return [each for each in container.streams.video if not each.disposition & Disposition.attached_pic]
 
 
 def _time_s(frame: VideoFrame) -> float | None:

@@ -96,9 +96,9 @@ def trial(
 ) -> Trial | None:
     """Fit a street that stands to most of the frames that may be seen, small and short; judge the others.
 
-    What moves is no part of it: smeared over the street it would hide what stands. Where road users are known,
-    only they are left out: what else moves, as seen from behind a handlebar, is a street that was not
-    understood. None where that leaves too few frames to fit, or nothing to judge.
+    What moves is no part of it: smeared over the street it would hide what stands. Where road users are
+    known, only they are left out: what else moves, as seen from behind a handlebar, is a street that was
+    not understood. None where that leaves too few frames to fit, or nothing to judge.
     """
     seen = np.flatnonzero(~clip.held_out)
     frames = tuple(seen[options.withheld // 2 :: options.withheld].tolist())
@@ -147,9 +147,7 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
         set_in_motion=None,
         looks=(),
     )
-    maps: dict[str, Any] = {
-        name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky")
-    }
+    maps: dict[str, Any] = {name: near(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky")}
     regions = near(geometry.fixed_regions.astype(np.int32))
     cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
     maps["moving"] = np.zeros_like(maps["confidence"])
