@@ -68,7 +68,8 @@ def read_clip(
     sampler, read = _gather(source, chosen, size, lambda of: calibration(of, intrinsics, hfov_deg))
     index, clock_s = np.array([raw.index for raw in read]), [raw.time_s for raw in read]
     times_s, said = _times(source, index, clock_s, fps)
-    notes = [*said, *dict.fromkeys(note for raw in read for note in raw.notes), *sampler.notes]
+    listed = source.notes if isinstance(source, ImageFolder) else ()
+    notes = [*listed, *said, *dict.fromkeys(note for raw in read for note in raw.notes), *sampler.notes]
 
     def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
         if file is None:

@@ -9,10 +9,13 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from dreamdrive.data.picture_file import read_picture
+from dreamdrive.data.companions import frames_among
+from dreamdrive.data.picture_file import read_pages
 from dreamdrive.errors import InputError
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".avif")
+UNREAD = (".heic", ".heif", ".jxl", ".dng", ".cr2", ".cr3", ".nef", ".arw")
+"""Pictures of cameras that are not read, but known by their names."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +44,20 @@ class RawFrame:
 
 @dataclass(frozen=True)
 class ImageFolder:
-    """The images of one folder in natural order (2 before 10)."""
+    """The frames of one folder in natural order (2 before 10), with sentences for the report."""
 
     path: Path
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
     @staticmethod
     def open(path: Path) -> "ImageFolder":
-        """List the images of a folder; hidden files and other kinds are left alone."""
-        files = tuple(sorted(_images_in(path), key=lambda f: natural_key(f.name)))
+        """List the frames of a folder, not hidden files, other kinds and what lies beside frames."""
+        files = sorted(_images_in(path), key=lambda f: natural_key(f.name))
         if not files:
             raise InputError(f"{path} holds no images ({', '.join(SUFFIXES)}){_hint(path)}")
-        return ImageFolder(path, files)
+        listed = frames_among(files)
+        return ImageFolder(path, listed.files, listed.notes)
 
     def count(self) -> int:
         """Number of frames."""
@@ -75,12 +80,12 @@ def read_image(path: Path, index: int = 0) -> RawFrame:
 
     16-bit images are scaled by 255/65535, grey ones become RGB, and pixels less than half opaque are marked.
     """
-    image = read_picture(path)
+    image, pages = read_pages(path)
     if image.dtype.name not in ("uint8", "uint16"):
         raise InputError(f"{path} holds {image.dtype} numbers; expected 8 or 16 bits a channel")
     if image.ndim == 3 and image.shape[2] not in (3, 4):
         raise InputError(f"{path} has {image.shape[2]} channels; expected grey, RGB or RGB with opacity")
-    notes: list[str] = []
+    notes = ["Of images with several pages the first one is read."] if pages > 1 else []
     opaque = None
     if image.ndim == 3 and image.shape[2] == 4:
         opaque = np.ascontiguousarray(image[..., 3] >= np.iinfo(image.dtype).max / 2)
@@ -107,6 +112,9 @@ def _images_in(path: Path) -> list[Path]:
 
 def _hint(path: Path) -> str:
     """What the user may have meant instead."""
+    unread = [f.name for f in sorted(path.iterdir()) if f.suffix.lower() in UNREAD]
+    if unread:
+        return f"; {unread[0]} is of a kind that is not read: save such pictures as JPEG or PNG"
     folders = [f.name for f in sorted(path.iterdir()) if f.is_dir() and _images_in(f)]
     videos = [f.name for f in sorted(path.iterdir()) if f.suffix.lower() in (".mp4", ".mov", ".mkv", ".avi")]
     found = [*folders[:6], *videos[:6]]

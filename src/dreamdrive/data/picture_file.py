@@ -1,12 +1,15 @@
 """Pictures on disk, decoded only where their header says that they fit into memory."""
 
+import re
 import struct
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 from jaxtyping import Shaped
+from PIL import Image, ImageOps
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_bytes
@@ -15,7 +18,7 @@ MAX_PIXELS = 64_000_000
 """Pixels that a picture may have: twice as many as a frame of 8K video, 0.2 GB."""
 PICTURE_BYTES = 200_000_000
 """Bytes that a file of a picture may have, so that file and picture fit into memory together."""
-KINDS = "PNG, JPEG, BMP, TIFF or WebP"
+KINDS = "PNG, JPEG, BMP, TIFF, WebP or AVIF"
 _MAX_SCANS = 50
 """Scans that a JPEG may have: decoding takes as long for each. Usual are 10."""
 _JPEG_SIZES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
@@ -26,26 +29,37 @@ _JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xDA)})
 _BYTES_OF = {1: 1, 3: 2, 4: 4, 16: 8}
 """Bytes of a whole number in TIFF, by its type."""
 _WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274
+_NEXT = -1
+"""In place of a tag: where the next directory of a TIFF lies, 0 where there is none."""
+_AVIF_HEAD = 100_000
+"""Bytes at the start of an AVIF in which it tells its size."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """The header of a PNG, JPEG, BMP, TIFF or WebP, with its size as stored, before turning.
+    """The header of a picture, with its size as stored, before turning.
 
-    ``orientation`` is how to turn it, as EXIF counts, 1 to 8; 1 of a TIFF, which its decoder turns.
+    ``orientation`` is how to turn it, as EXIF counts, 1 to 8; 1 where its decoder turns it, as of a TIFF.
+    ``pages`` are 2 where there are more than one.
     """
 
     kind: str
     width_px: int
     height_px: int
     orientation: int = 1
+    pages: int = 1
 
 
 def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     """A picture with its own depth and channels, upright: grey, or blue, green, red and perhaps alpha.
 
-    Messages call it ``where``, or by its path.
+    Messages call it ``where``, or by its path. Of several pages it is the first.
     """
+    return read_pages(path, where)[0]
+
+
+def read_pages(path: Path, where: str = "") -> tuple[Shaped[np.ndarray, "h w *c"], int]:
+    """The picture as of ``read_picture``, and its number of pages: 1, or 2 for several."""
     where = where or str(path)
     data = read_bytes(path, where, at_most=PICTURE_BYTES)
     if not data:
@@ -58,6 +72,8 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
     if header is None or 0 in (header.width_px, header.height_px):
         raise InputError(f"{where} cannot be read as an image; expected {KINDS}")
     _check(header, data, where)
+    if header.kind == "AVIF":
+        return _decoded_by_pillow(data, where), header.pages
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -68,7 +84,7 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
         cv2.utils.logging.setLogLevel(level)
     if picture is None:  # pyright: ignore[reportUnnecessaryComparison]
         raise InputError(f"{where} cannot be read as an image; expected {KINDS}")
-    return _upright(np.asarray(picture), header.orientation)
+    return _upright(np.asarray(picture), header.orientation), header.pages
 
 
 def write_picture(
@@ -83,6 +99,18 @@ def write_picture(
     if path.suffix.lower() == ".png":
         options = [] if compression is None else [cv2.IMWRITE_PNG_COMPRESSION, compression]
     path.write_bytes(cv2.imencode(path.suffix, np.ascontiguousarray(picture), options)[1].tobytes())
+
+
+def _decoded_by_pillow(data: bytes, where: str) -> Shaped[np.ndarray, "h w *c"]:
+    """What OpenCV's wheels do not read."""
+    try:
+        with Image.open(BytesIO(data), formats=("AVIF",)) as opened:
+            upright = ImageOps.exif_transpose(opened)
+            return np.asarray(upright.convert("RGBA" if "A" in upright.getbands() else "RGB"))[
+                ..., [2, 1, 0, 3][: len(upright.getbands())]
+            ]
+    except (OSError, ValueError, SyntaxError) as error:
+        raise InputError(f"{where} cannot be read as an image: {error}") from error
 
 
 def _check(header: Header, data: bytes, where: str) -> None:
@@ -125,7 +153,10 @@ def parse_header(data: bytes) -> Header | None:
             return _bmp(data)
         if data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
             tags = _tags(data)
-            return Header("TIFF", max(tags.get(_WIDTH, [0])), max(tags.get(_HEIGHT, [0])))
+            size = max(tags.get(_WIDTH, [0])), max(tags.get(_HEIGHT, [0]))
+            return Header("TIFF", *size, pages=2 if tags.get(_NEXT, [0])[0] else 1)
+        if data[4:12] in (b"ftypavif", b"ftypavis"):
+            return _avif(data)
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             return _webp(data)
     except struct.error:
@@ -137,16 +168,17 @@ def _png(data: bytes) -> Header | None:
     if data[12:16] != b"IHDR":
         return None
     width, height = struct.unpack_from(">II", data, 16)
-    place, orientation, kind = 8, 1, b""
+    place, orientation, kind, pages = 8, 1, b"", 1
     while kind != b"IEND":
         length, kind = struct.unpack_from(">I4s", data, place)
         if kind == b"eXIf":
             orientation = _turn(data[place + 8 : place + 8 + length])
+        pages = 2 if kind == b"acTL" else pages
         place += 12 + length
         # OpenCV takes memory for what a part says that it holds.
         if place > len(data):
             return None
-    return Header("PNG", width, height, orientation)
+    return Header("PNG", width, height, orientation, pages)
 
 
 def _jpeg(data: bytes) -> Header | None:
@@ -187,13 +219,25 @@ def _webp(data: bytes) -> Header | None:
     if kind != b"VP8X" or len(data) < 30:
         return None
     width, height = (int.from_bytes(data[place : place + 3], "little") + 1 for place in (24, 27))
-    place, orientation = 12, 1
+    place, orientation, pages = 12, 1, 1
     while place + 8 <= len(data):
         name, length = struct.unpack_from("<4sI", data, place)
         if name == b"EXIF":
             orientation = _turn(data[place + 8 : place + 8 + length].removeprefix(b"Exif\0\0"))
+        pages = 2 if name == b"ANIM" else pages
         place += 8 + length + length % 2
-    return Header("WebP", width, height, orientation)
+    return Header("WebP", width, height, orientation, pages)
+
+
+def _avif(data: bytes) -> Header | None:
+    """By the boxes that tell an image's extent; a grid of tiles has one for the whole, the largest."""
+    extents = [
+        struct.unpack_from(">II", data, at.end() + 4) for at in re.finditer(b"ispe", data[:_AVIF_HEAD])
+    ]
+    if not extents:
+        return None
+    width, height = max(extents, key=lambda extent: extent[0] * extent[1])
+    return Header("AVIF", width, height, pages=2 if data[8:12] == b"avis" else 1)
 
 
 def _turn(exif: bytes) -> int:
@@ -221,4 +265,7 @@ def _tags(data: bytes) -> dict[int, list[int]]:
             at += 12 if big else 8
             value = data[at : at + _BYTES_OF.get(kind, 4)]
             found.setdefault(tag, []).append(int.from_bytes(value, "little" if order == "<" else "big"))
+    end = place + count * (20 if big else 12)
+    following = data[end : end + (8 if big else 4)]
+    found[_NEXT] = [int.from_bytes(following, "little" if order == "<" else "big")]
     return found

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dreamdrive.data.images import SUFFIXES, ImageFolder
+from dreamdrive.data.images import SUFFIXES, UNREAD, ImageFolder
 from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 
@@ -19,6 +19,8 @@ def open_source(path: Path) -> Source:
         return ImageFolder.open(frames if frames.is_dir() else path)
     if path.suffix.lower() in SUFFIXES:
         raise one_frame(path)
+    if path.suffix.lower() in UNREAD:
+        raise InputError(f"{path} is a picture of a kind that is not read; save it as JPEG or PNG")
     if path.suffix.lower() == ".json":
         raise InputError(f"{path} is a JSON file, not a recording; a layout is taken by --prior street-world")
     return Video.open(path)
