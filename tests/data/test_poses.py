@@ -111,6 +111,40 @@ def test_poses_of_another_rate_are_matched_by_time(write, start_s):
     assert bool(notes) == (start_s > 0)
 
 
+def tum(poses: np.ndarray, times_s: np.ndarray) -> str:
+    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    table = np.column_stack([times_s, poses[:, :3, 3], quaternions])
+    return "\n".join(" ".join(f"{x:.9f}" for x in row) for row in table)
+
+
+@pytest.mark.parametrize(
+    ("times_s", "index", "fps"),
+    [(np.arange(16.0), range(16), "1"), (np.arange(8) / 10, range(0, 16, 2), "20")],
+)
+def test_times_that_do_not_fit_count_more_than_a_number_that_does(write, times_s, index, fps):
+    path = write(tum(drive(len(times_s)), times_s))
+    with pytest.raises(InputError, match=rf"a pose for each frame, but its times span .* give --fps {fps},"):
+        read(path, list(index), 16)
+
+
+@pytest.mark.parametrize("clock", [lambda t: t, lambda t: t + 1.5e9, lambda t: 1.01 * t + 3])
+def test_a_clock_of_its_own_start_and_pace_is_no_matter(write, clock):
+    poses = drive(12)
+    got, notes = read(write(tum(poses, clock(np.arange(12) / 10))), list(range(12)), 12)
+    np.testing.assert_allclose(got, to_first(poses), atol=1e-6)
+    assert notes == ()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("name", ["p.txt", "p.json"])
+def test_text_as_other_editors_save_it_is_read(tmp_path, encoding, name):
+    poses, times_s = drive(4), np.arange(4) / 10
+    write_trajectory(Trajectory(poses, times_s), tmp_path / name)
+    (tmp_path / name).write_bytes((tmp_path / name).read_text().replace("\n", "\r\n").encode(encoding))
+    got, _ = read(tmp_path / name, [0, 1, 2, 3], 4)
+    np.testing.assert_allclose(got, to_first(poses), atol=1e-9)
+
+
 def test_poses_too_far_from_the_frames_are_refused(write, tmp_path):
     write_trajectory(Trajectory(drive(7), np.arange(7.0)), tmp_path / "t.json")
     with pytest.raises(InputError, match=r"a frame lies .* at most half a frame \(0.05 s\)"):
@@ -183,7 +217,7 @@ def test_a_trajectory_needs_times(write):
 
 
 def test_files_that_are_not_text_are_refused(tmp_path):
-    (tmp_path / "p.txt").write_bytes(b"\xff\xfe\x00\x81")
+    (tmp_path / "p.txt").write_bytes(b"\x81\xfe\x00")
     for path in (tmp_path / "p.txt", tmp_path / "none.txt"):
         with pytest.raises(InputError, match="cannot be read"):
             read(path, [0, 1], 2)

@@ -23,6 +23,8 @@ from dreamdrive.files.output import new_file
 from dreamdrive.files.paths import read_text
 from dreamdrive.scene.trajectory import Trajectory
 
+_CLOCKS_DIFFER = 0.05
+"""Part by which the rates of two clocks may differ that tell the same times."""
 _CLOCK_NOTE = "The times of the pose file count from its first row, taken as frame 0 of the input."
 
 
@@ -84,23 +86,40 @@ def of_frames(
 ) -> tuple[Float[np.ndarray, "f 4 4"], tuple[str, ...]]:
     """Those of a file's poses that are of the selected frames, in the frame of the first, and notes.
 
-    A file has one pose per frame of the source, or one per selected frame; with any other number, poses with
-    times are matched to the nearest frame within half a frame, both since frame 0 of the source. ``count``
-    gives the number of frames of the source; it is called only where it decides.
+    A file has one pose per frame of the source, or one per selected frame, and its times, if it has any, run
+    as those of the frames do; else poses with times are matched to the nearest frame within half a frame,
+    both since frame 0 of the source. ``count`` gives the number of frames of the source; it is called only
+    where it decides.
     """
     notes: tuple[str, ...] = ()
-    if len(rows) == len(index):
-        chosen = np.arange(len(index))
-    elif len(rows) == count():
-        chosen = np.asarray(index)
-    elif rows.times_s is None:
+    chosen = _by_count(rows, index, count)
+    if rows.times_s is None and chosen is None:
         raise InputError(
             f"{rows.where} has {len(rows)} poses, but the input has {count()} frames, {len(index)} of "
             "them selected; expected one pose per frame of the input or per selected frame"
         )
-    else:
-        chosen, notes = _by_time(rows.where, rows.times_s, index, times_s)
+    if rows.times_s is not None and (chosen is None or not _run_alike(rows.times_s[chosen], times_s)):
+        chosen, notes = _by_time(rows.where, rows.times_s, index, times_s, counts=chosen is not None)
     return to_first(rows.world_from_camera[chosen]), notes
+
+
+def _by_count(
+    rows: PoseRows, index: Int[np.ndarray, " f"], count: Callable[[], int]
+) -> Int[np.ndarray, " f"] | None:
+    """The rows of the frames where there is one for each of them, or one for each of the source."""
+    if len(rows) == len(index):
+        return np.arange(len(index))
+    return np.asarray(index) if len(rows) == count() else None
+
+
+def _run_alike(rows_s: Float[np.ndarray, " f"], times_s: Float[np.ndarray, " f"]) -> bool:
+    """Whether two clocks differ by where they start and, a little, by how fast they run."""
+    if len(times_s) < 2:
+        return True
+    ours_s, theirs_s = times_s - times_s[0], rows_s - rows_s[0]
+    rate = theirs_s[-1] / ours_s[-1]
+    apart_s = np.abs(theirs_s - rate * ours_s).max()
+    return bool(abs(rate - 1) < _CLOCKS_DIFFER and apart_s <= np.median(np.diff(times_s)))
 
 
 def to_first(poses: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "f 4 4"]:
@@ -119,8 +138,13 @@ def _by_time(
     rows_s: Float[np.ndarray, " n"],
     index: Int[np.ndarray, " f"],
     times_s: Float[np.ndarray, " f"],
+    *,
+    counts: bool,
 ) -> tuple[Int[np.ndarray, " f"], tuple[str, ...]]:
-    """The nearest row of each frame, on the source's clock or, if that cannot be, on the file's own."""
+    """The nearest row of each frame, on the source's clock or, if that cannot be, on the file's own.
+
+    ``counts`` tells that the file has as many rows as there are frames, whose times run otherwise.
+    """
     period_s = float(np.median(np.diff(times_s) / np.diff(index)))
     worst = np.inf
     for clock_s, notes in ((rows_s, ()), (rows_s - rows_s[0], (_CLOCK_NOTE,))):
@@ -129,6 +153,14 @@ def _by_time(
         if gap.max() <= period_s / 2 and (np.diff(chosen) > 0).all():
             return chosen, notes
         worst = min(worst, float(gap.max()))
+    if counts:
+        steps = index[-1] - index[0] if len(rows_s) == len(index) else len(rows_s) - 1
+        span_s = rows_s[-1] - rows_s[0]
+        raise InputError(
+            f"{where} has a pose for each frame, but its times span {span_s:.3g} s and those of the frames "
+            f"{times_s[-1] - times_s[0]:.3g} s; if it is of these frames, give --fps "
+            f"{steps / max(span_s, 1e-9):.3g}, or leave the times out of the file"
+        )
     raise InputError(
         f"{where}: its {len(rows_s)} poses (times {rows_s[0]:g} to {rows_s[-1]:g} s) do not meet the "
         f"{len(index)} selected frames ({times_s[0]:g} to {times_s[-1]:g} s): a frame lies {worst:.3g} s "

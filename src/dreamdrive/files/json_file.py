@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.paths import TEXT_BYTES, read_bytes
+from dreamdrive.files.paths import TEXT_BYTES, read_bytes, text_in
 
 MAX_DEPTH = 32
 """How deep objects and lists may lie in each other; what is read and written has ten levels at most."""
@@ -47,7 +47,7 @@ def _as_list(array: Any) -> Any:
 def parse_json(data: bytes | str, where: str) -> Any:
     """JSON values without NaN, infinities and far too large numbers, nested ``MAX_DEPTH`` at most."""
     try:
-        values = msgspec.json.decode(data)
+        values = msgspec.json.decode(text_in(data) if isinstance(data, bytes) else data)
     except RecursionError:
         raise InputError(f"{where} is not JSON for dreamdrive: it is nested too deep") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

@@ -63,11 +63,16 @@ def read_bytes(path: Path, where: str = "", *, at_most: int, follow: bool = True
             raise InputError(f"{where} cannot be read: {error.strerror}") from error
 
 
+def text_in(data: bytes) -> str:
+    """Text in UTF-8, or as a byte order mark at its start tells; ``UnicodeDecodeError`` for others."""
+    return data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+
+
 def read_text(path: Path, where: str = "", *, at_most: int = TEXT_BYTES) -> str:
-    """The text in a file, in UTF-8."""
+    """The text in a file, as of ``text_in``."""
     data = read_bytes(path, where, at_most=at_most)
     try:
-        return data.decode("utf-8")
+        return text_in(data)
     except UnicodeDecodeError as error:
         raise InputError(f"{where or path} cannot be read as text: {error}") from None
 

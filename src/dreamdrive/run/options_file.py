@@ -28,9 +28,12 @@ def read_options(path: Path, base: Options) -> Options:
     The file holds tables such as ``[fit]`` with ``steps = 600``; every field of ``Options`` can be set but
     the seed and the weights, which have flags.
     """
+    text = read_text(path)
     try:
-        values = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
+        values = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"--options {path} is not TOML for dreamdrive: it is nested too deep") from None
+    except ValueError as error:  # also of numbers with more digits than Python reads
         raise InputError(f"--options {path} is not TOML: {error}") from None
     return _changed(base, values, "", f"--options {path}", sorted(_names(base, "")))
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.paths import read_bytes
+from dreamdrive.files.paths import read_bytes, text_in
 
 MOST_BYTES = 200_000_000
 """Of a file, and of what it unpacks to: the boxes of a log take 2 MB."""
@@ -62,7 +62,7 @@ def _of_csv(file: Path) -> dict[str, Sequence[Any]]:
     if file.suffix == ".gz":
         data = _unpacked(data, file)
     try:
-        rows = list(csv.reader(io.StringIO(data.decode("utf-8"), newline="")))
+        rows = list(csv.reader(io.StringIO(text_in(data), newline="")))
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file} is damaged or no CSV ({error}); download it again") from None
     head, *rows = [row for row in rows if row] or [[]]
