@@ -62,7 +62,10 @@ def with_core(folder: Path) -> None:
             build_core(folder, core)
             core.rename(kept)
     for library in kept.iterdir():
-        shutil.copy(library, folder / "src" / "dreamdrive")
+        # Replaced in one step: whoever runs this commit beside us has the library in memory.
+        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
+            copied = shutil.copy(library, made)
+            os.replace(copied, folder / "src" / "dreamdrive" / library.name)
 
 
 def interpreter_of(folder: Path) -> Path:

@@ -1,6 +1,7 @@
 """Entry point of ``dreamdrive``."""
 
 import errno
+import io
 import logging
 import sys
 
@@ -43,6 +44,7 @@ COMMANDS = {
 }
 _USER_ERROR, _INTERRUPTED, _TERMINATED = 2, 130, 143
 # What the machine may refuse without anything being wrong with the program.
+_NO_MEMORY = "Insufficient memory", "can't allocate memory", "CUDA out of memory"
 _REFUSALS = {
     errno.ENOSPC: "free some space, or choose a folder on another disk",
     errno.EDQUOT: "free some of your quota, or choose a folder on another disk",
@@ -60,6 +62,10 @@ def main() -> None:
     Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted, 143 terminated.
     """
     stop_like_an_interruption()
+    for stream in (sys.stdout, sys.stderr):
+        # What a terminal cannot show is shown as a question mark: better than to fail behind the work.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     if sys.argv[1:] == ["--version"]:
         Console(highlight=False).print(f"dreamdrive {dreamdrive.__version__}")
@@ -85,3 +91,13 @@ def main() -> None:
         where = f" ({error.filename})" if error.filename else ""
         errors.print(f"error: {error.strerror}{where}; {_REFUSALS[error.errno]}")
         sys.exit(_USER_ERROR)
+    except Exception as error:
+        if not _out_of_memory(error):
+            raise
+        errors.print("error: memory is used up; choose fewer frames with --frames, or a smaller --size")
+        sys.exit(_USER_ERROR)
+
+
+def _out_of_memory(error: Exception) -> bool:
+    """Whether Python, or the allocator of OpenCV or PyTorch, got no more memory."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY)
