@@ -175,28 +175,38 @@ class Clip:
         """Indices of those of them that a fit may see."""
         return np.flatnonzero((self.camera == camera) & ~self.held_out).tolist()
 
-    def only(self, camera: int) -> "Clip":
-        """The frames of one camera of the rig, with what is known of them; it is mounted at the identity."""
-        rows, known = self.of_camera(camera), self.known
+    def of_frames(self, rows: Int[np.ndarray, " k"]) -> "Clip":
+        """Some of the frames, in their order, with what is known of them but what the street network saw."""
+        known, motion = self.known, self.set_in_motion
         return replace(
             self,
             frames=self.frames[rows],
             times_s=self.times_s[rows],
-            camera=np.zeros(len(rows), dtype=np.int64),
-            rig=(self.rig[camera].at(np.eye(4)),),
+            camera=self.camera[rows],
             valid=self.valid[rows],
             held_out=self.held_out[rows],
             source_index=self.source_index[rows],
             features={name: values[rows] for name, values in self.features.items()},
             latents=None if self.latents is None else self.latents[rows],
-            looks=self.looks[camera : camera + 1],
-            cuts=tuple(np.flatnonzero(np.isin(rows, self.cuts)).tolist()),
+            set_in_motion=None if motion is None else motion[rows],
+            looks=(),
+            cuts=tuple(row for row in np.flatnonzero(np.isin(rows, self.cuts)).tolist() if row),
             known=replace(
                 known,
                 world_from_camera=None if known.world_from_camera is None else known.world_from_camera[rows],
                 depth_m=None if known.depth_m is None else known.depth_m[rows],
                 sky=None if known.sky is None else known.sky[rows],
             ),
+        )
+
+    def only(self, camera: int) -> "Clip":
+        """The frames of one camera of the rig, with what is known of them; it is mounted at the identity."""
+        own = self.of_frames(self.of_camera(camera))
+        return replace(
+            own,
+            camera=np.zeros(len(own), dtype=np.int64),
+            rig=(self.rig[camera].at(np.eye(4)),),
+            looks=self.looks[camera : camera + 1],
         )
 
     def with_features(self, **features: Float[np.ndarray, "f _ _ _"]) -> "Clip":

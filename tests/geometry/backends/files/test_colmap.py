@@ -1,5 +1,6 @@
 """COLMAP's models: conventions, matching, lenses, and what is said about bad ones."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,9 +71,35 @@ def test_other_names_count_in_order(tmp_path):
     assert len(got.known.world_from_camera) == 6
 
 
+def test_pictures_that_were_not_registered_are_left_out_and_named(tmp_path):
+    rows = [0, 1, 3, 5]
+    drives.write_colmap_text(tmp_path / "model", TRUTH[rows], [NAMES[row] for row in rows])
+    clip = drives.make_clip(tmp_path / "clip", [0, 1, 2, 3, 4, 5])
+    got = attach(replace(clip, held_out=np.arange(6) == 1), tmp_path / "model")
+    assert got.source_index.tolist() == rows
+    np.testing.assert_array_equal(got.frames, clip.frames[rows])
+    np.testing.assert_allclose(got.times_s, clip.times_s[rows] - clip.times_s[0])
+    np.testing.assert_allclose(got.known.world_from_camera, drives.relative(TRUTH[rows]), atol=1e-9)
+    assert got.held_out.tolist() == [False, True, False, False]
+    assert any(
+        "2 of the 6 selected frames: 0002.jpg, 0004.jpg: these frames" in n for n in got.provenance["notes"]
+    )
+
+
+def test_a_clip_that_loses_its_start_begins_at_time_0_and_sees_its_ends(tmp_path):
+    drives.write_colmap_text(tmp_path / "model", TRUTH[2:], NAMES[2:])
+    clip = drives.make_clip(tmp_path / "clip", [0, 1, 2, 3, 4, 5])
+    got = attach(replace(clip, held_out=np.arange(6) == 2), tmp_path / "model")
+    assert got.times_s[0] == 0
+    assert not got.held_out.any()
+    np.testing.assert_array_equal(got.known.world_from_camera[0], np.eye(4))
+
+
 def test_missing_pictures_are_named(tmp_path):
-    drives.write_colmap_text(tmp_path / "model", TRUTH[:3], NAMES[:3])
-    with pytest.raises(InputError, match=r"2 of the 4 selected frames: 0003.jpg, 0004.jpg;.*--frames"):
+    drives.write_colmap_text(tmp_path / "model", TRUTH[:2], NAMES[:2])
+    with pytest.raises(
+        InputError, match=r"3 of the 4 selected frames: 0002.jpg, 0003.jpg, 0004.jpg; expected"
+    ):
         attach(drives.make_clip(tmp_path / "clip", [1, 2, 3, 4]), tmp_path / "model")
     drives.write_colmap_text(tmp_path / "model", TRUTH[:3], ["a.jpg", "b.jpg", "c.jpg"])
     with pytest.raises(InputError, match=r"poses for 3 pictures.*6 frames of the input or of the 2 selected"):

@@ -14,7 +14,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.geometry.backends.files.formats import recognise
 from dreamdrive.geometry.backends.files.given import NAME, DepthFiles, Given
-from dreamdrive.geometry.backends.files.wanted import Wanted
+from dreamdrive.geometry.backends.files.wanted import PosesMissingError, Wanted
 from dreamdrive.geometry.road import depth_ratios, factor_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
@@ -22,6 +22,8 @@ from dreamdrive.scene.clip import Clip, Known
 _SAME_PINHOLE = 0.05
 """How far the focal length of files may be from that of frames that were undistorted to a known pinhole."""
 _ASPECT_TOLERANCE = 0.01
+_LEAST_SHARE = 0.5
+"""Part of the frames that have to have poses for the others to be left out."""
 
 
 @dataclass(frozen=True)
@@ -104,10 +106,15 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
 
     Raises:
         InputError: A file is missing or damaged, or does not fit the clip.
+
+    Frames that a model did not register are left out, and that is said.
     """
     reader, place = recognise(path)
-    wanted = Wanted.of(clip, source)
-    given = reader(place, wanted)
+    try:
+        given, gaps = reader(place, Wanted.of(clip, source)), list[str]()
+    except PosesMissingError as missing:
+        clip, gaps = _with_poses(clip, missing)
+        given = reader(place, Wanted.of(clip, source))
     onto = OntoClip.of(clip)
     rig, camera = _rig(clip, given, onto, str(place))
     bent = not given.cameras or any(each.distortion is not None for each in given.cameras)
@@ -123,7 +130,7 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
         metric=given.metric,
         points=points,
     )
-    said = [*clip.provenance.get("notes", []), *given.notes, *notes]
+    said = [*clip.provenance.get("notes", []), *gaps, *given.notes, *notes]
     if given.cameras and not clip.known.intrinsics:
         said.append(f"The focal length is that of {place.name}, not the one that was taken before.")
     attached = replace(clip, rig=rig, camera=camera, known=known)
@@ -132,6 +139,17 @@ def attach(clip: Clip, path: Path, source: Path | None = None) -> Clip:
         attached = replace(attached, known=known)
         said.append(note)
     return replace(attached, provenance={**clip.provenance, "notes": said})
+
+
+def _with_poses(clip: Clip, missing: PosesMissingError) -> tuple[Clip, list[str]]:
+    """The frames of the clip that have poses, from time 0 on, and what to say about the others."""
+    kept = missing.kept
+    if len(kept) < _LEAST_SHARE * len(clip) or len(kept) < 2:
+        raise InputError(f"{missing}; expected poses for at least half of them: add them to the model")
+    rest = clip.of_frames(kept)
+    held_out = rest.held_out & (np.arange(len(kept)) > 0) & (np.arange(len(kept)) < len(kept) - 1)
+    rest = replace(rest, times_s=rest.times_s - rest.times_s[0], held_out=held_out)
+    return rest, [f"{missing}: these frames are left out."]
 
 
 def _rig(

@@ -14,6 +14,14 @@ from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
 
 
+class PosesMissingError(InputError):
+    """Some of the selected frames have no pose; ``kept`` are the others (K,), by their place among them."""
+
+    def __init__(self, message: str, kept: Int[np.ndarray, " k"]) -> None:
+        super().__init__(message)
+        self.kept = kept
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What is known of the frames for which geometry is wanted."""
@@ -73,9 +81,10 @@ class Wanted:
         missing = [name for name, row in zip(self.names or (), found, strict=True) if row is None]
         if missing:
             more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-            raise InputError(
+            raise PosesMissingError(
                 f"{where} has no pose for {len(missing)} of the {len(found)} selected frames: "
-                f"{', '.join(missing[:8])}{more}; add them to the model or leave them out with --frames"
+                f"{', '.join(missing[:8])}{more}",
+                np.flatnonzero([row is not None for row in found]),
             )
         return np.array(found, np.intp), ()
 
