@@ -52,6 +52,13 @@ ROUGH = {
             "recording with five frames a second or more, or a smaller step in --frames",
         ),
     ),
+    "poses of another unit": (
+        replace(GOOD, basis="given", against="the camera is 0.16 m above the road, not 1.50 m"),
+        (
+            "by the poses that were given the camera is 0.16 m above the road, not 1.50 m: their unit is no "
+            "metre, or they are not of these frames. Bring their positions to metres, or leave them out",
+        ),
+    ),
     "three frames": (
         replace(GOOD, frames=3, placed=3),
         ("there are only 3 frames. Give 8 or more, better 24, with --frames or a longer recording",),
@@ -114,6 +121,10 @@ METRES = {
     ),
     "poses": (replace(GOOD, basis="given", spread=0.0), "as given with the input"),
     "depth": (replace(GOOD, basis="given", spread=0.05), "as given with the input, within 5 %"),
+    "another unit": (
+        replace(GOOD, basis="given", spread=0.0, against="the car drives 80 m/s"),
+        "as given with the input, which cannot be right: the car drives 80 m/s",
+    ),
     "speed": (
         replace(GOOD, basis="usual speed", spread=0.6),
         "nothing shows them; a speed of 8 m/s is assumed, so that all distances may be off by 60 % or more. "

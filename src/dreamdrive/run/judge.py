@@ -35,7 +35,8 @@ class Facts:
     piece between two cuts, where frames are ``step`` apart. Likeness is the mean of the held-out frames in
     decibels, and that of blending their neighbours along the motion in the picture. ``basis`` is what metres
     rest on, ``spread`` how far they may be off, as a fraction. ``all_moves`` where nothing is known to stand,
-    ``drifts`` where the street moves as the picture does.
+    ``drifts`` where the street moves as the picture does. ``against`` says why metres that were given cannot
+    be right.
     """
 
     frames: int
@@ -52,6 +53,7 @@ class Facts:
     spread: float
     all_moves: bool = False
     drifts: bool = False
+    against: str = ""
 
 
 def facts_of(
@@ -87,6 +89,7 @@ def facts_of(
         spread=geometry.scale.spread,
         all_moves=none_stands or _moving_share(clip, geometry, lead) >= EVERYTHING,
         drifts=drifts,
+        against=geometry.scale.against,
     )
 
 
@@ -136,7 +139,8 @@ def _mean_psnr(scores: dict[int, Likeness]) -> float | None:
 
 def rough_because(facts: Facts) -> tuple[str, ...]:
     """Why the result is rough, and what helps, a sentence each; nothing where it is not."""
-    reasons = [_of_few(facts), _of_fallback(facts), _of_cuts(facts), _of_motion(facts), _of_held_out(facts)]
+    of = _of_few, _of_fallback, _of_cuts, _of_motion, _of_scale, _of_held_out
+    reasons = [each(facts) for each in of]
     return tuple(reason for reason in reasons if reason is not None)
 
 
@@ -186,6 +190,15 @@ def _of_motion(facts: Facts) -> str | None:
     )
 
 
+def _of_scale(facts: Facts) -> str | None:
+    if not facts.against:
+        return None
+    return (
+        f"by the poses that were given {facts.against}: their unit is no metre, or they are not of these "
+        "frames. Bring their positions to metres, or leave them out"
+    )
+
+
 def _of_few(facts: Facts) -> str | None:
     if facts.frames < ENOUGH_FRAMES:
         return (
@@ -222,6 +235,8 @@ def limits_of(facts: Facts) -> tuple[str, str]:
 
 def _metres(facts: Facts) -> str:
     if facts.basis == "given":
+        if facts.against:
+            return f"as given with the input, which cannot be right: {facts.against}"
         return "as given with the input" + ("" if facts.spread == 0 else f", within {_percent(facts)}")
     if facts.basis in ("usual speed", "usual depth"):
         what = "a speed of 8 m/s" if facts.basis == "usual speed" else "a distance of 12 m"

@@ -30,12 +30,14 @@ class Scale:
         spread: Relative spread of the scale, as a fraction; infinite when there is no metric scale.
         others: What else tells metres, by its source: its metres for one of this scale, 1 where both agree.
         basis: The kind of that source.
+        against: Why it cannot be right, in words; empty where nothing is against it.
     """
 
     source: str
     spread: float
     others: dict[str, float] = field(default_factory=dict)
     basis: Basis = "given"
+    against: str = ""
 
     @property
     def disagreement(self) -> float | None:

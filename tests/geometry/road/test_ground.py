@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,7 +10,14 @@ from dreamdrive.geometry.cameras.posing import pose_clip
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.geometry.road.ground_points import fit_points
 from dreamdrive.geometry.road.ground_sweep import Road, sweep
-from dreamdrive.geometry.road.scale import Street, asked_m_s, from_ground, from_road_points
+from dreamdrive.geometry.road.scale import (
+    Street,
+    as_given,
+    asked_m_s,
+    contradicted,
+    from_ground,
+    from_road_points,
+)
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -90,3 +98,43 @@ def test_the_camera_height_gives_metres() -> None:
     assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)
     assert "1.50 m (given)" in posed.scale.source
     assert posed.scale.spread < 0.1
+
+
+@cache
+def driven() -> Street:
+    """A street whose road shows, by poses in metres."""
+    path = straight([0.6] * 7)
+    clip = make_clip(path)
+    return Street.of(clip, observe(clip), clip.rig[0], path, np.zeros((0, 3)))
+
+
+@pytest.mark.parametrize(
+    ("unit", "told_m", "said"),
+    [
+        (0.1, None, "where cars carry it 1 to 3.5 m high"),
+        (0.5, None, "where cars carry it 1 to 3.5 m high"),
+        (1.0, None, ""),
+        (2.0, None, ""),
+        (5.0, None, "where cars carry it 1 to 3.5 m high"),
+        (0.1, HEIGHT_M, "not 1.50 m"),
+        (0.5, HEIGHT_M, "not 1.50 m"),
+        (1.0, HEIGHT_M, ""),
+        (2.0, HEIGHT_M, "not 1.50 m"),
+        (5.0, HEIGHT_M, "not 1.50 m"),
+    ],
+)
+def test_a_unit_that_is_no_metre_is_said(unit: float, told_m: float | None, said: str) -> None:
+    seen = driven()
+    poses = seen.world_from_camera.copy()
+    poses[:, :3, 3] *= unit
+    street = replace(seen, world_from_camera=poses)
+    against = as_given(street, "poses", 0.0, "the given poses", told_m, 0).scale.against
+    assert bool(against) == bool(said)
+    assert against.endswith(said)
+    if said:
+        assert float(against.split()[3]) == pytest.approx(unit * HEIGHT_M, rel=0.05)
+
+
+def test_a_speed_that_no_car_drives_is_said() -> None:
+    assert contradicted(None, None, 80.0) == "the car drives 80 m/s"
+    assert contradicted(1.6, None, 30.0) == contradicted(None, 1.5) == ""

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.paths import path_length, without_poses
+from dreamdrive.geometry.road.scale import contradicted
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 from dreamdrive.scene.similarity import fit_similarity
@@ -67,10 +68,14 @@ def _scaled(geometry: Geometry, factor: float) -> Geometry:
     cameras = tuple(camera.at(longer * camera.world_from_camera) for camera in geometry.cameras)
     ground, before = geometry.ground, geometry.scale
     others = {name: ratio / factor for name, ratio in before.others.items()} | {before.source: 1 / factor}
+    against = ""
+    if ground is not None:
+        told_m = ground.offset_m if before.basis == "height" else None
+        against = contradicted(ground.offset_m * factor, told_m)
     return replace(
         geometry,
         cameras=cameras,
         depth_m=geometry.depth_m * np.float32(factor),
         ground=None if ground is None else Ground(ground.normal_world, ground.offset_m * factor),
-        scale=Scale("length of the given path", 0.0, others),
+        scale=Scale("length of the given path", 0.0, others, against=against),
     )

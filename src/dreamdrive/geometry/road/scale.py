@@ -15,6 +15,8 @@ from dreamdrive.scene.geometry import Basis, Ground, Scale
 
 USUAL_HEIGHT_M = 1.5
 KNOWN_HEIGHTS_M = (0.6, 5.0)
+CARRIED_HEIGHTS_M = (1.0, 3.5)
+"""From a low car to a tall lorry: other heights of a camera say that a unit is no metre."""
 AGREES = 0.15  # relative; a height that differs more is worth a note
 MIN_INLIERS, MIN_SHARE = 100, 0.25
 SPEEDS_M_S = (0.5, 45.0)
@@ -156,11 +158,29 @@ def as_given(
     disagrees.
     """
     plane, _ = find_ground(street, seed, KNOWN_HEIGHTS_M)
+    if plane is None:
+        plane, _ = find_ground(street, seed)  # in whatever unit, to say that it is no metre
     ground = None if plane is None else Ground(plane.normal, plane.offset)
-    notes: tuple[str, ...] = ()
-    if plane is not None and height_m is not None and abs(plane.height / height_m - 1) > AGREES:
-        notes = (f"by {words} the camera is {plane.height:.2f} m above the road, not {height_m:.2f} m",)
-    return Metric(1.0, ground, Scale(source, spread, by_height(plane, 1.0, height_m)), notes)
+    found_m = None if plane is None else plane.height
+    against = contradicted(found_m, height_m, median_speed(street))
+    notes = (f"by {words} {against}",) if against else ()
+    return Metric(1.0, ground, Scale(source, spread, by_height(plane, 1.0, height_m), against=against), notes)
+
+
+def contradicted(found_m: float | None, height_m: float | None, speed_m_s: float = 0.0) -> str:
+    """What speaks against a path that was given in metres, in words; nothing where all is as it can be.
+
+    Args:
+        found_m: Height of the camera above the road by that path; None where no road was found.
+        height_m: The same as it was told; None: not told.
+        speed_m_s: How fast the car drives by it.
+    """
+    if found_m is not None and height_m is not None and abs(found_m / height_m - 1) > AGREES:
+        return f"the camera is {found_m:.2f} m above the road, not {height_m:.2f} m"
+    low, high = CARRIED_HEIGHTS_M
+    if found_m is not None and height_m is None and not low <= found_m <= high:
+        return f"the camera is {found_m:.2f} m above the road, where cars carry it {low:g} to {high:g} m high"
+    return f"the car drives {speed_m_s:.0f} m/s" if speed_m_s > SPEEDS_M_S[1] else ""
 
 
 def _from_speed(street: Street, problem: str) -> Metric:
