@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from dreamdrive.data.pandaset.restricted import SWEEP
 from dreamdrive.data.pandaset.tables import read_table
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_bytes
@@ -31,7 +32,7 @@ def read_points(path: Path) -> Float[np.ndarray, "n 3"]:
 
 
 def _of_table(path: Path) -> Float[np.ndarray, "n 3"]:
-    table = read_table(path)
+    table = read_table(path, SWEEP)
     if missing := [axis for axis in "xyz" if axis not in table]:
         raise InputError(f"{path} has no columns {', '.join(missing)}; expected a sweep of PandaSet")
     try:

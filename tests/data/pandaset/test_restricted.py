@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.data.pandaset.pickles import table_bytes
 
-from dreamdrive.data.pandaset import restricted
-from dreamdrive.data.pandaset.restricted import read_pickle
+from dreamdrive.data.pandaset.restricted import BOXES, SWEEP, read_pickle
 from dreamdrive.data.pandaset.tables import read_table
 from dreamdrive.errors import InputError
 from dreamdrive.files.pickles import Made, Name
@@ -50,7 +49,7 @@ def written(folder: Path, data: bytes, name: str = "00.pkl") -> Path:
 @pytest.mark.parametrize("name", ["00.pkl", "00.pkl.gz"])
 def test_a_table_keeps_its_columns(tmp_path: Path, new: bool, name: str) -> None:
     data = table_bytes(TABLE, new)
-    table = read_table(written(tmp_path, gzip.compress(data) if name.endswith("gz") else data, name))
+    table = read_table(written(tmp_path, gzip.compress(data) if name.endswith("gz") else data, name), SWEEP)
     assert set(table) == set(TABLE)
     for key in ("yaw", "camera_used", "stationary", "z"):
         np.testing.assert_array_equal(table[key], TABLE[key])
@@ -63,7 +62,7 @@ def test_a_table_keeps_its_columns(tmp_path: Path, new: bool, name: str) -> None
 def test_a_table_in_columns_of_memory_is_the_same(tmp_path: Path, new: bool) -> None:
     """numpy pickles arrays that lie in columns as such."""
     columns = {name: np.arange(4.0) + k for k, name in enumerate("xyz")}
-    table = read_table(written(tmp_path, table_bytes(columns, new, order="F")))
+    table = read_table(written(tmp_path, table_bytes(columns, new, order="F")), SWEEP)
     for name, column in columns.items():
         np.testing.assert_array_equal(table[name], column)
 
@@ -80,15 +79,15 @@ def test_what_calls_functions_is_refused_and_not_run(tmp_path: Path, protocol: i
     data = pickle.dumps({"x": Call(called, f"rm {mark}")}, protocol=protocol)
     path = written(tmp_path, gzip.compress(data), "00.pkl.gz")
     with pytest.raises(InputError, match=r"asks for .*nothing of it was run"):
-        read_pickle(path)
+        read_pickle(path, SWEEP)
     assert mark.is_file()
 
 
 def test_a_known_name_is_written_down_and_not_called(tmp_path: Path) -> None:
-    made = read_pickle(written(tmp_path, pickle.dumps(slice(1, 2, 3))))
+    made = read_pickle(written(tmp_path, pickle.dumps(slice(1, 2, 3))), SWEEP)
     assert isinstance(made, Made)
     assert (made.name, made.args) == ("slice", (1, 2, 3))
-    assert read_pickle(written(tmp_path, pickle.dumps(slice))) == Name("slice")
+    assert read_pickle(written(tmp_path, pickle.dumps(slice)), SWEEP) == Name("slice")
 
 
 @pytest.mark.parametrize(
@@ -111,37 +110,45 @@ def test_a_known_name_is_written_down_and_not_called(tmp_path: Path) -> None:
 )
 def test_what_is_broken_is_told(tmp_path: Path, data: bytes) -> None:
     with pytest.raises(InputError, match=r"damaged|cut short"):
-        read_pickle(written(tmp_path, data))
+        read_pickle(written(tmp_path, data), SWEEP)
 
 
 def test_a_table_that_is_cut_off_is_told(tmp_path: Path) -> None:
     data = gzip.compress(table_bytes(TABLE))
     with pytest.raises(InputError, match="cut short"):
-        read_table(written(tmp_path, data[: len(data) // 2]))
+        read_table(written(tmp_path, data[: len(data) // 2]), SWEEP)
     with pytest.raises(InputError, match="damaged"):
-        read_table(written(tmp_path, table_bytes(TABLE)[:-40]))
+        read_table(written(tmp_path, table_bytes(TABLE)[:-40]), SWEEP)
     with pytest.raises(InputError, match="cannot be read"):
-        read_table(tmp_path / "missing.pkl.gz")
+        read_table(tmp_path / "missing.pkl.gz", SWEEP)
 
 
-def test_what_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(restricted, "MOST_BYTES", 100_000)
+def test_what_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unpacks to over"):
-        read_pickle(written(tmp_path, gzip.compress(bytes(1_000_000))))
-    monkeypatch.setattr(restricted, "EXPECTED", replace(restricted.EXPECTED, steps=50))
+        read_pickle(
+            written(tmp_path, gzip.compress(bytes(1_000_000))), replace(SWEEP, unpacked_bytes=100_000)
+        )
     with pytest.raises(InputError, match="instructions"):
-        read_pickle(written(tmp_path, pickle.dumps(list(range(100)))))
+        read_pickle(written(tmp_path, pickle.dumps(list(range(100)))), replace(SWEEP, steps=50))
+
+
+@pytest.mark.parametrize(
+    "columns", [{"z": np.zeros(BOXES.rows + 1)}, {f"c{k}": [1.0] for k in range(65)}], ids=["rows", "columns"]
+)
+def test_a_table_of_far_more_than_a_time_has_is_refused(tmp_path: Path, columns: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"an array has the shape \(.*at most \d+ rows"):
+        read_table(written(tmp_path, gzip.compress(table_bytes(columns))), BOXES)
 
 
 def test_large_numbers_to_remember_take_no_memory(tmp_path: Path) -> None:
     """The unpickler of Python takes sixteen bytes for each number below."""
-    assert read_pickle(written(tmp_path, b"\x80\x03Nr\xff\xff\xff\x7f.")) is None
+    assert read_pickle(written(tmp_path, b"\x80\x03Nr\xff\xff\xff\x7f."), SWEEP) is None
 
 
 @pytest.mark.parametrize("value", [{"x": 1}, [1.0], "text", None, slice(2)])
 def test_what_is_no_table_is_told(tmp_path: Path, value: object) -> None:
     with pytest.raises(InputError, match="holds no table"):
-        read_table(written(tmp_path, pickle.dumps(value)))
+        read_table(written(tmp_path, pickle.dumps(value)), SWEEP)
 
 
 def test_nested_keys_do_not_take_for_ever(tmp_path: Path) -> None:
@@ -150,16 +157,16 @@ def test_nested_keys_do_not_take_for_ever(tmp_path: Path) -> None:
         nested = (nested, nested)
     data = pickle.dumps([nested])[:-1] + b"}" + b"j\x00\x00\x00\x00" + b"Ns."
     with pytest.raises(InputError):
-        read_table(written(tmp_path, data))
+        read_table(written(tmp_path, data), SWEEP)
     with pytest.raises(InputError):
-        read_table(written(tmp_path, pickle.dumps(nested)))
+        read_table(written(tmp_path, pickle.dumps(nested)), SWEEP)
 
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = written(tmp_path_factory.getbasetemp(), data)
     with pytest.raises(InputError):
-        read_table(path)
+        read_table(path, SWEEP)
 
 
 @given(st.data())
@@ -172,7 +179,7 @@ def test_a_damaged_table_is_read_or_refused(
         raw[data.draw(st.integers(0, len(raw) - 1))] = data.draw(st.integers(0, 255))
     path = written(tmp_path_factory.getbasetemp(), bytes(raw))
     try:
-        table = read_table(path)
+        table = read_table(path, SWEEP)
     except InputError:
         return
     assert len({len(column) for column in table.values()}) == 1

@@ -5,18 +5,22 @@ import gzip
 import io
 import operator
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Shaped
 
+from dreamdrive.data.argoverse.unpacked import rows_and_bytes
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_bytes, text_in
 
-MOST_BYTES = 200_000_000
-"""Of a file, and of what it unpacks to: the boxes of a log take 2 MB."""
+MOST_BYTES, MOST_ROWS = 50_000_000, 100_000
+"""Of a file, and of what it unpacks to: the boxes of a log take 2 MB in 12,000 rows."""
+_MAGIC = 8
+"""Bytes before the messages of a feather file; behind them it has a table of contents that is not needed."""
 _ENDINGS = (".csv", ".csv.gz", ".feather")
 """The first that there is counts: who made a CSV of a table wants it to be read."""
 
@@ -62,9 +66,11 @@ def _of_csv(file: Path) -> dict[str, Sequence[Any]]:
     if file.suffix == ".gz":
         data = _unpacked(data, file)
     try:
-        rows = list(csv.reader(io.StringIO(text_in(data), newline="")))
+        lines = csv.reader(io.StringIO(text_in(data), newline=""))
+        rows = list(islice(lines, MOST_ROWS + 2))
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file} is damaged or no CSV ({error}); download it again") from None
+    _check_rows(len(rows) - 1, file)
     head, *rows = [row for row in rows if row] or [[]]
     for number, row in enumerate(rows):
         if len(row) != len(head):
@@ -73,6 +79,25 @@ def _of_csv(file: Path) -> dict[str, Sequence[Any]]:
                 "it is damaged or cut short, download it again"
             )
     return dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else {name: () for name in head}
+
+
+def _check_messages(messages: Iterable[Any], file: Path) -> None:
+    """Refuse what would unpack to more than a table of one log has; nothing is unpacked."""
+    rows = size = 0
+    for message in messages:
+        if message.type not in ("record batch", "dictionary"):
+            continue
+        dictionary = message.type == "dictionary"
+        more = rows_and_bytes(message.metadata.to_pybytes(), memoryview(message.body), dictionary=dictionary)
+        rows, size = rows + more[0], size + more[1]
+    _check_rows(rows, file)
+    if size > MOST_BYTES:
+        raise InputError(f"{file} unpacks to over {MOST_BYTES / 1e6:.0f} MB; expected a table of one log")
+
+
+def _check_rows(count: int, file: Path) -> None:
+    if count > MOST_ROWS:
+        raise InputError(f"{file} has over {MOST_ROWS} rows; expected a table of one log")
 
 
 def _unpacked(data: bytes, file: Path) -> bytes:
@@ -96,10 +121,10 @@ def _of_feather(file: Path) -> dict[str, Sequence[Any]]:
         ) from None
     data = read_bytes(file, at_most=MOST_BYTES)
     try:
-        table = ipc.open_file(pa.BufferReader(data)).read_all()
+        stream = pa.py_buffer(data[_MAGIC:])
+        _check_messages(ipc.MessageReader.open_stream(stream), file)
+        table = ipc.open_stream(stream).read_all()
         table.validate(full=True)
-        if table.nbytes > MOST_BYTES:
-            raise InputError(f"{file} unpacks to over {MOST_BYTES / 1e6:.0f} MB; expected a table of one log")
         return {name: table.column(name).to_pylist() for name in table.column_names}
     # What Arrow raises on damaged files; errors of input and output among them, as it reads buffers as files.
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError, OverflowError) as error:

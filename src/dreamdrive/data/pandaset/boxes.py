@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.data.pandaset.restricted import BOXES
 from dreamdrive.data.pandaset.tables import Columns, read_table
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import FARTHEST_M
@@ -98,7 +99,7 @@ def read_boxes(
     frames: dict[int, list[_Cuboid]] = {}
     for step, file in files.items():
         try:
-            frames[step] = _rows(read_table(file), file, problems)
+            frames[step] = _rows(read_table(file, BOXES), file, problems)
         except InputError as error:
             problems.append(f"{error}: there are no boxes at that time")
     twins = _twins([cuboid for rows in frames.values() for cuboid in rows])

@@ -2,19 +2,20 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Shaped
 
-from dreamdrive.data.pandaset.restricted import read_pickle
+from dreamdrive.data.pandaset.restricted import Most, read_pickle
 from dreamdrive.errors import InputError
 from dreamdrive.files.pickles import Made
 
 _DTYPE = re.compile(r"[fiu][1248]|b1|O8")
 """Numbers, truth and objects; of all other types of numpy none is needed."""
-_MOST_CELLS = 200_000_000
+_MOST_COLUMNS = 64
 
 Columns = Mapping[str, Shaped[np.ndarray, " n"]]
 
@@ -23,15 +24,17 @@ class _UnexpectedError(Exception):
     """What is no table as pandas writes them."""
 
 
-def read_table(path: Path) -> Columns:
+def read_table(path: Path, most: Most) -> Columns:
     """The columns of a pickled table by their names; its index is left out.
+
+    A file of a kilobyte can ask for gigabytes and hours: nothing is made that is more than ``most``.
 
     Raises:
         InputError: The file cannot be read, or holds no table.
     """
-    made = read_pickle(path)
+    made = read_pickle(path, most)
     try:
-        return _columns(made)
+        return _columns(made, most.rows)
     except (
         _UnexpectedError,
         ValueError,
@@ -47,14 +50,14 @@ def read_table(path: Path) -> Columns:
         ) from None
 
 
-def _columns(made: object) -> Columns:
+def _columns(made: object, most_rows: int) -> Columns:
     frame = _made(made, "DataFrame").state
     manager = _made(frame.get("_mgr", frame.get("_data")), "BlockManager")
     axes, blocks = _parts(manager)
-    names = [str(name) for name in _array(_index(axes[0]).get("data"))]
+    names = [str(name) for name in _array(_index(axes[0]).get("data"), _MOST_COLUMNS)]
     columns: dict[str, Shaped[np.ndarray, " n"]] = {}
-    for values, places in blocks:
-        rows = _array(values)
+    for values, places in islice(blocks, _MOST_COLUMNS):
+        rows = _array(values, most_rows)
         numbers = _places(places, len(names))
         if rows.ndim != 2 or len(rows) != len(numbers):
             raise _UnexpectedError(f"a block of the shape {rows.shape} is to fill {len(numbers)} columns")
@@ -92,11 +95,12 @@ def _places(value: object, count: int) -> list[int]:
     if isinstance(value, Made) and value.name == "slice":
         numbers = range(*slice(*value.args).indices(count))
     else:
-        numbers = _array(value).tolist()
+        numbers = _array(value, _MOST_COLUMNS).tolist()
     return [range(count)[number] for number in numbers]
 
 
-def _array(value: object) -> Shaped[np.ndarray, "..."]:
+def _array(value: object, most: int) -> Shaped[np.ndarray, "..."]:
+    """An array; of two sides the first are columns, of which there are few, and the last is ``most`` long."""
     if isinstance(value, Made) and value.name == "_frombuffer":
         data, dtype, shape, order = value.args
         in_columns = order == "F"
@@ -104,8 +108,12 @@ def _array(value: object) -> Shaped[np.ndarray, "..."]:
         _, shape, dtype, in_columns, data = _made(value, "_reconstruct").state
     kind = _dtype(dtype)
     sides = tuple(shape)
-    if len(sides) > 2 or not all(type(side) is int and 0 <= side <= _MOST_CELLS for side in sides):
+    if len(sides) not in (1, 2) or not all(type(side) is int and side >= 0 for side in sides):
         raise _UnexpectedError("an array has a shape of other than one or two numbers")
+    if sides[-1] > most or sides[0] > max(most if len(sides) == 1 else 0, _MOST_COLUMNS):
+        raise _UnexpectedError(f"an array has the shape {str(sides)[:60]}; expected at most {most} rows")
+    if len(data) > 8 * most * _MOST_COLUMNS:
+        raise _UnexpectedError("an array has more values than its shape")
     if kind.hasobject:
         flat = np.empty(len(data), dtype=object)
         flat[:] = [each if isinstance(each, str | float | int) else None for each in data]
