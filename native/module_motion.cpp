@@ -28,7 +28,8 @@ Network make_network(std::vector<In> tensors, dd::NetworkShape shape) {
   Network network = {std::move(tensors), shape, {}};
   const auto& t = network.tensors;
   const int depth = shape.depth, skip = shape.skip;
-  if (depth < 1 || t.size() < size_t(2 * depth + 2) || t.size() % 2 || skip >= depth || skip == 0)
+  const bool layers = depth >= 1 && size_t(depth) < t.size() / 2 && t[0].ndim() > 0;
+  if (!layers || t.size() % 2 || skip >= depth || skip == 0)
     throw nb::value_error("expected hidden layers, then heads, weight and bias each");
   network.shape.width = int(t[0].shape(0));
   network.shape.last = int(t[2 * depth - 1].size());

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.paths import path_length, without_poses
-from dreamdrive.geometry.road.scale import contradicted
+from dreamdrive.geometry.road import scale
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 from dreamdrive.scene.similarity import fit_similarity
@@ -71,7 +71,7 @@ def _scaled(geometry: Geometry, factor: float) -> Geometry:
     against = ""
     if ground is not None:
         told_m = ground.offset_m if before.basis == "height" else None
-        against = contradicted(ground.offset_m * factor, told_m)
+        against = scale.contradicted(ground.offset_m * factor, told_m)
     return replace(
         geometry,
         cameras=cameras,
