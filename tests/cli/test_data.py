@@ -181,3 +181,28 @@ def test_sizes_of_samples_are_checked(run: Run, folder: Path, tmp_path: Path) ->
         "is neither a scene nor a data set with labels"
         in run("dataset", "make", tmp_path, "-o", tmp_path / "samples").err
     )
+
+
+def test_a_letter_is_not_drawn_over(run: Run, tmp_path: Path) -> None:
+    letter = tmp_path / "letter.txt"
+    letter.write_text("Dear reader")
+    result = run("data", "show", tmp_path, "-o", letter)
+    assert result.code == 2
+    assert result.err == f"error: {letter}: expected a name that ends in .png"
+    assert letter.read_text() == "Dear reader"
+
+
+@pytest.mark.parametrize("what", ["consistency", "decomposition", "geometry", "video"])
+def test_figures_take_the_place_of_no_letter(run: Run, tmp_path: Path, what: str) -> None:
+    letter = tmp_path / "letter.txt"
+    letter.write_text("Dear reader")
+    given = {
+        "consistency": ("evaluate", "consistency", tmp_path),
+        "decomposition": ("evaluate", "decomposition", tmp_path, tmp_path),
+        "geometry": ("evaluate", "geometry", tmp_path, "--truth", tmp_path),
+        "video": ("evaluate", "video", tmp_path, tmp_path),
+    }
+    result = run(*given[what], "--json", letter)
+    assert result.code == 2
+    assert f"{letter}: expected a name that ends in .json" in result.err
+    assert letter.read_text() == "Dear reader"

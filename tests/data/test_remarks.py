@@ -102,5 +102,5 @@ def test_a_jump_of_the_clock_is_named():
     even = np.arange(6) * 0.1
     assert of_time_jumps(index, even) == []
     assert of_time_jumps(index, np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7])) == [
-        "The video's times jump, by 0.3 s between frames 4 and 6; elsewhere a step takes 0.1 s."
+        "The recording's times jump, by 0.3 s between frames 4 and 6; elsewhere a step takes 0.1 s."
     ]

@@ -126,6 +126,9 @@ def show(
         scene: Which scene, by its name or number.
         step: Which of its labelled times, counted from 0; without it the middle.
     """
+    from dreamdrive.files.output import check_ending
+
+    check_ending(output, ".png")
     from dreamdrive.data.log_layout import layout_of_log
     from dreamdrive.show import draw_log, write_png
     from dreamdrive.world import draw_layout

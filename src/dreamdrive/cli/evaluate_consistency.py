@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from rich.console import Console
 from tyro.conf import Positional, arg
 
-from dreamdrive.cli.tables import fixed, print_table, write_json
+from dreamdrive.cli.tables import check_endings, fixed, print_table, write_json
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate import Consistency
@@ -31,6 +31,7 @@ def consistency(
         fps: Rate of the frames, where the video does not tell it rightly.
         json: Write the figures to this file as well.
     """
+    check_endings(json=json)
     from dreamdrive.data import read_clip, read_trajectory
     from dreamdrive.evaluate import evaluate_consistency
 

@@ -8,7 +8,7 @@ from tyro.conf import Positional, arg
 
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.scene import open_scene
-from dreamdrive.cli.tables import fixed, print_table, write_json
+from dreamdrive.cli.tables import check_endings, fixed, print_table, write_json
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate import BoxError, Decomposition
@@ -27,6 +27,7 @@ def decomposition(
         world: The folder that world make wrote, or a layout, which is drawn again as the scene saw it.
         json: Write the figures to this file as well.
     """
+    check_endings(json=json)
     use_all_cores()
     from dreamdrive.evaluate import evaluate_decomposition, read_truth
 

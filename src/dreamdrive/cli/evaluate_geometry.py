@@ -8,7 +8,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
-from dreamdrive.cli.tables import fixed, print_table, write_json
+from dreamdrive.cli.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import inside
 
@@ -36,6 +36,7 @@ def geometry(
         json: Write the figures to this file as well.
         picture: Draw errors of depth and both paths into this PNG.
     """
+    check_endings(json=json, picture=picture)
     from dreamdrive.evaluate import evaluate_geometry, read_geometry_truth
     from dreamdrive.show import draw_geometry_errors, write_png
 

@@ -10,7 +10,7 @@ from tyro.conf import UseAppendAction, arg
 from dreamdrive.choices import DeviceName
 from dreamdrive.cli.machine import asked_to_stop, use_all_cores
 from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.tables import fixed, print_table, write_json
+from dreamdrive.cli.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ def perception(
         device: Where networks are trained.
         json: Write the figures to this file as well.
     """
+    check_endings(json=json)
     use_all_cores()
     from dreamdrive.device import computing_on
     from dreamdrive.perception import BevSet, read_trials

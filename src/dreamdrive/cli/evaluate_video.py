@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 from dreamdrive.choices import Covariance, Resize, Stlpips
 from dreamdrive.cli.machine import use_all_cores
 from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.tables import interval, number, print_table, write_json
+from dreamdrive.cli.tables import check_endings, interval, number, print_table, write_json
 
 if TYPE_CHECKING:
     from dreamdrive.evaluate import VideoReport
@@ -55,6 +55,7 @@ def evaluate_video(
         seed: Seed of everything random.
         json: Write all figures and settings there.
     """
+    check_endings(json=json)
     use_all_cores()
     from dreamdrive import __version__
     from dreamdrive.evaluate import VideoSettings, WeightFiles

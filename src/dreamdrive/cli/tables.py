@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from dreamdrive.files.output import new_file
+from dreamdrive.files.output import check_ending, new_file
 
 _UNLIMITED = 1000
 """Characters that no table is wide."""
@@ -40,6 +40,13 @@ def fixed(value: float | None, digits: int, factor: float = 1.0) -> str:
 def interval(low: float | None, high: float | None) -> str:
     """Both ends of an interval; ``-`` for one that is not there."""
     return "-" if low is None or high is None else f"{number(low)} to {number(high)}"
+
+
+def check_endings(*, json: Path | None, picture: Path | None = None) -> None:
+    """Refuse names of other kinds of files before the work: whoever gives one may lose a letter."""
+    for path, ending in ((json, ".json"), (picture, ".png")):
+        if path is not None:
+            check_ending(path, ending)
 
 
 def write_json(path: Path, values: object) -> None:

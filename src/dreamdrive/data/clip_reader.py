@@ -12,6 +12,7 @@ from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.images import ImageFolder, RawFrame
 from dreamdrive.data.intrinsics import Calibration, calibration
+from dreamdrive.data.name_times import times_of_names
 from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
 from dreamdrive.data.sampler import Sampler, check_pictures, most_frames, too_many
@@ -49,7 +50,8 @@ def read_clip(
     Args:
         path: Video or folder of images.
         frames: ``START:STOP:STEP`` over source indices (file or decode order); all without it.
-        fps: Rate of the input before the step. Without it a video's own times count, and a folder has 10 Hz.
+        fps: Rate of the input before the step. Without it a video's own times count, and those that
+            the names of images tell; else a folder has 10 Hz.
         size: Exact width and height; without it 480 wide, or the source's width if that is less.
         intrinsics: Calibration file (see ``intrinsics.read_intrinsics``).
         poses: Pose file (see ``poses.read_pose_file``).
@@ -147,6 +149,11 @@ def _times(
     if fps is not None:
         return index / fps, ()
     if not isinstance(source, Video):
+        named_s = times_of_names(source.files)
+        if named_s is not None:
+            rate_hz = (len(named_s) - 1) / named_s[-1]
+            if RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+                return named_s[index], (f"The images' names tell their times: {rate_hz:.3g} Hz in the mean.",)
         return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if all(t is not None for t in clock_s):
         times_s = np.array(clock_s, dtype=np.float64)
@@ -165,6 +172,9 @@ def _gaps(
 ) -> list[str]:
     """What to say about frames that are missing inside the selection."""
     if isinstance(source, ImageFolder):
+        named_s = None if fps is not None else times_of_names(source.files)
+        if named_s is not None:
+            return of_time_jumps(index, named_s[index])
         return of_missing_images(source.files[index[0] : index[-1] + 1])
     if fps is not None or any(t is None for t in clock_s):
         return []

@@ -96,7 +96,7 @@ def of_missing_images(files: Sequence[PurePath]) -> list[str]:
 
 
 def of_time_jumps(index: Int[np.ndarray, " f"], times_s: Float[np.ndarray, " f"]) -> list[str]:
-    """The sentence about steps in time, by the video's own clock, that are far longer than the others."""
+    """The sentence about steps in time, by the recording's own clock, that are far longer than the others."""
     steps_s = np.diff(times_s)
     if len(steps_s) < 3:
         return []
@@ -106,7 +106,9 @@ def of_time_jumps(index: Int[np.ndarray, " f"], times_s: Float[np.ndarray, " f"]
         return []
     said = [f"{steps_s[k]:.2g} s between frames {index[k]} and {index[k + 1]}" for k in after[:_NAMED]]
     more = [f"at {len(after) - _NAMED} more places"] if len(after) > _NAMED else []
-    return [f"The video's times jump, by {listed([*said, *more])}; elsewhere a step takes {usual_s:.2g} s."]
+    return [
+        f"The recording's times jump, by {listed([*said, *more])}; elsewhere a step takes {usual_s:.2g} s."
+    ]
 
 
 def _of_cuts(cuts: tuple[Cut, ...], index: Int[np.ndarray, " f"]) -> str:

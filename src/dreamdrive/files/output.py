@@ -113,6 +113,12 @@ def check_new_file(path: Path, replace: bool) -> None:
         )
 
 
+def check_ending(path: Path, *endings: str) -> None:
+    """Fail before the work where a name says that the file is of another kind, such as a letter."""
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path}: expected a name that ends in {' or '.join(endings)}")
+
+
 def plain_name(name: str) -> str:
     """A name from data as that of a file: itself where it is plain, else the like of it, and no other's.
 

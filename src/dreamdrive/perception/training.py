@@ -3,7 +3,6 @@
 What is random follows from the seed and the step, so that no state of generators is kept.
 """
 
-import json
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
@@ -16,6 +15,7 @@ from torch import nn
 from dreamdrive.device import CPU
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import claim_folder
+from dreamdrive.files.step_log import StepLog
 from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.perception.batch import BevBatch
 from dreamdrive.perception.losses import LossOptions
@@ -168,13 +168,11 @@ def _step(
 
 
 class _Log:
-    """Means of losses as lines of JSON; lines of steps that are made again are cut off."""
+    """Means of losses over some steps."""
 
     def __init__(self, path: Path, first: int, each: int) -> None:
-        self._path, self._each = path, each
+        self._lines, self._each = StepLog(path, first), each
         self._waiting: defaultdict[str, list[float]] = defaultdict(list)
-        kept = path.read_text().splitlines() if first and path.is_file() else []
-        path.write_text("".join(f"{line}\n" for line in kept if json.loads(line)["step"] <= first))
 
     def add(self, step: int, seconds: float, parts: Mapping[str, float], *, last: bool) -> None:
         """Remember the losses of a step, and write a line where it is time."""
@@ -183,5 +181,4 @@ class _Log:
         if last or step % self._each == 0:
             means = {name: round(sum(each) / len(each), 6) for name, each in self._waiting.items()}
             self._waiting.clear()
-            with self._path.open("a") as file:
-                file.write(json.dumps({"step": step, "seconds": round(seconds, 1)} | means) + "\n")
+            self._lines.add(step, {"seconds": round(seconds, 1)} | means)

@@ -1,6 +1,5 @@
 """The training of the street network: draw pictures, compare, step, average."""
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
@@ -10,6 +9,7 @@ import torch
 from torch import Tensor
 
 from dreamdrive.files.output import claim_folder
+from dreamdrive.files.step_log import StepLog
 from dreamdrive.knowledge.network import StreetNetwork
 from dreamdrive.knowledge.training.checkpoint import load_checkpoint, save_checkpoint
 from dreamdrive.knowledge.training.judge import judge
@@ -144,13 +144,11 @@ def train(
 
 
 class _Log:
-    """Means of losses, and figures, as lines of JSON; lines of steps that are made again are cut off."""
+    """Means of losses since the last line, and figures."""
 
     def __init__(self, path: Path, first: int) -> None:
-        self._path = path
+        self._lines = StepLog(path, first)
         self._waiting: list[dict[str, float]] = []
-        kept = path.read_text().splitlines() if first and path.is_file() else []
-        path.write_text("".join(f"{line}\n" for line in kept if json.loads(line)["step"] <= first))
 
     def add(self, parts: dict[str, float]) -> None:
         """Remember the losses of a step."""
@@ -163,15 +161,11 @@ class _Log:
             name: sum(parts.get(name, 0.0) for parts in self._waiting) / len(self._waiting) for name in names
         }
         self._waiting.clear()
-        self._line({"step": step, "seconds": round(seconds, 1)} | _rounded(means))
+        self._lines.add(step, {"seconds": round(seconds, 1)} | _rounded(means))
 
     def judged(self, step: int, figures: dict[str, float]) -> None:
         """A line with figures."""
-        self._line({"step": step, "figures": _rounded(figures)})
-
-    def _line(self, content: dict[str, object]) -> None:
-        with self._path.open("a") as file:
-            file.write(json.dumps(content) + "\n")
+        self._lines.add(step, {"figures": _rounded(figures)})
 
 
 def _rounded(values: Mapping[str, float]) -> dict[str, object]:

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import claim_folder, new_file
+from dreamdrive.files.step_log import StepLog
 from dreamdrive.knowledge import StreetNetwork, load_knowledge
 from dreamdrive.knowledge.training import load_checkpoint, save_checkpoint
 from dreamdrive.prior.photo.network import CHANNELS, PhotoNetwork
@@ -76,8 +77,8 @@ def train_photo(
     judge = load_knowledge(knowledge)
     both, data = (network, averaged), dict[str, str]()
     done, before_s = load_checkpoint(out, both, optimiser, options, data)
-    began = saved = time.monotonic()
-    losses = list[float]()
+    log, began = StepLog(out / _LOG, done), time.monotonic()
+    saved, losses = began, list[float]()
     for step in range(done, options.steps):
         for group in optimiser.param_groups:
             group["lr"] = options.rate * _share(step, options)
@@ -92,8 +93,7 @@ def train_photo(
         if stopped or time.monotonic() - saved > checkpoint_s or step + 1 == options.steps:
             spent_s = before_s + time.monotonic() - began
             save_checkpoint(out, step + 1, spent_s, both, optimiser, options, data)
-            with (out / _LOG).open("a") as file:
-                file.write(json.dumps({"step": step + 1, "loss": round(float(np.mean(losses)), 5)}) + "\n")
+            log.add(step + 1, {"loss": round(float(np.mean(losses)), 5)})
             saved, losses = time.monotonic(), []
         if stopped:
             return None
