@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dreamdrive.data.size import MAX_CROP, choose_size
+from dreamdrive.data.size import MAX_CROP, choose_size, cover
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -106,3 +106,13 @@ def test_sizes_no_video_can_have_are_refused(wanted, words):
 def test_tiny_sources_are_refused():
     with pytest.raises(InputError, match="8x6 pixels"):
         choose_size((8, 6), None)
+
+
+@pytest.mark.parametrize("source", [(2, 4000), (4000, 2), (30, 1000)])
+def test_a_strip_is_refused_before_it_fills_memory(source: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match="not a strip"):
+        cover(source, (1024, 576))
+
+
+def test_a_tall_photo_covers_a_wide_model() -> None:
+    assert cover((1080, 2400), (1024, 576)).scaled == (1024, 2276)

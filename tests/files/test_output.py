@@ -184,9 +184,21 @@ while True:
 """
 
 
+def heeding() -> None:
+    """Heed signals that these tests were told to ignore, as behind nohup or in the background of a shell."""
+    for number in (signal.SIGHUP, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def slowly(what: str, place: Path, seconds: float = 0.001) -> "subprocess.Popen[str]":
     arguments = [sys.executable, "-c", SLOW, what, str(place), str(seconds)]
-    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    process = subprocess.Popen(
+        arguments,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=heeding,
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
     return process

@@ -13,6 +13,7 @@ DEFAULT_WIDTH_PX = 480
 MIN_SIDE_PX = 16
 MAX_SIDE_PX, MAX_PIXELS = 8192, 4096 * 2176
 """Largest frames: a video with four of them, as ``panels.mp4`` is, is the largest that H.264 knows."""
+_LEAST_LEFT = 0.1
 MAX_CROP = 0.02
 """Largest share of the width or height that is cut away to reach an asked size."""
 
@@ -121,8 +122,18 @@ def _default(source: tuple[int, int]) -> tuple[int, int]:
 
 
 def cover(source: tuple[int, int], target: tuple[int, int]) -> Sizing:
-    """How frames of ``source`` cover ``target``, whatever has to be cut away for that."""
+    """How frames of ``source`` cover ``target``, whatever has to be cut away for that, within reason.
+
+    Raises:
+        InputError: Next to nothing of a frame would be left: it is a strip, which would fill memory first.
+    """
     scale = max(target[0] / source[0], target[1] / source[1])
+    left = min(target[0] / (source[0] * scale), target[1] / (source[1] * scale))
+    if left < _LEAST_LEFT:
+        raise InputError(
+            f"of a picture of {source[0]}x{source[1]} pixels {100 * left:.1g} % would be left at "
+            f"{target[0]}x{target[1]}; expected a picture of a street, not a strip"
+        )
     scaled = (max(target[0], round(source[0] * scale)), max(target[1], round(source[1] * scale)))
     offset = ((scaled[0] - target[0]) // 2, (scaled[1] - target[1]) // 2)
     return Sizing(source, scaled, offset, target)
