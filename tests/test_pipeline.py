@@ -113,7 +113,7 @@ def test_the_report_says_what_the_design_promises(finished: Path) -> None:
         assert record["peak_rss_mb"] > 50
     scene = load_scene(finished / "scene")
     assert report["gaussians"] == {"static": len(scene.static), "dynamic": len(scene.dynamic)}
-    assert set(report["scale"]) == {"source", "spread", "others", "basis", "disagreement"}
+    assert set(report["scale"]) == {"source", "spread", "others", "basis", "against", "disagreement"}
     assert set(report["focal"]) == {"px", "observed"}
     assert report["requested"] is None
     assert list(report["held_out"]) == ["2"]

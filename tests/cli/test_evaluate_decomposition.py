@@ -79,8 +79,10 @@ def test_figures_are_shown_and_written(place: Path, capsys: pytest.CaptureFixtur
 
 def test_a_layout_is_drawn_as_the_scene_saw_it(place: Path) -> None:
     for world in ("world", "layout.json"):
-        decomposition(place / "out", place / world, json=place / f"{world}.figures")
-    written = [json.loads((place / f"{world}.figures").read_text()) for world in ("world", "layout.json")]
+        decomposition(place / "out", place / world, json=place / f"{world}.figures.json")
+    written = [
+        json.loads((place / f"{world}.figures.json").read_text()) for world in ("world", "layout.json")
+    ]
     assert written[0] == written[1]
 
 

@@ -136,7 +136,7 @@ def test_two_entries_of_one_token_are_refused(tmp_path: Path) -> None:
         ("a.json", b"[1, 2]", "holds a list; expected an object"),
         ("a.json", b"{}", "holds no plan"),
         ("a.json", b"[" * 100_000, "is not JSON"),
-        ("a.json", b"\xff\xfe", "cannot be read as text"),
+        ("a.json", b"\x81\xfe", "cannot be read as text"),
         ("a.npz", b"PK", "cannot be read as an npz"),
         ("a.pkl", pickle.dumps([1]), "holds a list; expected a dictionary"),
         ("a.pkl", pickle.dumps({1: np.zeros((6, 2))}), "keys that are no text"),
