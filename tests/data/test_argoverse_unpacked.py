@@ -1,5 +1,6 @@
 """Feather files tell what they unpack to; what is far too much is never unpacked."""
 
+import importlib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,8 @@ from dreamdrive.data.argoverse.tables import MOST_ROWS, read_table
 from dreamdrive.data.argoverse.unpacked import rows_and_bytes
 from dreamdrive.errors import InputError
 
-pa = pytest.importorskip("pyarrow")
-feather = pytest.importorskip("pyarrow.feather")
+pa = pytest.importorskip("pyarrow", reason="reading feather needs pyarrow, which the extra dev brings")
+feather = importlib.import_module("pyarrow.feather")
 
 
 def written(path: Path, columns: dict[str, Any], compression: str) -> bytes:

@@ -12,7 +12,6 @@ from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.data.images import ImageFolder, RawFrame
 from dreamdrive.data.intrinsics import Calibration, calibration
-from dreamdrive.data.name_times import times_of_names
 from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
 from dreamdrive.data.sampler import Sampler, check_pictures, most_frames, too_many
@@ -148,18 +147,14 @@ def _times(
     """Seconds since frame 0 of the source, and what to say about them."""
     if fps is not None:
         return index / fps, ()
-    if not isinstance(source, Video):
-        named_s = times_of_names(source.files)
-        if named_s is not None:
-            rate_hz = (len(named_s) - 1) / named_s[-1]
-            if RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
-                return named_s[index], (f"The images' names tell their times: {rate_hz:.3g} Hz in the mean.",)
-        return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if all(t is not None for t in clock_s):
         times_s = np.array(clock_s, dtype=np.float64)
         rate = (index[-1] - index[0]) / max(times_s[-1] - times_s[0], 1e-12)
         if (np.diff(times_s) > 0).all() and RATES_HZ[0] <= rate <= RATES_HZ[1]:
-            return times_s, ()
+            named = f"The images' names tell their times: {rate:.3g} Hz in the mean."
+            return times_s, () if isinstance(source, Video) else (named,)
+    if not isinstance(source, Video):
+        return index / FOLDER_RATE_HZ, (f"No --fps was given: the images count as {FOLDER_RATE_HZ:g} Hz.",)
     if source.rate_hz is None:
         raise InputError(f"{source.path} has no usable times; give its rate with --fps")
     return index / source.rate_hz, (
@@ -171,12 +166,10 @@ def _gaps(
     source: Source, index: Int[np.ndarray, " f"], clock_s: list[float | None], fps: float | None
 ) -> list[str]:
     """What to say about frames that are missing inside the selection."""
-    if isinstance(source, ImageFolder):
-        named_s = None if fps is not None else times_of_names(source.files)
-        if named_s is not None:
-            return of_time_jumps(index, named_s[index])
+    told = fps is None and all(t is not None for t in clock_s)
+    if isinstance(source, ImageFolder) and not told:
         return of_missing_images(source.files[index[0] : index[-1] + 1])
-    if fps is not None or any(t is None for t in clock_s):
+    if not told:
         return []
     return of_time_jumps(index, np.array(clock_s, dtype=np.float64))
 

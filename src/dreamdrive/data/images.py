@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from dreamdrive.data.companions import frames_among
+from dreamdrive.data.name_times import times_of_names
 from dreamdrive.data.picture_file import read_pages
 from dreamdrive.errors import InputError
 
@@ -64,9 +65,11 @@ class ImageFolder:
         return len(self.files)
 
     def read(self, wanted: range) -> Iterator[RawFrame]:
-        """The wanted frames, one at a time."""
+        """The wanted frames, one at a time, with the times that all names tell."""
+        times_s = times_of_names(self.files)
         for index in wanted:
-            yield read_image(self.files[index], index)
+            frame = read_image(self.files[index], index)
+            yield frame if times_s is None else replace(frame, time_s=float(times_s[index]))
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
