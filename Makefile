@@ -6,42 +6,45 @@ MAKEFLAGS += --no-builtin-rules
 
 PYTHON ?= python3
 VENV := .venv
+PRODUCTS := packages/streetworld packages/dreamdrive_train benchmarks
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # One thread of torch for each of the two workers.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest
-PARALLEL ?= -n 2
+PARALLEL ?= -n 2 --dist worksteal
 
 # Where the demo's results go, and what is reconstructed; nothing means the built-in street.
-OUT ?= $(if $(INPUT),out/clip,out/demo)
+OUT ?= $(if $(INPUT),demo/clip,demo/street)
 INPUT ?=
 OPTIONS ?=
 
-.PHONY: help install demo test ci check sanitize format clean
+.PHONY: help install demo test ci check sanitize snapshots wheels format clean
 
 help:
-	@echo "make demo [INPUT=clip.mp4] [OUT=out/demo] [OPTIONS='--quality draft']   a scene and its videos"
+	@echo "make demo [INPUT=clip.mp4] [OUT=demo/street] [OPTIONS='--quality draft']   a scene and its videos"
 	@echo "make test      the quick tests"
 	@echo "make ci        lint, types, sanitizers, slow tests, examples"
+	@echo "make snapshots the texts that tests keep, anew"
+	@echo "make wheels    wheels for Linux into dist/ [PYTHONS='python3.11 python3.12']"
 	@echo "make install   only the set-up, into $(VENV)"
 
 # Third-party packages, pinned; again only when what is wanted changes.
-$(VENV)/.packages: constraints.txt pyproject.toml
+$(VENV)/.packages: constraints.txt pyproject.toml benchmarks/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("Python 3.11 or newer is needed, $(PYTHON) is " + sys.version.split()[0] + "; choose another with make PYTHON=...")'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --constraint constraints.txt scikit-build-core nanobind cmake ninja
 	@touch $@
 
 # The package itself: Python is used in place, the C++ core is compiled.
-$(VENV)/.installed: $(VENV)/.packages CMakeLists.txt $(wildcard native/*)
-	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
+$(VENV)/.installed: $(VENV)/.packages CMakeLists.txt $(wildcard native/*/*) $(PRODUCTS:%=%/pyproject.toml)
+	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]' $(PRODUCTS:%=--editable ./%)
 	@touch $@
 
 install: $(VENV)/.installed
 
 demo: install
 	$(BIN)/dreamdrive generate $(if $(INPUT),'$(INPUT)',--prior street-world) --out '$(OUT)' $(OPTIONS)
-	@echo "Watch $(OUT)/video: drive.mp4, shift.mp4, recorded_beside_rendered.mp4, panels.mp4"
+	@echo "Watch $(OUT)/video: drive.mp4, shift.mp4 where aside is trusted, recorded_beside_rendered.mp4, panels.mp4"
 
 test: install
 	$(PYTEST) $(PARALLEL) -m "not slow and not gpu"
@@ -57,11 +60,18 @@ sanitize: install
 
 ci: check sanitize
 	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
-	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)"; done
+	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)" || exit 1; done
+
+# Public names, messages and pages that tests compare with: look at the difference before it is committed.
+snapshots: install
+	DREAMDRIVE_SNAPSHOTS=renew $(PYTEST) --quiet tests/test_public_names.py tests/cli/test_messages.py tests/test_examples.py
+
+wheels:
+	packaging/wheels $(PYTHONS)
 
 format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf build out
+	rm -rf build demo out

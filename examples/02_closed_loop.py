@@ -3,10 +3,10 @@
     python examples/02_closed_loop.py [--out DIR]
 
 A small drawn street becomes a scene, as a draft. `DreamDrive-v0` then drives in it: the policy sees numbers
-alone, which takes half a millisecond a step, and ten weights are found by the cross-entropy method:
-draw many, keep the best, draw around them. At the end the learned drive is shown through the front camera.
+alone, which takes half a millisecond a step, and ten weights are found by the cross-entropy method: draw
+many, keep the best, draw around them. At the end the learned drive is shown through the front camera.
 
-About three minutes on two cores, most of them for the scene.
+Half a minute on two cores, most of it for the scene.
 """
 
 import argparse
@@ -15,22 +15,22 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 
-import dreamdrive.environment  # noqa: F401  (registers DreamDrive-v0)
+import dreamdrive.tasks.environment  # noqa: F401  (registers DreamDrive-v0)
 from dreamdrive import Control, generate
-from dreamdrive.data.video_writer import write_video
-from dreamdrive.environment import NAMES, EgoOptions, EnvironmentOptions, StartOptions
+from dreamdrive.data.pictures.video_writer import write_video
 from dreamdrive.show import write_png
+from dreamdrive.tasks.environment import NAMES, EgoOptions, EnvironmentOptions, StartOptions
 
 SEEN = [NAMES.index(name) for name in ("aside_m", "turned_rad", "route_10_y_m", "speed_m_s")]
 SCALE = np.array([1.0, 0.2, 1.0, 10.0])
 WEIGHTS = 2 * (len(SEEN) + 1)
 """Of what is seen and of a constant, for the pedals and for the steering wheel."""
 OPTIONS = EnvironmentOptions(
-    max_steps=30,
+    max_steps=20,
     ego=EgoOptions(top_speed_m_s=10.0),
     start=StartOptions(share=(0.0, 0.3), aside_m=0.7, turned_rad=0.05),
 )
-"""Three seconds in a town, from a place beside the recorded one."""
+"""Two seconds in a town, from a place beside the recorded one."""
 
 
 def main() -> None:
@@ -39,7 +39,7 @@ def main() -> None:
     arguments.add_argument("--out", type=Path, default=Path("out/02_closed_loop"))
     out = arguments.parse_args().out
 
-    control = Control(frames="0:40:1", size=(160, 96), seed=3)
+    control = Control(frames="0:30:1", size=(160, 96), seed=3)
     generate(control, out, prior="street-world", options="draft", progress=show)
     print()
 
@@ -47,10 +47,10 @@ def main() -> None:
     rng = np.random.default_rng(0)
     mean, spread = np.zeros(WEIGHTS), np.ones(WEIGHTS)
     before = score(env, mean, range(1000, 1020))
-    for generation in range(20):
-        drawn = mean + spread * rng.normal(size=(32, WEIGHTS))
+    for generation in range(10):
+        drawn = mean + spread * rng.normal(size=(24, WEIGHTS))
         # All are judged by the same starts, which are others in each generation.
-        seeds = range(5 * generation, 5 * generation + 5)
+        seeds = range(4 * generation, 4 * generation + 4)
         returns = np.array([score(env, weights, seeds) for weights in drawn])
         best = drawn[np.argsort(returns)[-8:]]
         mean, spread = best.mean(axis=0), best.std(axis=0) + 0.02

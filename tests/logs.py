@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dreamdrive.data.nuscenes import write_points
+from dreamdrive.export.nuscenes.writer import write_points
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, Polygon
+from dreamdrive.scene.street.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, Polygon
 
 START_US = 1_533_000_000_000_000
 TIMES_S = np.array([0.0, 0.5, 1.0])

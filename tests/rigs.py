@@ -6,17 +6,19 @@ from functools import lru_cache
 import numpy as np
 
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.world import Drive, Mount, StreetOptions, draw_street, drive, front_from_mount
+from dreamdrive.scene.street.truth import DriveTruth, Mount
+from streetworld import StreetOptions, World, draw_street, drive, front_from_mount
 from tests.streets import street_clip
 
 MOUNTED: tuple[Mount, ...] = ("front", "front_left")
 
 
 @lru_cache
-def drives(frames: int = 6, size: tuple[int, int] = (96, 64)) -> dict[Mount, Drive]:
+def drives(frames: int = 6, size: tuple[int, int] = (96, 64)) -> dict[Mount, DriveTruth]:
     """What each camera records; do not change it."""
     layout = draw_street(4, StreetOptions(seconds=frames / 10))
-    return {mount: drive(layout, frames, 10.0, size, mount=mount) for mount in MOUNTED}
+    world = World(layout)
+    return {mount: drive(layout, frames, 10.0, size, world=world, mount=mount) for mount in MOUNTED}
 
 
 def true_poses(mount: Mount) -> np.ndarray:

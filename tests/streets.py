@@ -10,11 +10,12 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Scale
-from dreamdrive.scene.layout import Area, Box, Ego, Layout, TrackPoint
-from dreamdrive.world import Drive, drive, make_street
+from dreamdrive.scene.street.layout import Area, Box, Ego, Layout, TrackPoint
+from dreamdrive.scene.street.truth import DriveTruth
+from streetworld import drive, make_street
 
 
-def street_clip(street: Drive, hold_out: int | None = None) -> Clip:
+def street_clip(street: DriveTruth, hold_out: int | None = None) -> Clip:
     """The frames as a clip with known intrinsics and simple colour features."""
     count, height, width = street.frames.shape[:3]
     rig = street.cameras[0]
@@ -36,7 +37,7 @@ def street_clip(street: Drive, hold_out: int | None = None) -> Clip:
     )
 
 
-def true_geometry(street: Drive, evidence: bool = True) -> Geometry:
+def true_geometry(street: DriveTruth, evidence: bool = True) -> Geometry:
     """Exact cameras, depth, sky and, unless switched off, moving evidence."""
     moving = street.moving.astype(np.float32)
     return Geometry(
@@ -53,14 +54,22 @@ def true_geometry(street: Drive, evidence: bool = True) -> Geometry:
     )
 
 
-def small_street(**changes: object) -> Drive:
-    """A quick street for tests."""
+def small_street(**changes: object) -> DriveTruth:
+    """A quick street, drawn once for all tests that follow one another; do not change it."""
     settings: dict[str, object] = {"seed": 3, "frames": 8, "size": (96, 64), "movers": 1, "parked": 3}
-    return make_street(**{**settings, **changes})  # type: ignore[arg-type]
+    return _drawn(tuple(sorted({**settings, **changes}.items())))
+
+
+@lru_cache(maxsize=4)
+def _drawn(settings: tuple[tuple[str, object], ...]) -> DriveTruth:
+    made = make_street(**dict(settings))  # type: ignore[arg-type]
+    for pictures in (made.frames, made.depth_m, made.instance, made.semantic, made.moving, made.flow_px):
+        pictures.flags.writeable = False
+    return made
 
 
 @lru_cache
-def bare_street() -> Drive:
+def bare_street() -> DriveTruth:
     """A car ahead on an empty road, 5 frames of 80x48: quick to draw; do not change it."""
     car = Box("ahead", "car", (4.4, 1.8, 1.5), [TrackPoint(0, 12, 0, 0), TrackPoint(2, 26, 0, 0)])
     road = Area("road", [(-20.0, -5.0), (60.0, -5.0), (60.0, 5.0), (-20.0, 5.0)])
@@ -73,14 +82,14 @@ def car(name: str, points: list[tuple[float, float, float, float]], look: int = 
     return Box(name, "car", (4.4, 1.8, 1.5), [TrackPoint(*point) for point in points], look)
 
 
-def traffic(*boxes: Box, frames: int, fps: float = 10.0, size: tuple[int, int] = (96, 64)) -> Drive:
+def traffic(*boxes: Box, frames: int, fps: float = 10.0, size: tuple[int, int] = (96, 64)) -> DriveTruth:
     """Road users on a bare road, seen by a camera that drives at 7 m/s."""
     road = Area("road", [(-20.0, -8.0), (120.0, -8.0), (120.0, 8.0), (-20.0, 8.0)])
     ego = Ego([TrackPoint(0, 0, 0, 0), TrackPoint(6, 42, 0, 0)])
     return drive(Layout(ego, areas=[road], boxes=list(boxes)), frames, fps, size)
 
 
-def true_labels(street: Drive, geometry: Geometry, seeds: Gaussians) -> Grouping:
+def true_labels(street: DriveTruth, geometry: Geometry, seeds: Gaussians) -> Grouping:
     """What moves, a cluster for each thing in the order of the boxes."""
     every = np.arange(len(seeds))
     column, row = np.floor(source_pixels(geometry, seeds, every)[:, :2]).astype(int).T

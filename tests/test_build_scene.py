@@ -7,17 +7,20 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive import Given, build_scene, options, pipeline
+from dreamdrive import Given, build, build_scene, options
 from dreamdrive.decompose import Grouping
-from dreamdrive.fit import FitOptions
-from dreamdrive.progress import Work
-from dreamdrive.run import call
+from dreamdrive.fit import FitOptions, Trial, initialise
+from dreamdrive.progress import Work, call
 from dreamdrive.scene.clip import Known
 from tests.streets import small_street, street_clip, true_geometry
 
 DRAFT = options.QUALITIES["draft"]
 TINY = replace(
-    DRAFT, static=FitOptions(steps=4), score=replace(DRAFT.score, steps=4), fit=FitOptions(steps=4)
+    DRAFT,
+    knowledge="none",
+    static=FitOptions(steps=4),
+    score=replace(DRAFT.score, steps=4),
+    fit=FitOptions(steps=4),
 )
 
 
@@ -30,7 +33,7 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
         made[name] = call(name, options, compute, **chosen)
         return made[name]
 
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted)
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted).scene
     assert list(made) == ["look", "geometry", "initialise", "static", "score", "group", "fit"]
     assert made["geometry"] is geometry
     assert scene is made["fit"]
@@ -40,11 +43,11 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
     known = Given(geometry, made["static"], labels)  # type: ignore[arg-type]
     # All copies are kept: what other frames see past would go.
     kept = replace(TINY, cast=replace(TINY.cast, carve=False))
-    again = build_scene(clip, kept, given=known, run=noted)
+    again = build_scene(clip, kept, given=known, run=noted).scene
     assert made["group"] is labels
     assert len(again.dynamic) == int(half.sum())
     tracks = replace(TINY.cast, tracks=False)
-    still = build_scene(clip, replace(TINY, cast=tracks), given=known)
+    still = build_scene(clip, replace(TINY, cast=tracks), given=known).scene
     assert still.actors == ()
 
 
@@ -52,7 +55,7 @@ def test_the_same_clip_and_options_give_the_same_scene() -> None:
     street = small_street(frames=6)
     clip, given = street_clip(street, hold_out=4), Given(true_geometry(street))
     static = replace(TINY, representation="static")
-    one, other = (build_scene(clip, static, given=given) for _ in range(2))
+    one, other = (build_scene(clip, static, given=given).scene for _ in range(2))
     assert torch.equal(one.static.means, other.static.means)
     assert Work().keep("part", lambda: 3) == 3
 
@@ -60,11 +63,32 @@ def test_the_same_clip_and_options_give_the_same_scene() -> None:
 def test_a_street_that_was_drawn_from_its_depth_never_drifts(monkeypatch: pytest.MonkeyPatch) -> None:
     street = small_street(frames=6)
     clip, geometry = street_clip(street, hold_out=4), true_geometry(street)
-    monkeypatch.setattr(pipeline, "stands", lambda *_: False)
-    assert build_scene(clip, TINY, given=Given(geometry)).drifts
+    monkeypatch.setattr(build, "stands", lambda *_: False)
+    assert build_scene(clip, TINY, given=Given(geometry)).scene.moves_per_frame
     poses = np.stack([each.world_from_camera for each in geometry.cameras])
     known = Known(poses, depth_m=street.depth_m, generated=True)
-    assert not build_scene(replace(clip, known=known), TINY, given=Given(geometry)).drifts
+    assert not build_scene(replace(clip, known=known), TINY, given=Given(geometry)).scene.moves_per_frame
+
+
+@pytest.mark.parametrize("verdict", [True, False])
+def test_frames_are_asked_once_whether_the_street_stands(
+    monkeypatch: pytest.MonkeyPatch, verdict: bool
+) -> None:
+    street = small_street(frames=4)
+    clip, geometry = street_clip(street), true_geometry(street)
+    seeds = initialise(clip, geometry, TINY.seeds)
+    labels = Grouping(torch.zeros(len(seeds), dtype=torch.bool), torch.full((len(seeds),), -1))
+    no_error = np.zeros((0, 1, 1), dtype=np.float32)
+    found, asked = Trial(clip, (), no_error, no_error > 0), list[bool]()
+    monkeypatch.setattr(build, "trial", lambda *_: asked.append(True))
+    monkeypatch.setattr(build, "better_depth", lambda _, geometry, *__: (geometry, found))
+    monkeypatch.setattr(build, "stands", lambda *_: verdict)
+    chosen = build._as_frames_say(clip, geometry, TINY, 0)
+    assert asked == []
+    assert build._per_frame_street(clip, chosen, seeds, labels, TINY, 0) is None
+    # A path that was calmed is another one; so is what was found under other options.
+    assert (chosen.stands, asked) == ((True, []) if verdict else (None, [True]))
+    assert build._unasked(chosen).stands is None
 
 
 def test_each_of_several_drives_gets_the_steps_of_one() -> None:
@@ -77,7 +101,7 @@ def test_each_of_several_drives_gets_the_steps_of_one() -> None:
         asked[name] = options
         return call(name, options, compute, **chosen)
 
-    build_scene(two, replace(TINY, representation="static", knowledge="none"), given=given, run=noted)
+    build_scene(two, replace(TINY, representation="static"), given=given, run=noted)
     assert asked["static"][0].steps == 2 * TINY.static.steps
     assert asked["fit"][1].steps == 2 * TINY.fit.steps
 

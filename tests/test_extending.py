@@ -12,10 +12,14 @@ import numpy as np
 import pytest
 
 from dreamdrive import Control, InputError, generate, load_scene, options
-from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
+from dreamdrive.data.table import DATASETS
 from dreamdrive.fit import FitOptions
+from dreamdrive.geometry import BACKENDS
+from dreamdrive.prior import PRIORS
+from dreamdrive.stored import save_scene
 from tests.cli.conftest import Run, run  # noqa: F401 - a fixture
 from tests.conftest import ROOT
+from tests.scene.scenes import make_scene
 
 PAGE = (ROOT / "docs/extending.md").read_text()
 TINY = Control(frames="0:4", size=(64, 40), seed=1)
@@ -63,6 +67,7 @@ def roadside(install: Install) -> None:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     draft = options.QUALITIES["draft"]
     few = replace(draft, static=FitOptions(steps=4), fit=FitOptions(steps=4), representation="static")
+    few = replace(few, knowledge="none")
     few = replace(few, geometry=replace(draft.geometry, method="level"))
     monkeypatch.setitem(options.QUALITIES, "draft", few)
 
@@ -117,7 +122,7 @@ def test_what_a_data_set_does_not_take_or_know(tmp_path: Path, run: Run) -> None
     assert f"--dataset odometer: {tmp_path} is not one of it; expected a folder with images and" in said.err
     control = Control(drive(tmp_path / "drive"), dataset="odometer", hfov_deg=60.0)
     with pytest.raises(
-        InputError, match=r"takes no hfov_deg; it takes dataset, fps, frames, hold_out, path, size"
+        InputError, match=r"takes no --hfov; it takes --dataset, --fps, --frames, --hold-out, --size"
     ):
         PRIORS["replay"](control)
 
@@ -132,6 +137,17 @@ def test_commands_and_doctor_know_them(run: Run, monkeypatch: pytest.MonkeyPatch
     assert "prior fog: street-world on a foggy day" in said
     assert "package: roadside 1.0" in said
     assert "data set odometer: a folder with images" in said
+    assert "export xyz: centres of Gaussians as text" in said
+
+
+@pytest.mark.usefixtures("roadside")
+def test_an_export_is_taken_by_its_name(run: Run, tmp_path: Path) -> None:  # noqa: F811
+    save_scene(make_scene(), tmp_path / "scene")
+    wanted = ("export", tmp_path / "scene", "--to", "xyz", "-o")
+    assert run(*wanted, tmp_path / "points.xyz").code == 0
+    assert len((tmp_path / "points.xyz").read_text().splitlines()) == 7
+    assert "exists already" in run(*wanted, tmp_path / "points.xyz").err
+    assert "expected a name that ends in .xyz" in run(*wanted, tmp_path / "points.ply").err
 
 
 ENTRY = "[dreamdrive.priors]\n{} = {}\n"

@@ -10,18 +10,18 @@ import torch
 from numpy.testing import assert_allclose
 
 from dreamdrive import Control, Given, build_scene, options
-from dreamdrive.decompose import Grouping, GroupOptions, cast, find_path, group, source_pixels
+from dreamdrive.decompose import Grouping, GroupOptions, find_actors, find_path, group, source_pixels
 from dreamdrive.fit import FitOptions, initialise
-from dreamdrive.knowledge import NO_KNOWLEDGE
-from dreamdrive.run.outcome import lines_of, outcome_of
-from dreamdrive.run.report import describe
+from dreamdrive.run.report.document import describe
+from dreamdrive.run.report.outcome import lines_of, outcome_of
 from dreamdrive.run.request import request_of
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.street.truth import DriveTruth
 from dreamdrive.splat import render_scene
-from dreamdrive.world import Drive
+from dreamdrive.street_network import NO_KNOWLEDGE
 from tests.streets import car, small_street, street_clip, traffic, true_geometry, true_labels
 
 DRAFT = options.QUALITIES["draft"]
@@ -82,7 +82,7 @@ def assert_edits(scene: Scene, id: int) -> None:
     assert_allclose((after - before).mean(dim=0), [1, 0, 0], atol=0.05)
 
 
-def seeded(street: Drive) -> tuple[Clip, Geometry, Gaussians]:
+def seeded(street: DriveTruth) -> tuple[Clip, Geometry, Gaussians]:
     clip, geometry = street_clip(street), true_geometry(street)
     return clip, geometry, initialise(clip, geometry, TINY.seeds)
 
@@ -98,7 +98,7 @@ def nothing_stands() -> tuple[Clip, Geometry, Gaussians]:
 
 def test_where_all_pixels_move_a_scene_is_built_and_the_report_says_so(nothing_stands) -> None:
     clip, geometry, _ = nothing_stands
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry)).scene
     assert_sane(scene)
     report = report_of(clip, geometry, scene)
     assert any(reason.startswith(ALL_MOVES) for reason in report["rough"])
@@ -114,7 +114,7 @@ def test_where_all_seeds_score_as_moving_the_road_stays_or_all_of_it_goes(nothin
     low = geometry.ground.height_m(seeds.means.numpy().astype(np.float64)) < 0.05
     # Of the road only what the outline of an upright thing surrounds goes with it, see ``on_road``.
     assert labels.dynamic[low].float().mean() == pytest.approx(0 if clusters == "flow" else 1, abs=0.01)
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert len(scene.static) == int((~labels.dynamic).sum())
     assert_sane(scene)
 
@@ -126,7 +126,7 @@ def test_without_any_static_gaussian_a_scene_is_built_and_the_report_says_so(
     clip, geometry, seeds = nothing_stands
     number = torch.zeros(len(seeds), dtype=torch.int64) if clusters == "one" else seeds.source_frame
     labels = Grouping(torch.ones(len(seeds), dtype=torch.bool), number)
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert len(scene.static) == 0
     assert_sane(scene)
     assert len(scene.actors) == (1 if clusters == "one" else 0)
@@ -142,7 +142,7 @@ def test_at_times_at_which_nothing_is_seen_a_scene_without_street_is_sky(nothing
     geometry = replace(geometry, depth_m=geometry.depth_m * first, confidence=geometry.confidence * first)
     seeds = initialise(clip, geometry, TINY.seeds)
     labels = Grouping(torch.ones(len(seeds), dtype=torch.bool), torch.zeros(len(seeds), dtype=torch.int64))
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert_sane(scene)
     alpha = [float(render_scene(scene, scene.cameras[0], t_s).alpha.max()) for t_s in scene.times_s.tolist()]
     assert alpha[0] > 0.5
@@ -153,7 +153,7 @@ def test_where_much_stands_nothing_of_that_is_said() -> None:
     street = small_street(frames=6)
     clip, geometry = street_clip(street), true_geometry(street)
     static = replace(TINY, representation="static")
-    still = build_scene(clip, static, given=Given(geometry=geometry))
+    still = build_scene(clip, static, given=Given(geometry=geometry)).scene
     report = report_of(clip, geometry, still)
     assert not any(reason.startswith(ALL_MOVES) for reason in report["rough"])
     assert report["notes"] == []
@@ -184,7 +184,7 @@ def glimpsed() -> tuple[Clip, Geometry, Gaussians, Grouping]:
 def test_what_one_frame_shows_has_no_track_and_the_report_says_so(glimpsed, least_frames: int) -> None:
     clip, geometry, _, labels = glimpsed
     chosen = replace(TINY, cast=replace(TINY.cast, least_frames=least_frames))
-    scene = build_scene(clip, chosen, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, chosen, given=Given(geometry=geometry, labels=labels)).scene
     count = int(labels.dynamic.sum())
     assert scene.actors == ()
     assert len(scene.dynamic) == count > 30
@@ -194,7 +194,7 @@ def test_what_one_frame_shows_has_no_track_and_the_report_says_so(glimpsed, leas
     dead = scene.dynamic_at(float(clip.times_s[ONCE + 3]))
     assert len(dead) == 0
     report = report_of(clip, geometry, scene)
-    assert report["notes"][-1].startswith(f"{count} Gaussians of what moves have no track")
+    assert report["notes"][-1].startswith(f"{count} Gaussians of what moves could not be followed")
     assert "with parts that move and have no track, from" in lines(report)[0]
 
 
@@ -204,8 +204,8 @@ def test_what_one_frame_shows_can_have_a_known_place(glimpsed) -> None:
     anywhere = replace(TINY.cast.placing, most_spread_m=1e4)
     path = find_path(clip, geometry, np.array([ONCE]), shown, anywhere, REACH_PX)
     assert path is not None
-    moving = cast(clip, geometry, seeds, labels, TINY.cast, REACH_PX, known={0: path})
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels, tracks=moving))
+    moving = find_actors(clip, geometry, seeds, labels, TINY.cast, REACH_PX, known={0: path})
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels, tracks=moving)).scene
     assert len(scene.actors) == 1
     assert len(scene.actors[0].track.times_s) == 1
     assert scene.actors[0].track.speed_m_s.tolist() == [0]
@@ -233,7 +233,7 @@ def test_cars_that_touch_in_the_picture_stay_two(case: str) -> None:
     true = true_labels(street, geometry, seeds)
     assert_touching(street)
     labels = group(clip, geometry, seeds, true.dynamic.float(), TINY.group, REACH_PX)
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert_sane(scene)
     # A thing may come in two parts, but no part is of both.
     for cluster in range(int(labels.cluster.max()) + 1):
@@ -246,7 +246,7 @@ def test_cars_that_touch_in_the_picture_stay_two(case: str) -> None:
         assert min(abs(actor.track.length_m - length_m) for length_m in gone.values()) < 0.6
 
 
-def assert_touching(street: Drive) -> None:
+def assert_touching(street: DriveTruth) -> None:
     """Both are in the picture, with no pixel between them, in some frame."""
     one, other = (street.instance == box.instance for box in street.boxes)
     assert one.any(axis=(1, 2)).all()
@@ -255,26 +255,28 @@ def assert_touching(street: Drive) -> None:
     assert beside.any()
 
 
-@pytest.mark.parametrize("users", [False, True], ids=["by depth alone", "told apart by the network"])
-def test_cars_that_touch_at_one_depth_and_one_speed_are_one_unless_something_tells_them_apart(users) -> None:
+@pytest.mark.parametrize("road_users", [False, True], ids=["by depth alone", "told apart by the network"])
+def test_cars_that_touch_at_one_depth_and_one_speed_are_one_unless_something_tells_them_apart(
+    road_users,
+) -> None:
     left = car("left", [(0, 14, 0.91, 0), (2, 34, 0.91, 0)])
     right = car("right", [(0, 14, -0.91, 0), (2, 34, -0.91, 0)], look=3)
     street = traffic(left, right, frames=8, size=(160, 96))
     clip, geometry, seeds = seeded(street)
     assert_touching(street)
-    if users:
-        geometry = replace(geometry, users=street.instance.astype(np.uint16))
+    if road_users:
+        geometry = replace(geometry, road_users=street.instance.astype(np.uint16))
     moves = true_labels(street, geometry, seeds).dynamic
     labels = group(clip, geometry, seeds, moves.float(), TINY.group, REACH_PX)
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert_sane(scene)
-    assert len(scene.actors) == (2 if users else 1)
+    assert len(scene.actors) == (2 if road_users else 1)
     for actor in scene.actors:
         assert actor.track.length_m == pytest.approx(7, abs=0.5)
 
 
 @pytest.fixture(scope="module")
-def returning() -> tuple[Drive, Clip, Geometry, Gaussians, Grouping]:
+def returning() -> tuple[DriveTruth, Clip, Geometry, Gaussians, Grouping]:
     """A car that falls back out of the picture and overtakes again: 20 frames, three without it."""
     points = [(t, 8 + 1.5 * t + 1.1 * t * t, 3.0, 0.0) for t in np.arange(0, 5.3, 0.25).tolist()]
     street = traffic(car("back", points), frames=20, fps=4)
@@ -289,7 +291,7 @@ def test_what_leaves_the_picture_and_comes_back_keeps_to_its_lane(returning, kno
     street, clip, geometry, seeds, labels = returning
     if not known:
         labels = group(clip, geometry, seeds, labels.dynamic.float(), TINY.group, REACH_PX)
-    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels))
+    scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
     assert_sane(scene)
     truth_m = partial(np.interp, xp=street.times_s, fp=street.boxes[0].world_from_box[:, 2, 3])
     assert len(scene.actors) == 1 if known else len(scene.actors) >= 2

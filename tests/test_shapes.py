@@ -5,7 +5,7 @@ import pytest
 import torch
 from jaxtyping import Float, TypeCheckError, jaxtyped
 
-from dreamdrive.run.held_out import likeness
+from dreamdrive.run.report.held_out import likeness
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.trajectory import Trajectory

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from dreamdrive.knowledge.training.textures import make_textures
+from dreamdrive_train.street_network.data.textures import make_textures
 
 if __name__ == "__main__":
     data, out = (Path(argument) for argument in sys.argv[1:3])

@@ -1,4 +1,4 @@
-"""Types of the compiled core: native/module.cpp and what that binds from its neighbours.
+"""Types of the compiled core: native/bindings/module.cpp and what that binds from its neighbours.
 
 Arrays are contiguous float32 CPU tensors, or NumPy's of geometry; ``visible``, ``mask``, ``usable`` and the
 ``sky`` of the geometry loss are bool, ``actor`` is int64, homographies are float64.

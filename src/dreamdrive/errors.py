@@ -1,5 +1,7 @@
-"""The one error a user's own mistake raises."""
+"""The one error a user's own mistake raises, and what installs a package that is missing."""
 
+PIP = ".venv/bin/pip install"
+"""What installs packages, in the clone that dreamdrive runs from."""
 _LONGEST, _HEAD, _TAIL = 1000, 500, 400
 
 
@@ -8,8 +10,14 @@ class InputError(ValueError):
 
     The command line prints the text alone and exits with code 2. What it quotes from files may be long and
     hold anything: the middle of a long text is left out, and what would move a terminal's cursor is escaped.
+    Other processes send one as its text or make it anew of itself; both give the same again.
     """
 
-    def __init__(self, text: str) -> None:
-        whole = "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+    def __init__(self, text: object) -> None:
+        whole = "".join(each if each.isprintable() else repr(each)[1:-1] for each in str(text))
         super().__init__(whole if len(whole) <= _LONGEST else f"{whole[:_HEAD]} ... {whole[-_TAIL:]}")
+
+
+def installing(extra: str) -> str:
+    """What installs an extra of ``pyproject.toml``."""
+    return f"in dreamdrive's folder: {PIP} -e '.[{extra}]'"

@@ -1,22 +1,27 @@
-"""What ``--quality`` means: one row of numbers a name."""
+"""Options of all stages, and the qualities: one row of numbers a name."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import ceil
 
-from dreamdrive.choices import DeviceName, MethodName, QualityName, RepresentationName
-from dreamdrive.decompose import ActorOptions, DriftOptions, GroupOptions, ScoreOptions
+from dreamdrive.decompose import ActorOptions, GroupOptions, PerFrameOptions, ScoreOptions
+from dreamdrive.errors import InputError
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions, TrialOptions
 from dreamdrive.geometry import GeometryOptions
-from dreamdrive.knowledge import SHIPPED
 from dreamdrive.motion import REPRESENTATIONS, DeformationConfig, MotionConfig
+from dreamdrive.names import DeviceName, MethodName, QualityName, RepresentationName
 from dreamdrive.scene.clip import Clip
+from dreamdrive.street_network import SHIPPED
+
+_VISITS = 3.0  # see ``FitOptions.least_visits``
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a scene is built: the options of each stage.
+    """How a scene is built: the options of each stage, by default those of the quality ``"standard"``.
 
     Attributes:
+        quality: Name of the row of ``QUALITIES`` that they began as.
         static: The fit as if nothing moved.
         score: Training of the dynamic scores.
         fit: The joint fit.
@@ -32,16 +37,16 @@ class Options:
         geometry: How cameras and depth are found.
         knowledge: Weights of the street network: the name of those that ship, a file, or ``"none"``.
         method: Whose equations the others are set to, see ``with_method``.
-        seed: Seed of everything random.
     """
 
-    static: FitOptions
-    score: ScoreOptions
-    fit: FitOptions
+    quality: QualityName = "standard"
+    static: FitOptions = field(default_factory=partial(FitOptions, steps=150, least_visits=_VISITS))
+    score: ScoreOptions = field(default_factory=ScoreOptions)
+    fit: FitOptions = field(default_factory=partial(FitOptions, steps=500, least_visits=_VISITS))
     seeds: SeedOptions = field(default_factory=SeedOptions)
     group: GroupOptions = field(default_factory=GroupOptions)
     cast: ActorOptions = field(default_factory=ActorOptions)
-    drift: DriftOptions = field(default_factory=DriftOptions)
+    drift: PerFrameOptions = field(default_factory=PerFrameOptions)
     trial: TrialOptions = field(default_factory=TrialOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
     network: DeformationConfig = field(default_factory=DeformationConfig)
@@ -50,7 +55,19 @@ class Options:
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
     knowledge: str = SHIPPED
     method: MethodName = "dreamdrive"
-    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """The quality's, or ``"custom"`` where they are no longer its own.
+
+        What is chosen beside a quality does not matter: device, networks, what is known of the camera.
+        """
+        g, own = self.geometry, with_method(QUALITIES[self.quality], self.method)
+        told = {"method": g.method, "weights": g.weights}
+        told |= {"camera_height_m": g.camera_height_m, "refine_poses": g.refine_poses}
+        beside = {name: getattr(self, name) for name in ("representation", "device", "knowledge")}
+        same = self == replace(own, geometry=replace(own.geometry, **told), **beside)
+        return self.quality if same else "custom"
 
     @property
     def motion(self) -> MotionConfig:
@@ -97,9 +114,9 @@ _PAPER_TAU = 0.05
 def with_method(options: Options, method: MethodName) -> Options:
     """The options of ``--method``: ``"paper"`` takes eq. 5-14 as printed, ``"dreamdrive"`` is ours.
 
-    The paper's error map is the only target of the scores, unscaled, in all frames; every Gaussian is
-    clustered and votes; F_deform alone, of the size of Deformable-3DGS that the paper follows, moves things;
-    the loss is L1 + SSIM.
+    The paper's error map is the only target of the scores, unscaled, in all frames, all pixels alike; every
+    Gaussian is clustered and votes; F_deform alone, of the size of Deformable-3DGS that the paper follows,
+    moves things; the loss is L1 + SSIM. What stays as it is here stands in docs/design.md.
     """
     if method == "dreamdrive":
         return options
@@ -107,7 +124,7 @@ def with_method(options: Options, method: MethodName) -> Options:
     return replace(
         options,
         method="paper",
-        score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None),
+        score=replace(s, target="error", error_scale=1.0, error_sigma_px=0.0, window=None, balance=None),
         group=replace(g, clusters="density", threshold=_PAPER_TAU, majority=0.5),
         cast=replace(options.cast, tracks=False),
         drift=replace(options.drift, allowed=False),
@@ -117,22 +134,43 @@ def with_method(options: Options, method: MethodName) -> Options:
     )
 
 
-_VISITS = 3.0  # see ``FitOptions.least_visits``
 # Quality is steps, never seconds: the same command gives the same scene on a slow machine.
 QUALITIES: dict[QualityName, Options] = {
     "draft": Options(
+        "draft",
         FitOptions(steps=75, least_visits=_VISITS),
         ScoreOptions(),
         FitOptions(steps=150, least_visits=_VISITS, plane_rate=5e-2),
     ),
-    "standard": Options(
-        FitOptions(steps=150, least_visits=_VISITS),
-        ScoreOptions(),
-        FitOptions(steps=500, least_visits=_VISITS),
-    ),
+    "standard": Options(),
     "high": Options(
+        "high",
         FitOptions(steps=500, least_visits=_VISITS),
         ScoreOptions(steps=300),
         FitOptions(steps=2500, least_visits=_VISITS),
     ),
 }
+
+
+def options_of(quality: str) -> Options:
+    """Those of a quality.
+
+    Raises:
+        InputError: There is no such quality.
+    """
+    found = next((options for name, options in QUALITIES.items() if name == quality), None)
+    if found is None:
+        raise InputError(f"quality {quality!r}: expected {', '.join(QUALITIES)}, or an Options")
+    return found
+
+
+def chosen_options(
+    options: Options | QualityName | None, quality: QualityName | None, camera_height_m: float | None
+) -> Options:
+    """What ``generate`` was given, as one ``Options``."""
+    if options is not None and quality is not None:
+        raise InputError("generate takes options or a quality, not both; the quality decides the options")
+    whole = options if isinstance(options, Options) else options_of(options or quality or "standard")
+    if camera_height_m is None:
+        return whole
+    return replace(whole, geometry=replace(whole.geometry, camera_height_m=camera_height_m))

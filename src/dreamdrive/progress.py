@@ -1,4 +1,4 @@
-"""How work tells those who wait how far it is, and keeps what it has so far."""
+"""Progress of work, and parts of it that are kept."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -57,3 +57,40 @@ class Work:
             return self.keep(f"{name}-{index}", compute)
 
         return Work(tell, keep)
+
+
+def trusted(value: object) -> None:
+    """No check."""
+
+
+@runtime_checkable
+class Run(Protocol):
+    """What gives the result of a stage: ``call`` computes it, ``run.Stages`` keeps it on disk."""
+
+    def __call__(
+        self,
+        name: str,
+        options: object,
+        compute: Callable[[Work], T],
+        *,
+        check: Callable[[T], None] = trusted,
+        given: T | None = None,
+    ) -> T:
+        """The result of one of ``names.Stage``, unless it is given.
+
+        It depends on the options and the results before it, nothing else; ``check`` raises ``ValueError``
+        where a stored result does not belong to these.
+        """
+        ...
+
+
+def call(
+    name: str,
+    options: object,
+    compute: Callable[[Work], T],
+    *,
+    check: Callable[[T], None] = trusted,
+    given: T | None = None,
+) -> T:
+    """A ``Run`` that keeps nothing."""
+    return compute(Work()) if given is None else given

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import clips
+from dreamdrive_bench import clips
 
 
 def straight(metres: float) -> np.ndarray:

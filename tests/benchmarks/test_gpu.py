@@ -3,15 +3,14 @@
 import pytest
 import torch
 
-import gpu
 from dreamdrive.splat.ssim import ssim_map_reference
-from splat import gpu_training as training
+from dreamdrive_bench.splat import gpu, gpu_training as training
 
 
 def test_without_a_gpu_it_says_so(monkeypatch):
     monkeypatch.setattr("sys.argv", ["gpu.py"])
     monkeypatch.setattr(gpu, "why_unusable", lambda: "torch finds no CUDA device")
-    with pytest.raises(SystemExit, match=r"^gpu\.py measures a GPU, .*: torch finds no CUDA device$"):
+    with pytest.raises(SystemExit, match=r"^gpu measures a GPU, .*: torch finds no CUDA device$"):
         gpu.main()
 
 

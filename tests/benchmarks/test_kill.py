@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-import kill
+from dreamdrive_bench import kill
 
 SMALL = ["--prior", "street-world", "--frames", "0:5", "--size", "64x40", "--quality", "draft"]
 

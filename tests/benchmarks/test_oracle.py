@@ -9,16 +9,17 @@ from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.world import Drive, make_street
-from oracle.arms import ARMS, likeness
-from oracle.main import tables
-from oracle.truth import instances_of, true_labels, true_paths, with_true_depth
-from oracle.views import seen
+from dreamdrive.scene.street.truth import DriveTruth
+from dreamdrive_bench.oracle.arms import ARMS, likeness
+from dreamdrive_bench.oracle.main import tables
+from dreamdrive_bench.oracle.truth import instances_of, true_labels, true_paths, with_true_depth
+from dreamdrive_bench.oracle.views import seen
+from streetworld import make_street
 
 
 @pytest.fixture(scope="module")
-def street() -> tuple[Drive, Clip, Geometry, Gaussians]:
-    from common.drawn import drawn_clip
+def street() -> tuple[DriveTruth, Clip, Geometry, Gaussians]:
+    from dreamdrive_bench.common.drawn import drawn_clip
 
     made = make_street(0, 6, 10.0, (160, 96))
     known = Known(made.trajectory.world_from_camera, intrinsics=True, depth_m=0.7 * made.depth_m)
@@ -28,7 +29,7 @@ def street() -> tuple[Drive, Clip, Geometry, Gaussians]:
     return made, clip, geometry, initialise(clip, geometry)
 
 
-def test_depth_is_true_where_it_is_asked_for(street: tuple[Drive, Clip, Geometry, Gaussians]) -> None:
+def test_depth_is_true_where_it_is_asked_for(street: tuple[DriveTruth, Clip, Geometry, Gaussians]) -> None:
     made, clip, geometry, _ = street
     solid = (made.depth_m > 0) & ~clip.held_out[:, None, None]
     np.testing.assert_allclose(geometry.depth_m[solid], made.depth_m[solid], rtol=1e-4)
@@ -37,7 +38,9 @@ def test_depth_is_true_where_it_is_asked_for(street: tuple[Drive, Clip, Geometry
     np.testing.assert_array_equal(wrong.depth_m, geometry.depth_m)
 
 
-def test_labels_and_paths_are_those_of_the_boxes(street: tuple[Drive, Clip, Geometry, Gaussians]) -> None:
+def test_labels_and_paths_are_those_of_the_boxes(
+    street: tuple[DriveTruth, Clip, Geometry, Gaussians],
+) -> None:
     made, clip, geometry, seeds = street
     labels, instances = true_labels(made, geometry, seeds), instances_of(made, geometry, seeds)
     np.testing.assert_array_equal(labels.dynamic.numpy(), instances > 0)
@@ -52,11 +55,11 @@ def test_labels_and_paths_are_those_of_the_boxes(street: tuple[Drive, Clip, Geom
 
 
 def test_held_out_frames_are_read_from_those_beside_them(
-    street: tuple[Drive, Clip, Geometry, Gaussians], monkeypatch: pytest.MonkeyPatch
+    street: tuple[DriveTruth, Clip, Geometry, Gaussians], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made, clip, _, _ = street
-    monkeypatch.setattr("oracle.views.world_of", lambda seed: made)
-    monkeypatch.setattr("street.views.world_of", lambda seed: made)
+    monkeypatch.setattr("dreamdrive_bench.oracle.views.world_of", lambda seed: made)
+    monkeypatch.setattr("dreamdrive_bench.street.views.world_of", lambda seed: made)
     view = seen(0, "held_out", clip)
     groups = [view.groups[name] for name in ("standing", "moving", "unseen")]
     assert (np.sum(groups, axis=0) == 1).all()

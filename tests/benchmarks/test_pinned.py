@@ -5,20 +5,22 @@ from pathlib import Path
 
 import pytest
 
-import pinned
+from dreamdrive_bench import pinned
 
 SCRIPT = """
 import sys
 from pathlib import Path
 import dreamdrive
-Path("runs/said.txt").write_text(" ".join([dreamdrive.WORD, *sys.argv[1:]]))
+import dreamdrive_bench
+Path("runs/said.txt").write_text(" ".join([dreamdrive.WORD + dreamdrive_bench.WORD, *sys.argv[1:]]))
 sys.exit(3)
 """
 
 
 def commit(root: Path, word: str) -> str:
     """The repository with another word in its package, committed."""
-    (root / "src/dreamdrive/__init__.py").write_text(f"WORD = {word!r}\n")
+    for package in ("src/dreamdrive", "benchmarks/src/dreamdrive_bench"):
+        (root / package / "__init__.py").write_text(f"WORD = {word!r}\n")
     author = ["-c", "user.name=A", "-c", "user.email=a@example.org"]
     for arguments in (["add", "-A"], [*author, "commit", "-q", "-m", word]):
         subprocess.run(["git", "-C", root, *arguments], check=True)
@@ -27,7 +29,7 @@ def commit(root: Path, word: str) -> str:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    for folder in ("src/dreamdrive", "native", "benchmarks", "runs"):
+    for folder in ("src/dreamdrive", "native", "benchmarks/src/dreamdrive_bench", "runs"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "native/core.cpp").touch()
     (tmp_path / "CMakeLists.txt").touch()
@@ -55,9 +57,10 @@ def test_the_code_is_that_of_the_commit_and_the_results_lie_in_the_checkout(
 ) -> None:
     first, second = commit(root, "old"), commit(root, "new")
     (root / "src/dreamdrive/__init__.py").write_text("WORD = 'changed'\n")
+    (root / "benchmarks/src/dreamdrive_bench/__init__.py").write_text("WORD = 'changed'\n")
     for word, name in (("old", first), ("new", "HEAD"), ("old", first[:10])):
         assert pinned.run(name, ["benchmarks/say.py", "--resume"], root) == 3
-        assert (root / "runs/said.txt").read_text() == f"{word} --resume"
+        assert (root / "runs/said.txt").read_text() == f"{2 * word} --resume"
         assert f"benchmarks/say.py of {pinned.git('rev-parse', '--short', name, folder=root)}, {word}" in (
             capfd.readouterr().out
         )

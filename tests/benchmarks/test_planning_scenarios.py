@@ -8,7 +8,8 @@ import pytest
 import shapely
 from jaxtyping import Bool, Float
 
-from dreamdrive.plan import (
+from dreamdrive.scene.street.layout import Box, track_function
+from dreamdrive.tasks.plan import (
     AHEAD_RAD,
     CAR,
     Agents,
@@ -21,18 +22,24 @@ from dreamdrive.plan import (
     overlapping,
     planning_from_ego,
 )
-from dreamdrive.scene.layout import Box, track_function
-from dreamdrive.world import StreetOptions, draw_street, drive
-from dreamdrive.world.road import LANE_M
-from dreamdrive.world.traffic import to_track
-from planning.driver import STEP_S, Driver, covered
-from planning.ego import EgoWay
-from planning.footprints import FRONT_M, ego_rectangles, in_the_way, meetings, rectangles_of, reference_poses
-from planning.picture import draw_grid
-from planning.protocol import KINDS, Kind, read_protocol
-from planning.scenario import Scenario
-from planning.scenarios import draw_scenario
-from planning.streets import street_of
+from dreamdrive_bench.planning.driver import STEP_S, Driver, covered
+from dreamdrive_bench.planning.ego import EgoWay
+from dreamdrive_bench.planning.footprints import (
+    FRONT_M,
+    ego_rectangles,
+    in_the_way,
+    meetings,
+    rectangles_of,
+    reference_poses,
+)
+from dreamdrive_bench.planning.picture import draw_grid
+from dreamdrive_bench.planning.protocol import KINDS, Kind, read_protocol
+from dreamdrive_bench.planning.scenario import Scenario
+from dreamdrive_bench.planning.scenarios import draw_scenario
+from dreamdrive_bench.planning.streets import street_of
+from streetworld import StreetOptions, draw_street, drive
+from streetworld.edition1.traffic import to_track
+from streetworld.engine.road import LANE_M
 
 PROTOCOL = read_protocol()
 SEEDS = {group.kind: group.seeds[1] for group in PROTOCOL.development}

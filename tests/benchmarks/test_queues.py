@@ -2,13 +2,12 @@
 
 import numpy as np
 
-import queues
-from dreamdrive.world import make_street
-from queues import Row, table, told
+from dreamdrive_bench import queues
+from dreamdrive_bench.queues import Row, table, told
+from streetworld import DrawnDrive
 
 
-def test_outlines_tell_of_road_users_and_nothing_of_the_lens() -> None:
-    made = make_street(3, 2, size=(96, 56), edition=2)
+def test_outlines_tell_of_road_users_and_nothing_of_the_lens(made: DrawnDrive) -> None:
     plain, outlined = told(made, "none", False), told(made, queues.OUTLINES, False)
     assert plain.look is None
     assert outlined.look is not None

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
 
-import removed
-from dreamdrive.world import make_street
+from dreamdrive_bench import removed
+from streetworld import make_street
+from tests.scene.scenes import make_scene
 
 
 def test_an_emptied_street_is_the_same_where_nothing_moved(monkeypatch: pytest.MonkeyPatch) -> None:

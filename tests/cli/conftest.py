@@ -1,11 +1,10 @@
 """Running the command line inside the test process."""
 
+import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import pytest
-from tests.test_pipeline import TINY, make, shorten
 
 from dreamdrive.cli.main import main
 
@@ -27,24 +26,20 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     """A function that runs ``dreamdrive`` with the given arguments."""
 
     def call(*arguments: object) -> Outcome:
-        monkeypatch.setattr("sys.argv", ["dreamdrive", *map(str, arguments)])
-        code: object = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = stop.code
+        code = code_of(monkeypatch, *arguments)
         said = capsys.readouterr()
         assert "Traceback" not in said.out + said.err
-        return Outcome(int(code or 0), " ".join(said.out.split()), " ".join(said.err.split()))  # type: ignore[call-overload]
+        return Outcome(code, " ".join(said.out.split()), " ".join(said.err.split()))
 
     return call
 
 
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a short run; whoever changes it takes a copy."""
-    out = tmp_path_factory.mktemp("run") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
-        make(out, replace(TINY, frames="0:4", hold_out=None))
-    return out
+def code_of(patch: pytest.MonkeyPatch, *arguments: object) -> int:
+    """How ``dreamdrive`` ends with the given arguments."""
+    patch.setattr("sys.argv", ["dreamdrive", *map(str, arguments)])
+    patch.setattr("sys.unraisablehook", sys.unraisablehook)  # the command sets its own
+    try:
+        main()
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0

@@ -1,12 +1,11 @@
 """Actions as words."""
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from dreamdrive.cli.arguments import EXAMPLES, parse_action
+from dreamdrive.cli.terminal.arguments import EXAMPLES, parse_action
 from dreamdrive.errors import InputError
-from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
+from dreamdrive.scene.control import Command, Goal, Steering, Waypoints
 
 
 def test_the_examples_are_actions() -> None:
@@ -38,7 +37,7 @@ def test_anything_else_is_one_message_with_examples(text: str, problem: str) -> 
     assert "examples are: command=left" in str(caught.value)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.text(max_size=40) | st.text(alphabet="speedwhl=0123,. -", max_size=40))
 def test_rubbish_is_never_a_traceback(text: str) -> None:
     try:

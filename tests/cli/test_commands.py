@@ -7,15 +7,15 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from tests.cli.conftest import Run
-from tests.export.ply_file import columns, count
-from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.drive import MANOEUVRES
 from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.stored import save_scene
+from tests.cli.conftest import Run
+from tests.export.ply_file import columns, count
+from tests.scene.scenes import make_baseline, make_scene
 
 
 @pytest.fixture
@@ -109,7 +109,7 @@ def test_the_doctor_says_what_is_there(run: Run) -> None:
 
 
 def test_the_doctor_says_what_is_missing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("dreamdrive.run", "dreamdrive.run.report"):
+    for module in ("dreamdrive.run", "dreamdrive.run.report.document"):
         monkeypatch.setattr(f"{module}.PACKAGES", ("torch", "not-installed-package"))
     monkeypatch.setattr("dreamdrive.cli.doctor.free_bytes", lambda: 500_000_000)
     result = run("doctor")

@@ -19,8 +19,8 @@ Help = Callable[..., str]
 
 @pytest.fixture
 def help_of(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Help:
-    """What ``dreamdrive WORDS --help`` prints, wide enough for one line an option."""
-    monkeypatch.setenv("COLUMNS", "400")
+    """What ``dreamdrive WORDS --help`` prints, as wide as it goes with one panel a line."""
+    monkeypatch.setenv("COLUMNS", "129")
 
     def call(*words: str) -> str:
         monkeypatch.setattr("sys.argv", ["dreamdrive", *words, "--help"])

@@ -1,16 +1,18 @@
 """``dreamdrive data``, and drives of a data set through ``generate``."""
 
 import json
+import shutil
 from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.conftest import Run
-from tests.logs import log
-from tests.test_pipeline import shorten
 
-from dreamdrive.data.lidar_file import read_points
-from dreamdrive.data.nuscenes import read_nuscenes, write_nuscenes
+from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.datasets.nuscenes import read_nuscenes
+from dreamdrive.export.nuscenes.writer import write_nuscenes
+from tests.cli.conftest import Run, code_of
+from tests.logs import log
+from tests.test_generate import shorten
 
 
 @pytest.fixture
@@ -18,6 +20,17 @@ def folder(tmp_path: Path) -> Path:
     logs = [log(tmp_path / name, name) for name in ("scene-0001", "scene-0002")]
     write_nuscenes(logs, tmp_path / "set", read_points)
     return tmp_path / "set"
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drawn street of six cameras in the format of nuScenes; who changes it takes a copy."""
+    world, written = (tmp_path_factory.mktemp("drawn") / name for name in ("world", "street"))
+    size = ("--frames", 6, "--size", "96x54", "--one-ray")
+    with pytest.MonkeyPatch.context() as patch:
+        assert code_of(patch, "world", "make", "--cameras", "surround", *size, "-o", world) == 0
+        assert code_of(patch, "export", world, "--to", "nuscenes", "-o", written) == 0
+    return written
 
 
 def test_data_sets_are_listed(run: Run) -> None:
@@ -80,18 +93,19 @@ def test_which_scene_has_to_be_said(run: Run, folder: Path, tmp_path: Path) -> N
 def test_fields_of_recordings_are_refused(run: Run, folder: Path, tmp_path: Path) -> None:
     result = run("generate", folder, "--scene", 0, "--fps", 3, "-o", tmp_path / "out")
     assert result.code == 2
-    assert "takes no fps; it takes cameras, dataset, frames, hold_out, path, scene, size" in result.err
+    assert (
+        "takes no --fps; it takes --cameras, --dataset, --frames, --hold-out, --scene, --size" in result.err
+    )
 
 
 def test_a_scene_is_made_of_a_drive(
-    run: Run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The street is drawn, and comes through the format of nuScenes with two cameras."""
     shorten(monkeypatch)
-    world, written, out = tmp_path / "world", tmp_path / "street", tmp_path / "out"
-    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x64", "--one-ray", "-o", world)
-    assert run("export", world, "--to", "nuscenes", "-o", written).code == 0
-    chosen = ("--cameras", "front,front_left", "--knowledge", "none", "--quality", "draft", "--hold-out", 4)
+    written, out = tmp_path / "street", tmp_path / "out"
+    shutil.copytree(street, written)
+    which = ("--cameras", "front,front_left", "--frames", "0:4", "--hold-out", 4)
+    chosen = (*which, "--knowledge", "none", "--quality", "draft")
     result = run("generate", written, *chosen, "-o", out)
     assert result.code == 0, result
     report = json.loads((out / "report.json").read_text())
@@ -109,14 +123,13 @@ def test_a_scene_is_made_of_a_drive(
     assert "other" in run("generate", written, *chosen, "-o", out).err  # the pictures decide
 
 
+@pytest.mark.slow
 def test_samples_are_made_of_drives_and_of_scenes(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shorten(monkeypatch)
-    world, written, out = tmp_path / "world", tmp_path / "street", tmp_path / "out"
-    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x54", "--one-ray", "-o", world)
-    run("export", world, "--to", "nuscenes", "-o", written)
-    chosen = ("--cameras", "all", "--knowledge", "none", "--quality", "draft")
+    written, out = street, tmp_path / "out"
+    chosen = ("--cameras", "all", "--frames", "0:3", "--knowledge", "none", "--quality", "draft")
     assert run("generate", written, *chosen, "-o", out).code == 0
     small = ("--size", "64x32", "--cells", 16)
     result = run("dataset", "make", written, *small, "-o", tmp_path / "real")
@@ -136,11 +149,9 @@ def test_samples_are_made_of_drives_and_of_scenes(
 
 
 @pytest.mark.slow
-def test_a_network_is_trained_on_samples_and_tested(run: Run, tmp_path: Path) -> None:
-    world, written, real = tmp_path / "world", tmp_path / "street", tmp_path / "real"
-    run("world", "make", "--cameras", "surround", "--frames", 6, "--size", "96x54", "--one-ray", "-o", world)
-    run("export", world, "--to", "nuscenes", "-o", written)
-    run("dataset", "make", written, "--size", "208x96", "--cells", 104, "-o", real)
+def test_a_network_is_trained_on_samples_and_tested(run: Run, street: Path, tmp_path: Path) -> None:
+    real = tmp_path / "real"
+    run("dataset", "make", street, "--size", "208x96", "--cells", 104, "-o", real)
     sets = ("--real", real, "--synthetic", real, "--validation", real)
     asked = ("evaluate", "perception", "--mode", "synthetic-train", *sets, "--network", "quick")
     quick = (*asked, "--trunk", "street", "--steps", 1, "--batch", 2, "--alpha", 0.75, "-o", tmp_path / "n")
@@ -154,6 +165,7 @@ def test_a_network_is_trained_on_samples_and_tested(run: Run, tmp_path: Path) ->
     assert "--alpha 1: expected a number between 0 and 1" in run(*asked, "--alpha", 1, "-o", tmp_path).err
 
 
+@pytest.mark.slow
 def test_samples_are_made_of_scenes_that_a_prior_drew(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -188,7 +200,7 @@ def test_a_letter_is_not_drawn_over(run: Run, tmp_path: Path) -> None:
     letter.write_text("Dear reader")
     result = run("data", "show", tmp_path, "-o", letter)
     assert result.code == 2
-    assert result.err == f"error: {letter}: expected a name that ends in .png"
+    assert result.err == f"error: {letter}: expected a name that ends in .png, such as letter.png"
     assert letter.read_text() == "Dear reader"
 
 

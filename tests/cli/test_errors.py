@@ -2,15 +2,20 @@
 
 import json
 import os
+import signal
+import time
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+
+from dreamdrive.run import production
 from tests.cli.conftest import Run
 
-from dreamdrive import pipeline
-from dreamdrive.run import production
+GENERATE = import_module("dreamdrive.generate")
 
 
 @pytest.fixture
@@ -60,7 +65,11 @@ def test_representations_are_known_by_name(run: Run, tmp_path: Path, name: str) 
 def test_a_gpu_that_is_not_there_is_said_before_any_work(
     run: Run, tmp_path: Path, clip: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "why_unusable", lambda: "gsplat is not installed: pip install it")
+    monkeypatch.setattr(
+        GENERATE,
+        "why_unusable",
+        lambda: "gsplat is not installed: pip install it",
+    )
     said = "error: --device cuda: gsplat is not installed: pip install it, or leave --device out for the CPU"
     expect(run, tmp_path / "out", clip, "--device", "cuda", message=said)
 
@@ -185,7 +194,7 @@ def test_a_full_disk(run: Run, clip: Path, tmp_path: Path, monkeypatch: pytest.M
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    result = run("generate", clip, "-o", tmp_path / "out", "--quality", "draft")
+    result = run("generate", clip, "-o", tmp_path / "out", "--quality", "draft", "--knowledge", "none")
     assert result.code == 2
     assert "No space left on device" in result.err
     assert "free some space" in result.err
@@ -195,7 +204,7 @@ def test_a_refusal_by_the_system_is_worded(run: Run, tmp_path: Path, monkeypatch
     def refused(*_: object, **__: object) -> bool:
         raise OSError(122, "Disk quota exceeded", "/somewhere")
 
-    monkeypatch.setattr(pipeline, "generate", refused)
+    monkeypatch.setattr(GENERATE, "generate", refused)
     result = run("generate", "--prior", "street-world", "-o", tmp_path / "out")
     assert result.code == 2
     assert result.err == (
@@ -207,9 +216,51 @@ def test_an_interruption_says_how_to_go_on(run: Run, tmp_path: Path, monkeypatch
     def interrupted(*_: object, **__: object) -> bool:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, "generate", interrupted)
+    monkeypatch.setattr(GENERATE, "generate", interrupted)
     result = run("generate", "--prior", "street-world", "-o", tmp_path / "out")
     assert result.code == 130
+    assert "the same command goes on from there" in result.err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_what_swallows_an_interruption_does_not_hide_it(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, code: int
+) -> None:
+    """As compiled libraries do, which then fail in another way."""
+
+    def swallowing(*_: object, **__: object) -> bool:
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+        raise ValueError("could not determine the shape")
+
+    monkeypatch.setattr(GENERATE, "generate", swallowing)
+    result = run("generate", "--prior", "street-world", "-o", tmp_path / "out")
+    assert result.code == code
+    assert "the same command goes on from there" in result.err
+    monkeypatch.setattr(GENERATE, "generate", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run("generate", "--prior", "street-world", "-o", tmp_path / "out")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_an_interruption_where_nothing_can_be_raised_is_raised_later(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, code: int
+) -> None:
+    """Python prints it there, as when an object is freed, and goes on."""
+
+    class Freed:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), number)
+
+    def freeing(*_: object, **__: object) -> bool:
+        held = [Freed()]
+        held.clear()
+        time.sleep(2)
+        return True
+
+    monkeypatch.setattr(GENERATE, "generate", freeing)
+    result = run("generate", "--prior", "street-world", "-o", tmp_path / "out")
+    assert result.code == code
     assert "the same command goes on from there" in result.err
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Run
 
 from dreamdrive import load_scene
 from dreamdrive.run import codec
 from dreamdrive.scene.clip import Clip
+from tests.cli.conftest import Run
 
-pytest.importorskip("foxglove", reason="pip install 'dreamdrive[mcap]'")
+pytest.importorskip("foxglove", reason="needs the extra mcap")
 pytest.importorskip("mcap_protobuf", reason="pip install mcap-protobuf-support")
 
 from tests.export.mcap_reader import picture_of, placed, read
@@ -46,7 +46,7 @@ def test_an_older_file_is_replaced_by_force(run: Run, finished: Path, tmp_path: 
     assert "--force" in result.err
     assert file.read_bytes() == b"older"
     assert "the frames" in run("export", finished / "scene", "--to", "mcap", "-o", file, "--force").out
-    assert len(read(file).times(FRONT)) == 4
+    assert len(read(file).times(FRONT)) == 6
 
 
 def test_a_scene_alone_is_rendered(run: Run, finished: Path, tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_a_scene_alone_is_rendered(run: Run, finished: Path, tmp_path: Path) -> 
     result = run("export", tmp_path / "alone", "--to", "mcap", "-o", tmp_path / "drive.mcap")
     assert result.code == 0, result
     assert "Pictures are rendered from the scene" in result.out
-    assert len(read(tmp_path / "drive.mcap").times(FRONT)) == 4
+    assert len(read(tmp_path / "drive.mcap").times(FRONT)) == 6
 
 
 def test_stages_of_another_run_are_refused(run: Run, finished: Path, tmp_path: Path) -> None:
@@ -90,4 +90,4 @@ def test_the_package_is_asked_for(run: Run, tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setitem(sys.modules, "foxglove.channels", None)
     result = run("export", tmp_path, "--to", "mcap", "-o", tmp_path / "drive.mcap")
     assert result.code == 2
-    assert "pip install 'dreamdrive[mcap]'" in result.err
+    assert "pip install -e '.[mcap]'" in result.err

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Run
 
 from dreamdrive import load_scene
 from dreamdrive.run import codec
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from tests.cli.conftest import Run
 
-pytest.importorskip("ncore.data.v4", reason="pip install 'dreamdrive[ncore]'")
+pytest.importorskip("ncore.data.v4", reason="needs the extra ncore")
 
 from tests.export.ncore_reader import read, world_from_camera
 
@@ -85,4 +85,4 @@ def test_the_package_is_asked_for(run: Run, tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setitem(sys.modules, "ncore.data.v4", None)
     result = run("export", tmp_path, "--to", "ncore", "-o", tmp_path / "set")
     assert result.code == 2
-    assert "pip install 'dreamdrive[ncore]'" in result.err
+    assert "pip install -e '.[ncore]'" in result.err

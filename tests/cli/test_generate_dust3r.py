@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 import torch
+
+from dreamdrive import load_scene
 from tests.cli.conftest import Run
 from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
-from tests.test_pipeline import shorten
-
-from dreamdrive import load_scene
+from tests.test_generate import shorten
 
 CLIP = ("--prior", "street-world", "--frames", "0:6", "--size", "64x40", "--hold-out", "4")
 SHORT = (*CLIP, "--quality", "draft")
@@ -118,7 +118,7 @@ def test_bad_input_is_refused_in_words(run: Run, tmp_path: Path, wrong: str, mes
     refused = run(
         "generate",
         pictures(tmp_path / "frames", frames),
-        *("--size", "256x160", "--quality", "draft", "--geometry", "dust3r"),
+        *("--size", "256x160", "--quality", "draft", "--knowledge", "none", "--geometry", "dust3r"),
         *("--weights", damaged(wrong, tmp_path), *more, "-o", tmp_path / "out"),
     )
     assert refused.code == 2, refused.err

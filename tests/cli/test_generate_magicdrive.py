@@ -4,13 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import Run
-from tests.prior.magicdrive.tiny import write_folder
-from tests.test_pipeline import shorten
 
 from dreamdrive import load_scene
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.world import draw_street
+from streetworld import draw_street
+from tests.cli.conftest import Run
+from tests.prior.magicdrive.tiny import write_folder
+from tests.test_generate import shorten
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ def test_six_generated_cameras_become_one_scene(
     assert any("generated from the layout" in note for note in report["notes"])
     assert report["requested"]["length_m"] > 0
     assert ("reason" in report["requested"]) == (prior == "magicdrive")
-    assert (report["scale"]["source"] == "poses") == (prior == "magicdrive")
+    assert (report["scale"]["source"] == "the path asked for") == (prior == "magicdrive")
     scene = load_scene(out / "scene")
     assert (len(scene.cameras), len(scene.trajectory)) == (24, 4)
     assert (out / "video" / "surround.mp4").is_file()

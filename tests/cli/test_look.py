@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from tests.cli.conftest import Run
 
-from dreamdrive.knowledge.network import StreetNetwork
-from dreamdrive.knowledge.weights import Training, write_network
+from dreamdrive.street_network.network import StreetNetwork
+from dreamdrive.street_network.weights import Training, write_network
+from tests.cli.conftest import Run
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.conftest import Run
 
 from dreamdrive.cli import main as module
+from tests.cli.conftest import Run
 
 COMMAND = [sys.executable, "-c", "from dreamdrive.cli.main import main; main()"]
 
@@ -45,11 +45,12 @@ def test_other_errors_keep_their_traceback(run: Run, monkeypatch: pytest.MonkeyP
         run("doctor")
 
 
-def test_nobody_who_reads_on_ends_it_without_a_word() -> None:
+@pytest.mark.parametrize("words", [("doctor",), ("generate", "--help")])
+def test_nobody_who_reads_on_ends_it_without_a_word(words: tuple[str, ...]) -> None:
     """As behind ``| head``: no traceback."""
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run([*COMMAND, "doctor"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run([*COMMAND, *words], stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert done.returncode == 1
     assert done.stderr == ""

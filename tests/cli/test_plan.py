@@ -8,12 +8,12 @@ import av
 import cv2
 import numpy as np
 import pytest
-from tests.cli.conftest import Run
-from tests.plan.test_occupancy import block, dots, scene_of
 
-from dreamdrive.data.poses import read_trajectory
+from dreamdrive.data.cameras.poses import read_trajectory
 from dreamdrive.scene.scene import Provenance
 from dreamdrive.stored import save_scene
+from tests.cli.conftest import Run
+from tests.drive.test_occupancy import block, dots, scene_of
 
 NAMES = ["drive.mp4", "plan.json", "plan.png", "trajectory.json"]
 

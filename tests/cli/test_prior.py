@@ -5,13 +5,13 @@ from pathlib import Path
 
 import av
 import pytest
-from tests.cli.conftest import Run
-from tests.prior.vista.photos import save_photo
-from tests.prior.vista.tiny import FRAMES, save_folder, save_official
-from tests.test_pipeline import shorten
 
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.stored import open_weights
+from tests.cli.conftest import Run
+from tests.prior.vista.photos import save_photo
+from tests.prior.vista.tiny import FRAMES, save_folder, save_official
+from tests.test_generate import shorten
 
 
 def test_a_single_file_becomes_a_folder(run: Run, tmp_path: Path) -> None:

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save_file
+
+from dreamdrive.data.layout_file import write_layout
+from dreamdrive.prior.vista.kinds import SVD, VISTA
+from streetworld import draw_street
 from tests.cli.conftest import Run
 from tests.prior.magicdrive.tiny import write_folder
 from tests.prior.vista.photos import save_photo
 from tests.prior.vista.tiny import official, save_official
-
-from dreamdrive.data.layout_file import write_layout
-from dreamdrive.prior.vista.kinds import SVD, VISTA
-from dreamdrive.world import draw_street
 
 Arguments = list[object]
 

@@ -7,13 +7,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from tests.cli.conftest import Run
-from tests.data.pictures import texture
 
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import read_features
 from dreamdrive.prior.vista import features
-from dreamdrive.scene.action import Command
+from dreamdrive.scene.control import Command
+from tests.cli.conftest import Run
+from tests.data.textures import texture
 
 SMALL = ("--frames", "0:2", "--size", "64x48")
 
@@ -53,10 +53,10 @@ def test_a_recording_is_sampled_with_its_files_named(run: Run, tmp_path: Path) -
     ("arguments", "message"),
     [
         (["--prior", "sora"], "invalid choice 'sora' for argument"),
-        (["--prior", "street-world", "--prompt", "rain"], "street-world takes no prompt"),
+        (["--prior", "street-world", "--prompt", "rain"], "street-world takes no --prompt"),
         (["--prior", "street-world", "--action", "command=up"], "'up' is no command; expected one of left"),
         (["--prior", "cosmos"], "prior cosmos needs --weights PATH"),
-        (["none.mp4"], "none.mp4 does not exist; expected the input"),
+        (["none.mp4"], "none.mp4 does not exist; expected a video"),
     ],
 )
 def test_what_cannot_be_sampled_is_said(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:

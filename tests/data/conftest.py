@@ -7,12 +7,8 @@ import av
 import cv2
 import numpy as np
 import pytest
-from hypothesis import settings
-from tests.data.pictures import texture
 
-# A busy machine is slow, and the same examples every time keep a run repeatable.
-settings.register_profile("repeatable", deadline=None, derandomize=True)
-settings.load_profile("repeatable")
+from tests.data.textures import texture
 
 
 @pytest.fixture

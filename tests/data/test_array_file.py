@@ -65,6 +65,11 @@ BAD = {
         "expected at most 256 MB",
     ),
     "a negative shape": (stating((-4, -6)) + NUMBERS.tobytes(), "says that its shape is (-4, -6)"),
+    "numbers of 3000 digits": (
+        stating((10**3000,) * 3),
+        f"says that its shape is ({'1' + 198 * '0'}...",
+    ),
+    "nine sides": (stating((1,) * 9) + bytes(4), "says that its shape is (1, 1, 1, 1, 1, 1, 1, 1, 1)"),
     "objects": (stating((4,), "|O") + b"cos\nsystem\n", "holds object; expected numbers of up to 64 bits"),
     "complex": (stating((4,), "<c8") + bytes(32), "holds complex64; expected numbers of up to 64 bits"),
 }

@@ -4,12 +4,14 @@ import resource
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from tests.data.pictures import texture
+from hypothesis import HealthCheck, given, settings, strategies as st
 
-from dreamdrive.data import Lens, read_clip, sampler
+from dreamdrive.data import SourceLens, clip_reader, read_clip
+from dreamdrive.data.input import read_dataset
+from dreamdrive.data.pictures import sampler
 from dreamdrive.errors import InputError
+from dreamdrive.scene.control import Control
+from tests.data.textures import texture
 
 CALIBRATION = {"width": 64, "height": 48, "intrinsics": {"fx": 60.0, "fy": 60.0, "cx": 31.5, "cy": 23.5}}
 
@@ -41,7 +43,7 @@ def test_a_folder_without_a_rate_counts_as_10_hz_and_says_so(make_folder):
     assert any("10 Hz" in note for note in clip.provenance["notes"])
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=10, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=10)
 @given(st.integers(0, 5), st.integers(1, 4), st.floats(1, 60))
 def test_times_follow_the_rate_of_the_input(make_video, start, step, fps):
     clip = read_clip(make_video(12), frames=f"{start}::{step}", fps=fps)
@@ -110,7 +112,7 @@ def test_a_calibrated_clip_is_undistorted_once(make_folder, tmp_path):
     assert (clip.rig[0].fx_px, clip.rig[0].cx_px, clip.rig[0].cy_px) == (60, 32, 24)
     assert not clip.valid[0, 0, 0]
     assert clip.valid[0, 24, 32]
-    lens = Lens.from_json(clip.recorded.lens)
+    lens = SourceLens.from_json(clip.recorded.lens)
     assert lens.camera.matrix.tolist() == clip.rig[0].matrix.tolist()
     again = lens.apply(clip.frames[0] / 255.0)
     error = np.abs(again - texture(48, 64) / 255.0)[4:-4, 4:-4]
@@ -211,6 +213,36 @@ def test_more_frames_than_memory_holds_are_refused(make_folder, monkeypatch):
     assert len(read_clip(folder, frames="0:4")) == 4
 
 
+@pytest.mark.parametrize("count", [5, 8, 9, 16])
+def test_of_too_many_frames_every_nth_is_taken(make_folder, make_video, monkeypatch, count):
+    """A video, which does not tell how many frames it has, as a folder, which does."""
+    monkeypatch.setattr(clip_reader, "MAX_FRAMES", 4)
+    for made in (make_folder(count), make_video(count)):
+        clip = read_clip(made, fps=10.0)
+        step = 2 if count <= 8 else 4
+        assert clip.source_index.tolist() == list(range(0, count, step))
+        np.testing.assert_allclose(clip.times_s, np.arange(0, count, step) / 10)
+        which = {2: "second", 4: "4th"}[step]
+        assert f"every {which} one is taken" in " ".join(clip.provenance["notes"])
+        np.testing.assert_array_equal(
+            clip.frames, read_clip(made, frames=f"0:{count}:{step}", fps=10.0).frames
+        )
+        assert len(read_clip(made, frames=f"0:{count}")) == count
+
+
+def test_a_recording_is_read_by_what_a_control_holds(make_folder):
+    control = Control(path=make_folder(3), fps=5.0)
+    assert len(read_dataset(control)) == 3
+
+
+def test_frames_too_far_apart_are_not_taken(make_folder, make_video, monkeypatch):
+    monkeypatch.setattr(clip_reader, "MAX_FRAMES", 4)
+    monkeypatch.setattr(sampler, "MAX_FRAMES", 4)
+    for made in (make_folder(17), make_video(17)):
+        with pytest.raises(InputError, match="more than 4 frames of 64x48 are selected, too many"):
+            read_clip(made, fps=10.0)
+
+
 def test_enlarging_is_said(make_folder):
     clip = read_clip(make_folder(2), size=(128, 96))
     assert clip.size == (128, 96)
@@ -229,7 +261,7 @@ def test_golden_a_distorted_video_survives_there_and_back(data_dir):
     options = {"frames": "0:4:2", "size": (480, 270)}
     plain = read_clip(clips / "video.mp4", **options)
     clip = read_clip(clips / "video.mp4", **options, intrinsics=clips / "meta.json")
-    lens = Lens.from_json(clip.recorded.lens)
+    lens = SourceLens.from_json(clip.recorded.lens)
     again = lens.apply(clip.frames[0] / 255.0)
     seen = lens.covered()
     error = (again - plain.frames[0] / 255.0)[seen]

@@ -1,10 +1,10 @@
 """Which images of a folder are its frames."""
 
+import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dreamdrive.data.companions import frames_among
 from dreamdrive.errors import InputError
@@ -58,11 +58,37 @@ def test_two_cameras_in_one_folder_are_refused() -> None:
         ("1.png", "2.png", "3.png"),
         ("a.png", "b.png"),
         ("2026-11-27_10-00-01.png", "2026-11-27_10-00-02.png"),
-        ("frame 1.png", "frame 1 (1).png"),
     ],
 )
 def test_one_series_is_taken_as_it_is(names: tuple[str, ...]) -> None:
     assert kept(*names) == list(names)
+
+
+COPIES = ["1 (1).png", "1 - Copy.png", "1 - Copy (2).png", "1_copy.png", "1 copy 2.png", "Copy of 1.png"]
+
+
+@pytest.mark.parametrize("copy", COPIES)
+def test_a_copy_of_a_frame_is_left_out_and_another_picture_of_such_a_name_is_not(
+    copy: str, tmp_path: Path
+) -> None:
+    files = [tmp_path / name for name in ("0.png", "1.png", copy)]
+    for file, content in zip(files, (b"zero", b"one", b"one"), strict=True):
+        file.write_bytes(content)
+    listed = frames_among(files)
+    assert [file.name for file in listed.files] == ["0.png", "1.png"]
+    assert listed.notes == (
+        f"1 images beside the frames are copies of others in the folder and left out, such as {copy}.",
+    )
+    files[2].write_bytes(b"two")
+    assert frames_among(files).files == tuple(files)
+
+
+def test_a_copy_of_all_frames_is_no_second_camera(tmp_path: Path) -> None:
+    for number in range(3):
+        for name in (f"{number}.png", f"Copy of {number}.png"):
+            (tmp_path / name).write_bytes(bytes([number]))
+    listed = frames_among(sorted(tmp_path.iterdir()))
+    assert [file.name for file in listed.files] == ["0.png", "1.png", "2.png"]
 
 
 @given(st.lists(st.text("ab01_-.masked", min_size=1, max_size=8), unique=True))
@@ -75,3 +101,13 @@ def test_a_folder_of_images_is_never_left_without_frames(stems: list[str]) -> No
     assert bool(listed.files) == bool(files)
     assert set(listed.files) <= set(files)
     assert list(listed.files) == [file for file in files if file in set(listed.files)]
+
+
+def test_many_names_take_little_time() -> None:
+    """Names that differ in their case alone, and a mask of each frame."""
+    names = [f"{'aB'[k % 2]}{k % 1000:04d}.{'pP'[k // 1000 % 2]}ng" for k in range(20_000)]
+    masks = [f"{k:05d}{end}" for k in range(10_000) for end in (".png", "_mask.png")]
+    begin_s = time.process_time()
+    assert len(kept(*names)) <= 2000
+    assert len(kept(*masks)) == 10_000
+    assert time.process_time() - begin_s < 3

@@ -7,16 +7,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from safetensors.numpy import save_file
-from tests.data.pictures import texture
 
 from dreamdrive.data import feature_file, read_clip
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
 from dreamdrive.errors import InputError
 from dreamdrive.prior.replay import REPLAY
 from dreamdrive.scene.control import Control
+from tests.data.textures import texture
 
 ABOUT = {"model": "a stand-in", "steps": 3}
 
@@ -40,14 +39,13 @@ def written(path: Path, **arrays: np.ndarray) -> Path:
 
 @settings(
     max_examples=30,
-    deadline=None,
-    derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(
     st.dictionaries(st.text(min_size=1, max_size=8).filter(lambda n: n != "__metadata__"), st.tuples(
         *[st.integers(1, 5)] * 3, st.sampled_from(["<f2", "<f4"])), min_size=1, max_size=3),
-    st.dictionaries(st.text(max_size=5), st.none() | st.integers() | st.text(max_size=5), max_size=3),
+    st.dictionaries(st.text(max_size=5), st.none() | st.integers(-(2**63), 2**63 - 1)
+        | st.text(max_size=5), max_size=3),
 )  # fmt: skip
 def test_what_is_written_is_read(tmp_path, shapes, provenance):
     arrays = {
@@ -65,8 +63,6 @@ def test_what_is_written_is_read(tmp_path, shapes, provenance):
 
 @settings(
     max_examples=60,
-    deadline=None,
-    derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.binary(max_size=60), st.integers(0, 400), st.booleans())

@@ -11,9 +11,9 @@ import pytest
 
 from dreamdrive.data.layout_file import problems, read_layout, schema_text, write_layout
 from dreamdrive.errors import InputError
-from dreamdrive.scene.layout import Area, Box, Ego, Layout, TrackPoint
-from dreamdrive.world import draw_street
-from dreamdrive.world.layout_picture import draw_layout
+from dreamdrive.scene.street.layout import Area, Box, Ego, Layout, TrackPoint
+from dreamdrive.show import draw_layout
+from streetworld import draw_street
 
 ROOT = Path(__file__).resolve().parents[2]
 

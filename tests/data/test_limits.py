@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dreamdrive.data.intrinsics import read_intrinsics
+from dreamdrive.data.cameras.intrinsics import read_intrinsics
+from dreamdrive.data.cameras.poses import read_trajectory
 from dreamdrive.data.layout_file import read_layout
-from dreamdrive.data.poses import read_trajectory
 from dreamdrive.data.rig import read_rig
 from dreamdrive.errors import InputError
 

@@ -5,11 +5,11 @@ import json
 import cv2
 import numpy as np
 import pytest
-from tests.data.pictures import texture
 
 from dreamdrive.data.photo import leading_frames, read_photo
-from dreamdrive.data.video_writer import write_video
+from dreamdrive.data.pictures.video_writer import write_video
 from dreamdrive.errors import InputError
+from tests.data.textures import texture
 
 
 def test_a_photo_is_cut_to_the_size_and_its_camera_with_it(tmp_path):

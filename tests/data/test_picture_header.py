@@ -5,9 +5,9 @@ import struct
 import cv2
 import numpy as np
 import pytest
-from tests.data.headers import bmp, exif, jpeg, png, tiff, webp
 
-from dreamdrive.data.picture_file import Header, parse_header
+from dreamdrive.data.pictures.picture_file import Header, parse_header
+from tests.data.headers import bmp, exif, jpeg, png, tiff, webp
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.data.pictures import texture
-from tests.prior.paths import circle
-from tests.rigs import rig_clip
 
 from dreamdrive.data.recording import write_recording
 from dreamdrive.errors import InputError
@@ -17,6 +14,9 @@ from dreamdrive.prior.replay import REPLAY
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.control import Control
+from tests.data.textures import texture
+from tests.prior.paths import circle
+from tests.rigs import rig_clip
 
 
 @pytest.fixture(scope="module")
@@ -116,5 +116,5 @@ def test_several_cameras_are_taken_up_as_a_rig(tmp_path: Path) -> None:
     assert again.known.world_from_camera is not None
     assert clip.known.world_from_camera is not None
     np.testing.assert_allclose(again.known.world_from_camera, clip.known.world_from_camera, atol=1e-6)
-    with pytest.raises(InputError, match=r"several cameras with rig.json.* takes no features"):
+    with pytest.raises(InputError, match=r"several cameras with rig.json.* takes no --features"):
         REPLAY(Control(made, features=tmp_path))

@@ -7,14 +7,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.data.pictures import approach
-from tests.rigs import drives, rig_clip, true_poses
+from hypothesis import given, strategies as st
 
 from dreamdrive.data.rig import RIG, is_rig, read_rig, read_rig_clip
 from dreamdrive.errors import InputError
-from dreamdrive.world.files import write_world
+from streetworld.files import write_world
+from tests.data.textures import approach
+from tests.rigs import drives, rig_clip, true_poses
 
 
 @pytest.fixture(scope="module")

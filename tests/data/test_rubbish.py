@@ -5,22 +5,19 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
-from dreamdrive.data.images import read_image
-from dreamdrive.data.intrinsics import read_intrinsics
-from dreamdrive.data.poses import read_pose_file
-from dreamdrive.data.video import Video
+from dreamdrive.data.cameras.intrinsics import read_intrinsics
+from dreamdrive.data.cameras.poses import read_pose_file
+from dreamdrive.data.pictures.images import read_image
+from dreamdrive.data.pictures.video import Video
 from dreamdrive.errors import InputError
 
 numbers = st.none() | st.booleans() | st.integers(-9, 9) | st.floats() | st.text(max_size=3)
 values = st.recursive(
     numbers, lambda v: st.lists(v, max_size=4) | st.dictionaries(st.text(max_size=3), v, max_size=3)
 )
-careless = settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None
-)
+careless = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80)
 
 
 @careless

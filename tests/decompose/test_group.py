@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from tests.rigs import rig_clip
-from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
+from dreamdrive.decompose import ActorOptions, GroupOptions, find_actors, group
 from dreamdrive.decompose.group import _successive
 from dreamdrive.fit import SeedOptions, initialise
+from tests.rigs import rig_clip
+from tests.streets import small_street, street_clip, true_geometry
 
 REACH_PX = SeedOptions().reach_px
 
@@ -42,7 +42,7 @@ def test_one_car_is_one_actor_whose_track_is_the_cars():
     street, clip, geometry, seeds = scene()
     scores = seeds.features[:, 0].clone()
     grouping = group(clip, geometry, seeds, scores, GroupOptions(), REACH_PX)
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
+    whole = find_actors(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     assert len(whole.actors) == 1
     box = next(b for b in street.boxes if b.moving)
     moved = box.world_from_box[-1, :3, 3] - box.world_from_box[0, :3, 3]
@@ -54,7 +54,7 @@ def test_copies_of_one_car_lie_on_top_of_each_other():
     """Every frame seeds its own copy; merged, they are as compact as one car, not a trail."""
     _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions(), REACH_PX)
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
+    whole = find_actors(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     centres = [
         whole.gaussians.means[whole.gaussians.source_frame == frame].median(dim=0).values
         for frame in range(len(clip))
@@ -70,7 +70,7 @@ def test_what_has_no_track_lives_as_long_as_is_asked():
     _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, seeds.features[:, 0].clone(), GroupOptions(), REACH_PX)
     options = ActorOptions(least_frames=100, untracked_frames=2.0)
-    whole = cast(clip, geometry, seeds, grouping, options, REACH_PX)
+    whole = find_actors(clip, geometry, seeds, grouping, options, REACH_PX)
     interval_s = float(np.median(np.diff(clip.times_s[~clip.held_out])))
     assert whole.tracks is None
     torch.testing.assert_close(whole.gaussians.means, seeds.select(grouping.dynamic).means)
@@ -79,10 +79,10 @@ def test_what_has_no_track_lives_as_long_as_is_asked():
     )
 
 
-def test_nothing_dynamic_gives_an_empty_cast():
+def test_nothing_dynamic_gives_no_actors():
     _, clip, geometry, seeds = scene()
     grouping = group(clip, geometry, seeds, torch.zeros(len(seeds)), GroupOptions(), REACH_PX)
-    whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
+    whole = find_actors(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
     assert len(whole.gaussians) == 0
     assert whole.actors == ()
     assert whole.tracks is None

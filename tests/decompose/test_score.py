@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.fit.test_fit import quiet
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.decompose import ScoreOptions, error_maps, score
 from dreamdrive.decompose.score import _weight_of_moving
 from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
+from tests.fit.test_fit import quiet
+from tests.streets import small_street, street_clip, true_geometry
 
 
 @pytest.fixture(scope="module")

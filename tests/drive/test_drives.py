@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
 
 from dreamdrive.data import write_trajectory
-from dreamdrive.drive.drives import check_numbers, distance_m, drives_of, share_seen
+from dreamdrive.drive.drives import distance_m, drives_of, share_seen
 from dreamdrive.errors import InputError
+from dreamdrive.scene.control import check_numbers
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
+from tests.scene.scenes import make_scene
 
 
 def ahead(frames: int, right_m: float = 0.0) -> np.ndarray:

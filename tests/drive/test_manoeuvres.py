@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.drive import manoeuvres as m
@@ -35,7 +34,7 @@ def heading_error_rad(path: Trajectory) -> float:
 
 
 @given(st.floats(-3, 3), st.floats(-1, 1), st.integers(2, 30))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_shift_is_exact_rigid_and_level(right_m: float, curve_rad: float, frames: int) -> None:
     drive = recorded(frames=frames, curve_rad=curve_rad)
     shifted = m.shift(drive, UP, right_m)

@@ -5,26 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.streets import street_clip, true_geometry
 
 from dreamdrive.evaluate.actor_boxes import WITHIN_M, BoxError, box_error
-from dreamdrive.evaluate.truth import Truth
+from dreamdrive.evaluate.truth.drawn import Truth
 from dreamdrive.fit import SeedOptions, initialise
-from dreamdrive.scene.actor import Actor, Box, Track
+from dreamdrive.scene.actor import Actor, ActorBox, Track
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
-from dreamdrive.world import Drive, WorldBox, make_street
+from dreamdrive.scene.street.truth import DriveTruth, WorldBox
+from streetworld import make_street
+from tests.streets import street_clip, true_geometry
 
 FRAMES, SIZE = 4, (320, 192)
 
 
 @pytest.fixture(scope="module")
-def street() -> Drive:
+def street() -> DriveTruth:
     return make_street(seed=3, frames=FRAMES, size=SIZE)
 
 
 @pytest.fixture(scope="module")
-def right(street: Drive) -> Scene:
+def right(street: DriveTruth) -> Scene:
     """Opaque Gaussians on all true surfaces, each to be seen in its own frame, and an actor a moving user."""
     made = initialise(
         street_clip(street),
@@ -48,14 +49,14 @@ def right(street: Drive) -> Scene:
     )
 
 
-def actor_of(street: Drive, box: WorldBox) -> Actor:
+def actor_of(street: DriveTruth, box: WorldBox) -> Actor:
     foot_m = box.world_from_box[:, :3, 3] - 0.5 * box.size_m[2] * box.world_from_box[:, :3, 2]
     track = Track(street.times_s, foot_m, np.zeros(FRAMES))
     ahead = box.world_from_box[0, :3, 0]
-    return Actor(box.instance, box.id, "vehicle", 9, track, Box(np.asarray(box.size_m), ahead))
+    return Actor(box.instance, box.id, "vehicle", 9, track, ActorBox(np.asarray(box.size_m), ahead))
 
 
-def found(scene: Scene, street: Drive) -> BoxError:
+def found(scene: Scene, street: DriveTruth) -> BoxError:
     truth = Truth.of(street)
     error = box_error(scene, street.cameras, truth, fit_similarity(scene.cameras, truth.cameras))
     assert error is not None
@@ -66,7 +67,7 @@ def changed(scene: Scene, **how: object) -> Scene:
     return replace(scene, actors=tuple(replace(actor, **how) for actor in scene.actors))  # type: ignore[arg-type]
 
 
-def test_the_truth_is_right(right: Scene, street: Drive) -> None:
+def test_the_truth_is_right(right: Scene, street: DriveTruth) -> None:
     error = found(right, street)
     assert error.pairs >= 4
     assert error.position_median_m < 1e-6  # type: ignore[operator]
@@ -76,7 +77,7 @@ def test_the_truth_is_right(right: Scene, street: Drive) -> None:
     assert (error.count_right, error.misses) == (1.0, ())
 
 
-def test_known_errors_have_their_size(right: Scene, street: Drive) -> None:
+def test_known_errors_have_their_size(right: Scene, street: DriveTruth) -> None:
     moved = [
         replace(a, track=replace(a.track, positions_m=a.track.positions_m + np.array([0.3, 9, 0.4])))
         for a in right.actors
@@ -88,12 +89,14 @@ def test_known_errors_have_their_size(right: Scene, street: Drive) -> None:
     assert error.heading_median_deg == pytest.approx(np.degrees(0.5), abs=3)
     assert error.heading_5_deg == 0
     longer = [
-        replace(a, box=Box(a.box.size_m + np.array([1, 0, 0]), a.box.ahead)) for a in right.actors if a.box
+        replace(a, box=ActorBox(a.box.size_m + np.array([1, 0, 0]), a.box.ahead))
+        for a in right.actors
+        if a.box
     ]
     assert found(replace(right, actors=tuple(longer)), street).length_median_m == pytest.approx(1)
 
 
-def test_who_is_not_shown_is_missed(right: Scene, street: Drive) -> None:
+def test_who_is_not_shown_is_missed(right: Scene, street: DriveTruth) -> None:
     gone = right.actors[0].id
     error = found(right.without(gone), street)
     assert [miss.instance for miss in error.misses] == [gone]
@@ -104,7 +107,7 @@ def test_who_is_not_shown_is_missed(right: Scene, street: Drive) -> None:
     assert (nobody.pairs, nobody.position_median_m) == (0, None)
 
 
-def test_far_ones_and_those_without_a_box_are_not_measured(right: Scene, street: Drive) -> None:
+def test_far_ones_and_those_without_a_box_are_not_measured(right: Scene, street: DriveTruth) -> None:
     assert found(changed(right, box=None), street).pairs == 0
     truth = Truth.of(street)
     far = np.eye(4)
@@ -115,6 +118,6 @@ def test_far_ones_and_those_without_a_box_are_not_measured(right: Scene, street:
     assert error.pairs == 0
 
 
-def test_a_truth_without_boxes_says_nothing(right: Scene, street: Drive) -> None:
+def test_a_truth_without_boxes_says_nothing(right: Scene, street: DriveTruth) -> None:
     truth = replace(Truth.of(street), boxes=())
     assert box_error(right, street.cameras, truth, fit_similarity(right.cameras, truth.cameras)) is None

@@ -10,12 +10,15 @@ from scipy.spatial.transform import Rotation
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.consistency import GAPS, Consistency, evaluate_consistency
 from dreamdrive.geometry.cameras import sfm
+from dreamdrive.scene.street.truth import DriveTruth
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.world import Drive, make_street
-from dreamdrive.world.corruption import Corruption, corrupt, parse_corruption
+from streetworld import make_street
+from streetworld.corruption import Corruption, corrupt, parse_corruption
 
 
-def evaluate(street: Drive, frames: np.ndarray, asked: Trajectory | None, **options: object) -> Consistency:
+def evaluate(
+    street: DriveTruth, frames: np.ndarray, asked: Trajectory | None, **options: object
+) -> Consistency:
     times_s = street.times_s[: len(frames)]
     return evaluate_consistency(frames, times_s, street.cameras[0], asked, **options)  # type: ignore[arg-type]
 
@@ -36,12 +39,12 @@ def worse(bad: Consistency, good: Consistency) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def street() -> Drive:
+def street() -> DriveTruth:
     return make_street(seed=1, frames=10, size=(160, 96))
 
 
 @pytest.fixture(scope="module")
-def clean(street: Drive) -> Consistency:
+def clean(street: DriveTruth) -> Consistency:
     return evaluate(street, street.frames, street.trajectory, moving=street.moving)
 
 
@@ -60,13 +63,13 @@ def test_the_truth_scores_well(clean: Consistency) -> None:
         assert gap.epipolar.share > least
 
 
-def test_a_corrupted_video_scores_worse_on_every_figure(street: Drive, clean: Consistency) -> None:
+def test_a_corrupted_video_scores_worse_on_every_figure(street: DriveTruth, clean: Consistency) -> None:
     frames = corrupt(street.frames, Corruption(1, 1, 1, 1, 1), street.depth_m)
     assert worse(evaluate(street, frames, street.trajectory, moving=street.moving), clean) == []
 
 
 def test_without_structure_from_motion_the_path_is_that_of_odometry(
-    street: Drive, monkeypatch: pytest.MonkeyPatch
+    street: DriveTruth, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sfm, "map_globally", lambda *_: None)
     found = evaluate(street, street.frames, street.trajectory, moving=street.moving)
@@ -84,13 +87,13 @@ def test_the_preset_scores_worse_on_every_figure() -> None:
     assert worse(bad, clean) == []
 
 
-def test_the_same_frames_give_the_same_figures(street: Drive) -> None:
+def test_the_same_frames_give_the_same_figures(street: DriveTruth) -> None:
     first, second = (evaluate(street, street.frames[:4], None) for _ in range(2))
     assert first == second
     assert first.found_by == "structure from motion"
 
 
-def test_a_wrong_path_is_measured_at_its_size(street: Drive, clean: Consistency) -> None:
+def test_a_wrong_path_is_measured_at_its_size(street: DriveTruth, clean: Consistency) -> None:
     poses, travelled = street.trajectory.world_from_camera.copy(), [0.0]
     travelled += np.cumsum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)).tolist()
     turns = Rotation.from_euler("y", 0.4 * np.array(travelled)[:, None], degrees=True).as_matrix()
@@ -106,7 +109,7 @@ def test_a_wrong_path_is_measured_at_its_size(street: Drive, clean: Consistency)
         assert one.epipolar.share < two.epipolar.share - 0.05  # type: ignore[union-attr, operator]
 
 
-def test_a_video_that_stands_misses_the_whole_path(street: Drive) -> None:
+def test_a_video_that_stands_misses_the_whole_path(street: DriveTruth) -> None:
     frames = np.repeat(street.frames[:1], 10, axis=0)
     found = evaluate(street, frames, street.trajectory)
     assert found.found_by == "standing"
@@ -115,7 +118,7 @@ def test_a_video_that_stands_misses_the_whole_path(street: Drive) -> None:
     assert all(gap.warp is not None and gap.warp.grey_levels == 0 for gap in found.gaps)
 
 
-def test_few_frames_leave_out_what_they_cannot_show(street: Drive) -> None:
+def test_few_frames_leave_out_what_they_cannot_show(street: DriveTruth) -> None:
     cut = Trajectory(street.trajectory.world_from_camera[:3], street.times_s[:3])
     found = evaluate(street, street.frames[:3], cut)
     assert [gap.warp is None for gap in found.gaps] == [False, True, True]
@@ -125,7 +128,7 @@ def test_few_frames_leave_out_what_they_cannot_show(street: Drive) -> None:
     assert json.loads(text)["gaps"][2] == {"gap": 8, "epipolar": None, "warp": None}
 
 
-def test_without_a_path_the_lines_are_those_found(street: Drive) -> None:
+def test_without_a_path_the_lines_are_those_found(street: DriveTruth) -> None:
     found = evaluate(street, street.frames[:6], None)
     assert found.path is None
     assert found.lines_from == "found"
@@ -134,7 +137,7 @@ def test_without_a_path_the_lines_are_those_found(street: Drive) -> None:
     assert any("No path was asked for" in note for note in found.notes)
 
 
-def test_blank_frames_show_no_path(street: Drive) -> None:
+def test_blank_frames_show_no_path(street: DriveTruth) -> None:
     frames = np.full_like(street.frames, 90)
     found = evaluate(street, frames, street.trajectory)
     assert found.path is None
@@ -144,7 +147,7 @@ def test_blank_frames_show_no_path(street: Drive) -> None:
     assert any("too little to follow" in note for note in found.notes)
 
 
-def test_what_cannot_be_measured_is_refused(street: Drive) -> None:
+def test_what_cannot_be_measured_is_refused(street: DriveTruth) -> None:
     with pytest.raises(InputError, match="got 1 frames; expected at least two"):
         evaluate(street, street.frames[:1], None)
     with pytest.raises(InputError, match="has 10 poses but the video has 6 frames"):

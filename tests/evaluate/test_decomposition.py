@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
-from tests.streets import street_clip, true_geometry
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.decomposition import Decomposition, evaluate_decomposition, true_labels
-from dreamdrive.evaluate.truth import Truth
+from dreamdrive.evaluate.truth.drawn import Truth
 from dreamdrive.fit import SeedOptions, initialise
 from dreamdrive.motion import (
     DeformationConfig,
@@ -23,23 +22,25 @@ from dreamdrive.motion import (
 )
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.world import Drive, make_street
+from dreamdrive.scene.street.truth import DriveTruth
+from streetworld import make_street
+from tests.streets import street_clip, true_geometry
 
 FRAMES, SIZE = 6, (160, 96)
 
 
 @pytest.fixture(scope="module")
-def street() -> Drive:
+def street() -> DriveTruth:
     return make_street(seed=3, frames=FRAMES, size=SIZE)
 
 
 @pytest.fixture(scope="module")
-def truth(street: Drive) -> Truth:
+def truth(street: DriveTruth) -> Truth:
     return Truth.of(street)
 
 
 @pytest.fixture(scope="module")
-def seeds(street: Drive) -> tuple[Gaussians, torch.Tensor]:
+def seeds(street: DriveTruth) -> tuple[Gaussians, torch.Tensor]:
     """Opaque Gaussians on the true surfaces of all frames, and which of them lie on moving ones."""
     options = SeedOptions(stride_px=1, moving_stride_px=1, footprint=0.4)
     made = initialise(street_clip(street), true_geometry(street), options).without_features()
@@ -53,20 +54,20 @@ def seeds(street: Drive) -> tuple[Gaussians, torch.Tensor]:
 
 
 def scene_of(
-    street: Drive, static: Gaussians, dynamic: Gaussians, field: DeformationField | None = None
+    street: DriveTruth, static: Gaussians, dynamic: Gaussians, field: DeformationField | None = None
 ) -> Scene:
     nothing = np.zeros(FRAMES, dtype=bool)
     return Scene(static, dynamic, field, (), None, None, street.cameras, street.times_s, nothing)
 
 
-def brief(street: Drive, gaussians: Gaussians) -> Gaussians:
+def brief(street: DriveTruth, gaussians: Gaussians) -> Gaussians:
     """The Gaussians, each to be seen in its source frame alone."""
     at_s = torch.from_numpy(street.times_s).float()[gaussians.source_frame]
     return replace(gaussians, lifespan=torch.stack([at_s, torch.full_like(at_s, 0.01)], dim=1))
 
 
 @pytest.fixture(scope="module")
-def right(street: Drive, seeds: tuple[Gaussians, torch.Tensor]) -> Scene:
+def right(street: DriveTruth, seeds: tuple[Gaussians, torch.Tensor]) -> Scene:
     made, moving = seeds
     return scene_of(street, made.select(~moving), brief(street, made.select(moving)))
 
@@ -76,7 +77,7 @@ def figures(right: Scene, truth: Truth) -> Decomposition:
     return evaluate_decomposition(right, truth)
 
 
-def everything_on_a_track(street: Drive, seeds: Gaussians, way_m: np.ndarray) -> Scene:
+def everything_on_a_track(street: DriveTruth, seeds: Gaussians, way_m: np.ndarray) -> Scene:
     """A scene without static Gaussians, all of it shifted downwards by ``way_m`` (F,) at the frames."""
     translation = np.zeros((1, FRAMES, 3))
     translation[0, :, 1] = way_m
@@ -103,7 +104,7 @@ def test_the_truth_is_right(figures: Decomposition) -> None:
 
 
 def test_labels_the_wrong_way_round_are_wrong(
-    street: Drive, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
+    street: DriveTruth, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
 ) -> None:
     made, moving = seeds
     found = evaluate_decomposition(scene_of(street, made.select(moving), made.select(~moving)), truth)
@@ -113,7 +114,7 @@ def test_labels_the_wrong_way_round_are_wrong(
 
 
 def test_a_scene_that_knows_no_motion_finds_none(
-    street: Drive, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
+    street: DriveTruth, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
 ) -> None:
     made, _ = seeds
     found = evaluate_decomposition(
@@ -128,7 +129,7 @@ def test_a_scene_that_knows_no_motion_finds_none(
 
 
 def test_a_wobble_is_measured_at_its_size(
-    street: Drive, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
+    street: DriveTruth, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
 ) -> None:
     # Every frame is 0.3 m from three of the five others, and none from two.
     wobbling = everything_on_a_track(street, seeds[0], 0.3 * (np.arange(FRAMES) % 2))
@@ -141,7 +142,7 @@ def test_a_wobble_is_measured_at_its_size(
 
 
 def test_what_has_no_life_left_moves_nothing(
-    street: Drive, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
+    street: DriveTruth, truth: Truth, seeds: tuple[Gaussians, torch.Tensor]
 ) -> None:
     wobbling = everything_on_a_track(street, seeds[0], 0.3 * (np.arange(FRAMES) % 2))
     found = evaluate_decomposition(replace(wobbling, dynamic=brief(street, wobbling.dynamic)), truth)
@@ -150,7 +151,7 @@ def test_what_has_no_life_left_moves_nothing(
 
 
 def test_road_users_that_fall_behind_are_behind(
-    street: Drive, right: Scene, truth: Truth, figures: Decomposition
+    street: DriveTruth, right: Scene, truth: Truth, figures: Decomposition
 ) -> None:
     late = right.dynamic.means.clone()
     late[:, 0] += 0.1 * right.dynamic.source_frame
@@ -197,7 +198,7 @@ def test_another_world_and_scale_change_nothing(right: Scene, truth: Truth, figu
 
 
 def test_a_gaussian_without_a_frame_is_judged_where_its_depth_fits(
-    street: Drive, right: Scene, truth: Truth
+    street: DriveTruth, right: Scene, truth: Truth
 ) -> None:
     known, judged = true_labels(right, street.cameras, truth, 1.0)
     static = replace(right.static, source_frame=torch.full_like(right.static.source_frame, -1))
@@ -212,7 +213,7 @@ def test_a_gaussian_without_a_frame_is_judged_where_its_depth_fits(
 
 
 def test_what_is_behind_a_road_user_stands_and_what_is_before_it_is_its_own(
-    street: Drive, right: Scene, truth: Truth
+    street: DriveTruth, right: Scene, truth: Truth
 ) -> None:
     centre = torch.from_numpy(street.cameras[2].world_from_camera[:3, 3]).float()
     own = right.dynamic.select(right.dynamic.source_frame == 2)
@@ -224,13 +225,13 @@ def test_what_is_behind_a_road_user_stands_and_what_is_before_it_is_its_own(
         assert (found[len(right.static) :] == moving).all()
 
 
-def _well_inside(street: Drive, gaussians: Gaussians) -> np.ndarray:
+def _well_inside(street: DriveTruth, gaussians: Gaussians) -> np.ndarray:
     column, row, depth = street.cameras[2].project(gaussians.means.double().numpy()).T
     pixel = row.astype(int), column.astype(int)
     return street.moving[2][pixel] & (np.abs(street.depth_m[2][pixel] / depth - 1) < 0.02)
 
 
-def test_scenes_of_other_frames_are_refused(right: Scene, truth: Truth, street: Drive) -> None:
+def test_scenes_of_other_frames_are_refused(right: Scene, truth: Truth, street: DriveTruth) -> None:
     with pytest.raises(InputError, match="has 6 frames but the truth has 4"):
         evaluate_decomposition(right, Truth.of(street, [0, 1, 2, 3]))
     narrow = tuple(replace(camera, width_px=120) for camera in right.cameras)

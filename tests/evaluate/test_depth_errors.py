@@ -5,8 +5,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.evaluate.geometry import SHARES, depth_errors, median_scale, trust
 
@@ -80,7 +79,7 @@ def test_equal_confidence_counts_with_its_mean_and_has_no_correlation() -> None:
     assert two.abs_rel == pytest.approx((0.05, 0.05, (0.1 + 0.25) / 3, 0.15))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(depths, st.randoms(use_true_random=False), st.sampled_from([0.25, 2.0, 8.0]))
 def test_order_and_common_unit_do_not_matter(
     pixels: list[tuple[float, float, float]], random: Random, unit: float
@@ -106,7 +105,7 @@ def test_order_and_common_unit_do_not_matter(
     assert a.rank_correlation is None or -1 - 1e-9 <= a.rank_correlation <= 1 + 1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(depths, st.floats(0.1, 10))
 def test_the_median_scale_takes_any_scale_out(
     pixels: list[tuple[float, float, float]], factor: float

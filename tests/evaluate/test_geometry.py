@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.estimate import Estimate
 from dreamdrive.evaluate.geometry import DepthGroup, GeometryFigures, evaluate_geometry
-from dreamdrive.evaluate.geometry_truth import GeometryTruth
+from dreamdrive.evaluate.truth.geometry import GeometryTruth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Scale
 
@@ -75,7 +74,7 @@ def test_the_truth_itself_has_no_errors() -> None:
     assert figures.notes == ()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.2, 5), st.tuples(*[st.floats(-3, 3)] * 3), st.tuples(*[st.floats(-50, 50)] * 3))
 def test_another_world_and_another_scale(
     scale: float, turn: tuple[float, float, float], shift: tuple[float, float, float]

@@ -8,7 +8,7 @@ from ncore.data.v4 import SequenceComponentGroupsReader, SequenceLoaderV4
 from ncore.impl.common.transformations import bbox_pose
 from ncore.sensors import CameraModel
 
-from dreamdrive.scene.log import box_corners
+from dreamdrive.scene.street.log import box_corners
 
 Sequence = SequenceLoaderProtocol
 

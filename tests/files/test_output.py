@@ -1,21 +1,34 @@
 """The one door for output: whole or absent, one writer, nothing foreign touched, nothing left behind."""
 
+import errno
 import json
 import os
 import resource
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+import torch
+from hypothesis import HealthCheck, given, settings, strategies as st
+from safetensors.torch import save_file
 
 from dreamdrive.errors import InputError
-from dreamdrive.files.output import MARK, check_free, claim_folder, new_file, new_folder, plain_name
+from dreamdrive.files.output import (
+    MARK,
+    check_free,
+    claim_folder,
+    new_file,
+    new_folder,
+    plain_name,
+    scratch_beside,
+    temporary_folder,
+)
 
 KIND = "set of things"
 
@@ -169,7 +182,7 @@ def test_hostile_names_become_plain_ones(name: str) -> None:
 SLOW = """
 import sys, time
 from pathlib import Path
-from dreamdrive.cli.machine import stop_like_an_interruption
+from dreamdrive.cli.terminal.machine import stop_like_an_interruption
 from dreamdrive.files.output import new_file, new_folder
 stop_like_an_interruption()
 what, place, seconds = sys.argv[1], Path(sys.argv[2]), float(sys.argv[3])
@@ -241,19 +254,32 @@ def test_a_second_writer_is_sent_away_and_harms_nothing(tmp_path: Path, what: st
     assert {p.name for p in tmp_path.iterdir()} == {"another"}
 
 
+@contextmanager
+def files_of_at_most(count: int) -> Iterator[None]:
+    """As on a disk that is full behind so many bytes of each file."""
+    limits, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (count, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_tensors_on_a_full_disk_are_an_error_of_the_disk(tmp_path: Path) -> None:
+    place, values = tmp_path / "a.safetensors", {"x": torch.zeros(5000)}
+    with pytest.raises(InputError, match="too large"), files_of_at_most(1000), new_file(place) as partial:
+        save_file(values, partial)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("what", ["file", "folder"])
 def test_a_full_disk_is_said_and_nothing_is_left(tmp_path: Path, what: str) -> None:
     place = tmp_path / "result"
     (write if what == "file" else fill)(place)
     before = tree(tmp_path)
-    limits, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
-    try:
-        with pytest.raises(InputError, match=r"cannot write .*; nothing was changed"):
-            (write if what == "file" else fill)(place, text="x" * 5000)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
+    with pytest.raises(InputError, match=r"cannot write .*; nothing was changed"), files_of_at_most(1000):
+        (write if what == "file" else fill)(place, text="x" * 5000)
     assert tree(tmp_path) == before
 
 
@@ -264,3 +290,52 @@ def test_a_claimed_folder_may_be_gone_on_in(tmp_path: Path) -> None:
     claim_folder(folder, "training")
     with pytest.raises(InputError, match="no other work of dreamdrive"):
         claim_folder(folder, "other work")
+
+
+def test_what_is_needed_meanwhile_lies_beside_the_result(tmp_path: Path) -> None:
+    place = tmp_path / "made" / "result"
+    with scratch_beside(place) as scratch:
+        (scratch / "picture").write_text("picture")
+        assert scratch.parent == place.parent
+        fill(place)
+        assert (scratch / "picture").exists()
+    assert [path.name for path in place.parent.iterdir()] == ["result"]
+
+
+NO_ROOM = "no room for temporary files in .*; free some space there, or name a folder on another disk"
+
+
+def test_no_room_for_temporary_files_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(InputError, match=NO_ROOM), temporary_folder():
+        raise OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(RuntimeError, match=r"^SQLite"), temporary_folder():
+        raise RuntimeError("SQLite: no such table")
+    with (
+        pytest.raises(InputError, match=NO_ROOM),
+        files_of_at_most(1000),
+        temporary_folder(),
+    ):
+        raise RuntimeError("SQLite: any of its words")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+    with pytest.raises(InputError, match=NO_ROOM), temporary_folder():
+        raise AssertionError("there is no such folder")
+
+
+def test_temporary_folders_of_killed_processes_are_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not those that are held or young, nor what links lead to."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "dreamdrive-link").symlink_to("mine")
+    for name in ("dreamdrive-left", "dreamdrive-young"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.txt").write_text("x")
+    os.utime(tmp_path / "dreamdrive-left", (0, 0))
+    with temporary_folder() as held:
+        os.utime(held, (0, 0))
+        with temporary_folder():
+            assert held.is_dir()
+    assert {p.name for p in tmp_path.iterdir()} == {"mine", "dreamdrive-link", "dreamdrive-young"}

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.fit.pretended import DEVICE, Elsewhere, pretending
-from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
 from dreamdrive.fit.trainer import Trainer
 from dreamdrive.motion import REPRESENTATIONS, Tracks
 from dreamdrive.options import QUALITIES
 from dreamdrive.splat import BACKENDS, reference
+from tests.fit.pretended import DEVICE, Elsewhere, pretending
+from tests.streets import small_street, street_clip, true_geometry
 
 STEPS = 25
 # Of the loss, relative: Adam makes a whole step of a gradient that is nothing but rounding, as at nodes of a

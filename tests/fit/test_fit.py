@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
-from dreamdrive.decompose import ActorOptions, GroupOptions, cast, group
+from dreamdrive.decompose import ActorOptions, GroupOptions, find_actors, group
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
 from dreamdrive.motion import DeformationConfig
 from dreamdrive.splat.scene_view import render_scene
+from tests.streets import small_street, street_clip, true_geometry
 
 REACH_PX = SeedOptions().reach_px
 
@@ -42,11 +42,16 @@ def fitted(stages, representation: str, steps: int = 120, seed: int = 0):
     elif representation == "deformable":
         parts = Parts(none, start.gaussians, None, ())
     else:
-        whole = cast(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
+        whole = find_actors(clip, geometry, seeds, grouping, ActorOptions(), REACH_PX)
         static = start.gaussians.select(grouping.static)
         parts = Parts(static, whole.gaussians, whole.tracks, whole.actors)
     network = DeformationConfig(width=32)
     return fit(clip, geometry, parts, start, FitOptions(steps=steps), network, DensifySettings(), seed, quiet)
+
+
+@pytest.fixture(scope="module")
+def hybrid(stages):
+    return fitted(stages, "hybrid")
 
 
 def error(scene, clip, frame: int, mask: np.ndarray | None = None) -> float:
@@ -55,21 +60,20 @@ def error(scene, clip, frame: int, mask: np.ndarray | None = None) -> float:
     return float(difference[mask].mean() if mask is not None else difference.mean())
 
 
-def test_the_hybrid_shows_the_moving_car_where_static_gaussians_cannot(stages, street):
+def test_the_hybrid_shows_the_moving_car_where_static_gaussians_cannot(stages, street, hybrid):
     clip = stages[0]
     frame = int(np.flatnonzero(clip.held_out)[0])
-    hybrid, static = fitted(stages, "hybrid"), fitted(stages, "static")
+    static = fitted(stages, "static")
     moving = street.moving[frame]
     assert error(hybrid, clip, frame, moving) < 0.7 * error(static, clip, frame, moving)
     assert error(hybrid, clip, frame) < 10 ** (-2.2)
 
 
-def test_one_car_is_seen_once_at_any_time(stages, street):
+def test_one_car_is_seen_once_at_any_time(hybrid, street):
     """Copies seeded by other frames must not show as ghosts, between frames neither."""
-    scene = fitted(stages, "hybrid")
-    for t_s in np.linspace(scene.times_s[0], scene.times_s[-1], 12):
-        nearest = int(np.argmin(np.abs(scene.times_s - t_s)))
-        mask = render_scene(scene, scene.cameras[nearest], float(t_s)).dynamic.numpy().astype(np.uint8)
+    for t_s in np.linspace(hybrid.times_s[0], hybrid.times_s[-1], 12):
+        nearest = int(np.argmin(np.abs(hybrid.times_s - t_s)))
+        mask = render_scene(hybrid, hybrid.cameras[nearest], float(t_s)).dynamic.numpy().astype(np.uint8)
         closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((5, 5)))
         sizes = cv2.connectedComponentsWithStats(closed)[2][1:, cv2.CC_STAT_AREA]
         assert (sizes > 0.1 * street.moving[nearest].sum()).sum() == 1, (t_s, sizes)
@@ -83,12 +87,12 @@ def test_all_gaussians_of_the_deformable_baseline_are_dynamic(stages):
 
 
 def test_a_fit_depends_on_its_seed_alone(stages):
-    one, two = fitted(stages, "hybrid", steps=25), fitted(stages, "hybrid", steps=25)
+    one, two = fitted(stages, "hybrid", steps=12), fitted(stages, "hybrid", steps=12)
     for name, value in one.static.tensors().items():
         assert torch.equal(value, two.static.tensors()[name]), name
     for name, value in one.deformation.state_dict().items():
         assert torch.equal(value, two.deformation.state_dict()[name]), name
-    other = fitted(stages, "hybrid", steps=25, seed=1)
+    other = fitted(stages, "hybrid", steps=12, seed=1)
     assert not torch.equal(one.static.means, other.static.means)
 
 

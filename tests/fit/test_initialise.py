@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit import SeedOptions, initialise
+from tests.streets import small_street, street_clip, true_geometry
 
 
 @pytest.fixture(scope="module")

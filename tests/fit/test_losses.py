@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from tests.splat.scenes import relative
 
 from dreamdrive.fit.losses import geometry_loss, render_loss
 from dreamdrive.splat import set_threads, ssim, threads
-from splat import plain_step as plain
+from dreamdrive_bench.splat import plain_step as plain
+from tests.splat.scenes import relative
 
 
 def images(height: int = 75, width: int = 32) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

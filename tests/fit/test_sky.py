@@ -1,8 +1,8 @@
 import numpy as np
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit.sky import estimate_sky
+from tests.streets import small_street, street_clip, true_geometry
 
 
 def test_sky_pixels_are_found_again():

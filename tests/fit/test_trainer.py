@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.densify import Densifier, DensifySettings, GradientDensifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.initialise import SeedOptions, initialise
@@ -16,8 +16,9 @@ from dreamdrive.fit.static import footprints
 from dreamdrive.fit.trainer import FitOptions, Model, Trainer, optimise
 from dreamdrive.fit.views import View, training_views
 from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Tracks
-from dreamdrive.splat import one_torch_thread, set_threads, threads
-from splat.plain_step import PlainTrainer
+from dreamdrive.splat import set_threads, threads
+from dreamdrive_bench.splat.plain_step import PlainTrainer
+from tests.streets import small_street, street_clip, true_geometry
 
 OPTIONS = FitOptions(steps=20, sh_after=0.0, warm_up=0.0)
 

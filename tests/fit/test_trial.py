@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.decompose.test_drifting import DEPTH_M, wall
 
 from dreamdrive.fit import SeedOptions, TrialOptions, better_depth, trial
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from tests.decompose.test_per_frame import DEPTH_M, wall
 
 OPTIONS = TrialOptions(visits=8.0)
 
@@ -111,10 +111,10 @@ def test_where_no_street_stands_stereo_is_not_taken() -> None:
 
 def test_where_road_users_are_known_only_they_are_left_out() -> None:
     clip, geometry = standing_wall()
-    moving, users = np.zeros_like(geometry.moving), np.zeros(geometry.moving.shape, np.uint16)
+    moving, road_users = np.zeros_like(geometry.moving), np.zeros(geometry.moving.shape, np.uint16)
     moving[:, :, 60:] = 1
-    users[:, :, 80:] = 1
-    found = trial(clip, replace(geometry, moving=moving, users=users), SeedOptions(), OPTIONS, 0)
+    road_users[:, :, 80:] = 1
+    found = trial(clip, replace(geometry, moving=moving, road_users=road_users), SeedOptions(), OPTIONS, 0)
     assert found is not None
     assert found.judged[:, :, :79].all()
     assert not found.judged[:, :, 81:].any()

@@ -5,9 +5,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit.views import training_views
+from tests.streets import small_street, street_clip, true_geometry
 
 
 def test_what_stands_keeps_away_from_what_moves() -> None:

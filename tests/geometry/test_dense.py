@@ -3,13 +3,13 @@
 import cv2
 import numpy as np
 import pytest
-from tests.geometry import toy
-from tests.scene.test_look import small_look
 
+from dreamdrive.compute import threads
 from dreamdrive.geometry.dense import densify
-from dreamdrive.geometry.depth import view as viewing
 from dreamdrive.geometry.moving import FLAGGED
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.geometry import toy
+from tests.scene.street.test_look import small_look
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_threads_do_not_change_the_result_and_opencv_keeps_its_setting(held, mon
     before = cv2.getNumThreads()
     both = densify(held.clip, held.posed)
     assert cv2.getNumThreads() == before
-    monkeypatch.setattr(viewing, "THREADS", 1)
+    monkeypatch.setattr(threads, "THREADS", 1)
     alone = densify(held.clip, held.posed)
     np.testing.assert_array_equal(both.depth_m, alone.depth_m)
     np.testing.assert_array_equal(both.moving, alone.moving)
@@ -70,6 +70,23 @@ def test_given_depth_and_sky_are_used():
     assert (dense.confidence[shown] == 1).all()
     assert not dense.depth_m[:, 60:70, 60:70].any()
     np.testing.assert_array_equal(dense.sky, sky)
+
+
+def test_single_points_of_lidar_are_kept_and_the_rest_is_found_as_without_them():
+    street = toy.drive([toy.Box(9, -0.9, 0.8)], count=3, held_out=(1,))
+    clip = street.clip
+    points = np.zeros(street.depth_m.shape, np.float32)
+    points[:, ::6, ::6] = street.depth_m[:, ::6, ::6] * np.float32(1.02)
+    points[2] = 0  # not every frame has a sweep
+    known = toy.replace(clip.known, depth_m=points)
+    plain = densify(clip, street.posed)
+    dense = densify(toy.replace(clip, known=known), street.posed)
+    for frame in (0, 2):
+        assert (dense.depth_m[frame] > 0).mean() >= (plain.depth_m[frame] > 0).mean() > 0.5
+    assert not dense.depth_m[1].any()
+    there = (points[0] > 0) & (dense.depth_m[0] > 0) & (dense.moving[0] < FLAGGED)
+    assert there.mean() > 0.01
+    assert (np.abs(dense.depth_m[0] / np.where(there, points[0], 1) - 1)[there] < 1e-3).mean() > 0.9
 
 
 def test_a_standing_clip_gets_plane_and_backdrop_little_trusted():
@@ -113,9 +130,9 @@ def test_with_given_depth_a_road_user_moves_as_a_whole():
     )
     parts = densify(clip, street.posed)
     whole = densify(toy.replace(clip, looks=(look,)), street.posed)
-    assert parts.users is None
+    assert parts.road_users is None
     assert (parts.moving[street.box] >= FLAGGED).mean() < 0.9
-    assert whole.users is not None
+    assert whole.road_users is not None
     assert (whole.moving[street.box] >= FLAGGED).all()
     assert not (whole.moving[~street.box] >= FLAGGED).any()
     shown = parts.depth_m > 0

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.toy import HEIGHT_M, Toy, drive
-from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions
@@ -15,6 +13,8 @@ from dreamdrive.geometry.finish import check_frames, finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground
+from tests.geometry.toy import HEIGHT_M, Toy, drive
+from tests.geometry.toy_drive import make_clip, straight
 
 UNIT = 0.07  # metres in a unit of the network
 

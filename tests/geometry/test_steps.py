@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from tests.geometry.toy_drive import make_clip, straight
 
 from dreamdrive.geometry import reconstruct
 from dreamdrive.geometry.cameras.mapping import STEPS
 from dreamdrive.geometry.dense import LOOK_PASSES, PASSES
-from dreamdrive.knowledge import look
 from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip
+from dreamdrive.street_network import look
+from tests.geometry.toy_drive import make_clip, straight
 
 
 def steps_of(clip: Clip) -> tuple[list[int], int]:

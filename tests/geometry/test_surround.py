@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.rigs import MOUNTED, drives, rig_clip, true_poses
-from tests.streets import true_geometry
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.surround import reconstruct_cameras
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from tests.rigs import MOUNTED, drives, rig_clip, true_poses
+from tests.streets import true_geometry
 
 
 class Method:

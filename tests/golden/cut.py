@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from safetensors.numpy import load_file, save_file
+
 from tests.golden.reading import CUT
 
 Arrays = dict[str, np.ndarray]

@@ -1,6 +1,6 @@
 """Numbers of other shapes in the format of the golden ones.
 
-``PYTHONPATH=benchmarks python -m tests.golden.make TO --seed 1`` writes them.
+``python -m tests.golden.make TO --seed 1`` writes them.
 
 They are made by the code that is tested, so they prove nothing of it. They prove that the tests take all
 sizes from the files: each seed has other heads, widths, depths, clips, frames, steps, cameras and pictures.
@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 import torch
-from tests.evaluate.networks.seeded import seeded_state
-from tests.evaluate.networks.test_lpips import files
-from tests.evaluate.test_pixels import VARIANTS
-from tests.golden import make_dust3r, make_magicdrive, make_vista, reading
-from tests.golden.cut import write
 from torch import Tensor
 
-from dreamdrive.evaluate.frechet import frechet_distance, polynomial_mmd
+from dreamdrive.evaluate.clips.frechet import frechet_distance, polynomial_mmd
 from dreamdrive.evaluate.networks.i3d import i3d_features, load_i3d, prepare
 from dreamdrive.evaluate.networks.inception import inception_features, load_inception
 from dreamdrive.evaluate.networks.lpips import load_lpips
 from dreamdrive.evaluate.networks.resize import resize
-from dreamdrive.evaluate.pixels import psnr, ssim
+from dreamdrive.vision.pixels import psnr, ssim
+from tests.evaluate.networks.seeded import seeded_state
+from tests.evaluate.networks.test_lpips import files
+from tests.golden import make_dust3r, make_magicdrive, make_vista, reading
+from tests.golden.cut import write
+from tests.vision.test_pixels import VARIANTS
 
 _KEYS = Path(__file__).parent / "eval/perceptual.json"
 """Names and shapes of the weights of the published networks, which have no others."""

@@ -5,13 +5,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from tests.geometry.backends.dust3r.align.pairs import street, window
-from tests.geometry.backends.dust3r.align.test_focal import _plane
-from tests.geometry.backends.dust3r.align.test_spanning_tree import _matrices
-from tests.geometry.backends.dust3r.network.networks import config_of, golden_network, seeded_state
-from tests.geometry.backends.dust3r.network.test_network import CASES, as_trained, decoded
-from tests.geometry.backends.dust3r.test_reference import PARTS
-from tests.golden.cut import write
 from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.align.focal import weiszfeld_px
@@ -20,11 +13,18 @@ from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tre
 from dreamdrive.geometry.backends.dust3r.network.blocks import Rotation, grid_positions, rotate, rotation
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
-from dreamdrive.geometry.backends.dust3r.network.images import any_fitting
+from dreamdrive.geometry.backends.dust3r.network.images import any_resize_crop
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
-from dreamdrive.geometry.backends.dust3r.reference import Objective, Raw, descend, raw_parameters
-from dreamdrive.geometry.fitting import prepare
-from geometry.simulated_pairs import Noise, Truth, pair_maps
+from dreamdrive.geometry.resize import prepare
+from dreamdrive_bench.geometry.authors_alignment import Objective, Raw, descend, raw_parameters
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps
+from tests.benchmarks.geometry.test_authors_alignment import PARTS
+from tests.geometry.backends.dust3r.align.pairs import street, window
+from tests.geometry.backends.dust3r.align.test_focal import _plane
+from tests.geometry.backends.dust3r.align.test_spanning_tree import _matrices
+from tests.geometry.backends.dust3r.network.networks import config_of, golden_network, seeded_state
+from tests.geometry.backends.dust3r.network.test_network import CASES, as_trained, decoded
+from tests.golden.cut import write
 
 Arrays = dict[str, np.ndarray]
 _MODES = {"depth_mode": ["exp", "-inf", "inf"], "conf_mode": ["exp", "1", "inf"]}
@@ -123,13 +123,13 @@ def _pictures(to: Path, rng: np.random.Generator) -> None:
         height, width = rng.integers(60, 140, 2).tolist()
         height, width = (height, height) if name == "square" else (height, width)
         frame = rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
-        made = prepare(frame, any_fitting(width, height, size))
+        made = prepare(frame, any_resize_crop(width, height, size))
         pictures |= {f"{name}.input": frame, f"{name}.output_u8": made.transpose(2, 0, 1)}
     write(to / "dust3r/preprocess.safetensors", pictures)
     sizes = {}
     for width, height in rng.integers(200, 900, (6, 2)).tolist():
         for square_ok in (False, True):
-            how = any_fitting(width, height, 376, square_ok=square_ok)
+            how = any_resize_crop(width, height, 376, square_ok=square_ok)
             sizes[f"{width}x{height}|376|{'square_ok' if square_ok else 'default'}"] = list(how.size)
     write(to / "dust3r/preprocess_sizes.json", sizes)
     pairs = {}

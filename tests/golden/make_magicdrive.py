@@ -6,9 +6,6 @@ from typing import Any
 import numpy as np
 import torch
 from diffusers.models.attention import BasicTransformerBlock
-from tests.golden.cut import write
-from tests.prior.magicdrive.test_networks import one_pass, tokens
-from tests.prior.magicdrive.tiny import official_configs, tiny_configs
 from torch import Tensor
 
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock
@@ -16,7 +13,10 @@ from dreamdrive.prior.magicdrive.condition import Conditions, box_corners
 from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_settings
 from dreamdrive.prior.magicdrive.networks import BevControlNet, MapEncoder, fourier, multiview_unet
 from dreamdrive.prior.magicdrive.sample import sample, unipc
-from dreamdrive.world.mesh import upright
+from dreamdrive.scene.level import upright
+from tests.golden.cut import write
+from tests.prior.magicdrive.test_networks import one_pass, tokens
+from tests.prior.magicdrive.tiny import official_configs, tiny_configs
 
 SCHEDULER = {"num_train_timesteps": 1000, "beta_start": 0.00085, "beta_end": 0.012}
 Networks = tuple[Any, BevControlNet]

@@ -6,15 +6,6 @@ from pathlib import Path
 import numpy as np
 import torch
 from diffusers.models.embeddings import Timesteps
-from tests.golden import reading
-from tests.golden.cut import write
-from tests.prior.vista import tiny
-from tests.prior.vista.networks import build, golden_unet
-from tests.prior.vista.test_condition import KINDS
-from tests.prior.vista.test_keys import MAPS, as_table
-from tests.prior.vista.test_rollout import STEPS, stand_in
-from tests.prior.vista.test_sampler import TINY_STEPS, mask_of, tiny_velocity
-from tests.prior.vista.test_unet import look, place_of
 from torch import Tensor
 
 from dreamdrive.prior.early_features import watch
@@ -23,6 +14,15 @@ from dreamdrive.prior.vista.keys import PARTS, UNET, recipes_of
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out
 from dreamdrive.prior.vista.sampler import Branches, denoise, guidance, sample, sigmas
+from tests.golden import reading
+from tests.golden.cut import write
+from tests.prior.vista import tiny
+from tests.prior.vista.networks import build, golden_unet
+from tests.prior.vista.test_condition import KINDS
+from tests.prior.vista.test_keys import MAPS, as_table
+from tests.prior.vista.test_rollout import STEPS, stand_in
+from tests.prior.vista.test_sampler import TINY_STEPS, mask_of, tiny_velocity
+from tests.prior.vista.test_unet import place_of, predict
 
 Tensors = dict[str, Tensor]
 PER_LEVEL = 2
@@ -94,15 +94,15 @@ def _unet_forward(rng: np.random.Generator) -> Tensors:
     unet, plain, made = golden_unet(), golden_unet(actions=False), dict[str, Tensor]()
     for tokens, masked in itertools.product(("1tok", "4tok"), (True, False)):
         context, name = given[f"in.context_{tokens}"], f"{tokens}_{'mask' if masked else 'nomask'}"
-        made[f"out_{name}"] = look(unet, given, context, mask=masked)
+        made[f"out_{name}"] = predict(unet, given, context, mask=masked)
         image = context[..., : tiny.IMAGE]
-        made[f"out_{name}_noaction"] = look(plain, given, image, mask=masked)
+        made[f"out_{name}_noaction"] = predict(plain, given, image, mask=masked)
         made[f"out_{name}_zeroaction"] = made[f"out_{name}_noaction"]
     blocks = [f"input_blocks.{i}" for i in (0, 1, 3, 4, 8)] + [f"output_blocks.{i}" for i in (0, 2, 4, 8)]
     for name in (*blocks, "middle_block"):
         kept: list[Tensor] = []
         handle = watch(unet, place_of(name, PER_LEVEL), kept.append)
-        look(unet, given, given["in.context_1tok"], mask=True)
+        predict(unet, given, given["in.context_1tok"], mask=True)
         handle.remove()
         made[f"feat.{name}"] = torch.cat(kept)
     return {**given, **{f"out.{key}": value.clone() for key, value in made.items()}}

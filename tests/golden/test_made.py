@@ -7,9 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests.conftest import ROOT
 
-READERS = ("tests/evaluate", "tests/geometry/backends/dust3r", "tests/prior")
+READERS = (
+    "tests/benchmarks/geometry",
+    "tests/evaluate",
+    "tests/geometry/backends/dust3r",
+    "tests/prior",
+)
 
 
 @pytest.mark.slow
@@ -17,7 +23,7 @@ READERS = ("tests/evaluate", "tests/geometry/backends/dust3r", "tests/prior")
 def test_the_tests_pass_on_numbers_of_other_shapes(tmp_path: Path, seed: int) -> None:
     def run(module: str, *options: str) -> str:
         command = [sys.executable, "-m", module, *options]
-        environment = os.environ | {"DREAMDRIVE_GOLDEN": str(tmp_path / "set"), "PYTHONPATH": "benchmarks"}
+        environment = os.environ | {"DREAMDRIVE_GOLDEN": str(tmp_path / "set")}
         done = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
         return done.stdout

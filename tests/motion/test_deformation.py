@@ -6,8 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.motion import (
     DeformationConfig,
@@ -105,7 +104,7 @@ def test_tracks_go_on_at_the_last_velocity_outside() -> None:
 
 
 @given(st.floats(-1, 4))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_constant_velocity_is_kept_between_and_beyond_uneven_key_frames(t_s: float) -> None:
     times_s = np.array([0.0, 0.3, 1.0, 2.0])
     even = Tracks(
@@ -125,7 +124,7 @@ def test_one_key_frame_is_a_standing_offset() -> None:
 @given(
     st.floats(-12, 12), st.floats(0, 5), st.floats(0.05, 10), st.sampled_from([torch.float32, torch.float64])
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_fading_multiplies_the_opacity(
     logit: float, away_s: float, deviation_s: float, dtype: torch.dtype
 ) -> None:
@@ -234,7 +233,7 @@ def test_wrong_shapes_are_refused() -> None:
 
 
 @given(st.lists(st.floats(-1, 1), min_size=8, max_size=8))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_quaternion_product_composes_rotations(numbers: list[float]) -> None:
     from scipy.spatial.transform import Rotation
 

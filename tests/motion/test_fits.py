@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit, fit_static, initialise
 from dreamdrive.motion import (
@@ -19,7 +18,9 @@ from dreamdrive.motion import (
     VibrationConfig,
     start_motion,
 )
+from dreamdrive.scene.scene import Scene
 from dreamdrive.splat.scene_view import render_scene
+from tests.streets import small_street, street_clip, true_geometry
 
 PLANES = HexPlaneConfig(width=32, features=8, resolution=32, levels=2)
 STEPS = 200
@@ -67,16 +68,22 @@ def static_error(stages, street) -> float:
     return error_of_movers(fitted(stages, None), stages[0], street)
 
 
-@pytest.mark.parametrize(("config", "share"), [(PLANES, 0.98), (VibrationConfig(), 0.8)])
+@pytest.fixture(scope="module", params=[(PLANES, 0.98), (VibrationConfig(), 0.8)])
+def moving(request, stages) -> tuple[Scene, float]:
+    """A scene of each motion, and the share of the static one's error that it leaves at most."""
+    config, share = request.param
+    return fitted(stages, config), share
+
+
 def test_moving_things_are_shown_better_than_by_static_gaussians(
-    stages, street, static_error: float, config: Any, share: float
+    stages, street, static_error: float, moving: tuple[Scene, float]
 ) -> None:
-    assert error_of_movers(fitted(stages, config), stages[0], street) < share * static_error
+    scene, share = moving
+    assert error_of_movers(scene, stages[0], street) < share * static_error
 
 
-@pytest.mark.parametrize("config", [PLANES, VibrationConfig()])
-def test_gaussians_of_the_moving_car_move_most(stages, config: Any) -> None:
-    clip, scene = stages[0], fitted(stages, config)
+def test_gaussians_of_the_moving_car_move_most(stages, moving: tuple[Scene, float]) -> None:
+    clip, scene = stages[0], moving[0]
     on_car = scene.dynamic.features[:, 0] > 0.5  # moving evidence of the seeds, which their children keep
     ends = [scene.deformation.apply_at(scene.dynamic, float(clip.times_s[i])).means for i in (2, 6)]
     moved_m = torch.linalg.vector_norm(ends[1] - ends[0], dim=1)

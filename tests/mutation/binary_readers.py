@@ -1,34 +1,41 @@
 """What is no text: pictures, videos, arrays, weights."""
 
+import struct
 import zlib
 from collections.abc import Callable
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
 import numpy as np
 import torch
+from PIL import Image
 from safetensors.torch import save_file
 from torch import nn
 
 from dreamdrive.data.array_file import read_npy, read_npz
 from dreamdrive.data.clip_reader import read_clip
-from dreamdrive.data.images import read_image
-from dreamdrive.data.picture_file import MAX_PIXELS
-from dreamdrive.data.select import UNBOUNDED
-from dreamdrive.data.video import RATES_HZ, Video
+from dreamdrive.data.frames.select import UNBOUNDED
+from dreamdrive.data.photo import read_photo
+from dreamdrive.data.pictures.images import read_image
+from dreamdrive.data.pictures.picture_file import MAX_PIXELS
+from dreamdrive.data.pictures.video import RATES_HZ, Video
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
 from dreamdrive.geometry.backends.feedforward.load import read_stored
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.models.weights import load_network
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.stored import open_weights
-from tests.data.pictures import texture
+from dreamdrive.tasks.perception import CrossViewTransformer, load_cvt, save_cvt
+from tests.data.textures import texture, write_video
 from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
 from tests.mutation.reader import Reader
 from tests.prior.vista.tiny import save_official
+from tests.tasks.perception.streets import ON_STREET_TRUNK as TINY
 
 _DEPTH = np.linspace(1, 50, 600, dtype=np.float32).reshape(20, 30)
 
@@ -95,6 +102,35 @@ def _video(name: str, codec: str = "libx264", **options: str) -> Reader:
     return Reader(f"video-{Path(name).stem}-{Path(name).suffix[1:]}", write, read)
 
 
+def _read_frames(path: Path) -> None:
+    sizes = {frame.rgb.shape for frame in Video.open(path).read(range(0, UNBOUNDED))}
+    assert all(rows > 0 and columns > 0 for rows, columns, _ in sizes)
+
+
+def _shown(name: str, **settings: Any) -> Reader:
+    """A video that says how its pictures are to be shown."""
+    pictures = [texture(48, 64, index) for index in range(6)]
+    return Reader(
+        f"video-{name}",
+        lambda folder: write_video(folder / "v.mp4", pictures, **settings),
+        lambda folder: _read_frames(folder / "v.mp4"),
+    )
+
+
+def _turned() -> Reader:
+    """A video whose container turns its pictures by a right angle."""
+
+    def write(folder: Path) -> None:
+        path = write_video(folder / "v.mp4", [texture(48, 64, index) for index in range(6)])
+        data, one = bytearray(path.read_bytes()), 1 << 16
+        place = data.index(b"tkhd") + 44  # the matrix of the track, 16.16 fixed point
+        data[place : place + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 48 * one, 0, 1 << 30)
+        path.write_bytes(data)
+        assert next(Video.open(path).read(range(0, 1))).size == (48, 64)
+
+    return Reader("video-turned", write, lambda folder: _read_frames(folder / "v.mp4"))
+
+
 def _depth(name: str, write: Callable[[Path], object]) -> Reader:
     def read(folder: Path) -> None:
         depth, _ = read_depth(folder / name, None)
@@ -123,7 +159,32 @@ def _weights(name: str, write: Callable[[dict[str, torch.Tensor], Path], object]
     return Reader(f"weights-{name}", lambda f: write(_Small().state_dict(), f / name), read)
 
 
+def _avif(folder: Path) -> None:
+    Image.fromarray(texture(24, 32)).save(folder / "a.avif", quality=60)
+
+
+def _read_avif(folder: Path) -> None:
+    raw = read_image(folder / "a.avif")
+    assert raw.rgb.dtype == np.uint8
+    assert raw.rgb.ndim == 3
+
+
+def _photo(folder: Path) -> None:
+    told = Image.Exif()
+    told.get_ifd(0x8769)[0xA405] = 28
+    told.get_ifd(0x8825).update({1: "N", 2: (48.0, 8.0, 30.5), 3: "E", 4: (11.0, 34.0, 0.5), 17: 90.0})
+    told[0x0112] = 6
+    Image.fromarray(texture(48, 64)).save(folder / "p.jpg", exif=told)
+
+
+def _read_photo(folder: Path) -> None:
+    photo = read_photo(folder / "p.jpg", (64, 32))
+    assert photo.rgb.shape == (32, 64, 3)
+
+
 _PICTURES = (
+    Reader("picture-a.avif", _avif, _read_avif),
+    Reader("photo", _photo, _read_photo),
     _picture("a.png", texture(24, 32)),
     _picture("alpha.png", np.dstack([texture(24, 32), texture(24, 32)[..., 0]])),
     _picture("deep.png", texture(24, 32).astype(np.uint16) * 257),
@@ -141,6 +202,9 @@ _VIDEOS = (
     _video("a.mkv"),
     _video("a.avi", "mpeg4"),
     _video("a.ts"),
+    _shown("wide", aspect=Fraction(4, 3)),
+    _shown("interlaced", flags="+ildct+ilme", **{"x264-params": "tff=1"}),
+    _turned(),
 )
 _ARRAYS = (
     _depth("a.npz", lambda path: np.savez_compressed(path, depth_m=_DEPTH)),
@@ -150,6 +214,12 @@ _ARRAYS = (
     Reader("arrays-npz", _lists, lambda f: read_npz(f / "l.npz", ("u", "v", "depth"))),
     Reader("arrays-npy", lambda f: np.save(f / "a.npy", _DEPTH), lambda f: read_npy(f / "a.npy")),
 )
+
+
+def _read_cvt(folder: Path) -> None:
+    load_cvt(folder / "c.safetensors")
+
+
 _WEIGHTS = (
     _weights("w.pth", torch.save),
     _weights("old.pth", partial(torch.save, _use_new_zipfile_serialization=False)),
@@ -159,6 +229,7 @@ _WEIGHTS = (
         lambda f: save_file(_Small().state_dict(), f / "model.safetensors"),
         lambda f: read_stored(f, "a model"),
     ),
+    Reader("weights-cvt", lambda f: save_cvt(CrossViewTransformer(TINY), f / "c.safetensors"), _read_cvt),
     Reader("weights-dust3r-pth", lambda f: save_pth(f / "m.pth", tiny()), lambda f: load_dust3r(f / "m.pth")),
     Reader("weights-dust3r-hub", lambda f: save_hub(f, tiny()), load_dust3r),
     Reader("weights-svd", lambda f: save_official(f / "svd.safetensors", SVD), open_weights),

@@ -1,6 +1,7 @@
 """Ways to spoil a file: by its bytes, its words, its JSON values, or by what stands in its place."""
 
 import copy
+import gzip
 import io
 import json
 import math
@@ -138,6 +139,8 @@ def mutate(path: Path, rng: Random) -> str:
         ways = [bytes_changed]
         if data[:2] == b"PK":
             ways = [bytes_changed, zip_changed, zip_changed]
+        elif data[:2] == b"\x1f\x8b":
+            ways = [bytes_changed, gzip_changed, gzip_changed]
         elif data[:6] == b"\x93NUMPY":
             ways = [bytes_changed, words_changed]
         elif data[8:9] == b"{":
@@ -214,7 +217,8 @@ def words_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
     kind = rng.choice(
         ("word", "word", "word", "drop word", "more words", "drop", "repeat", "swap", "reverse", "many")
     )
-    words = lines[row].split(" ")
+    between = rng.choice([each for each in " ,=" if each in lines[row]] or [" "])
+    words = lines[row].split(between)
     place = rng.randrange(len(words))
     if kind == "word":
         words[place] = rng.choice(_WORDS)
@@ -222,7 +226,7 @@ def words_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
         del words[place]
     elif kind == "more words":
         words[place:place] = words[place : place + 1] * rng.choice((1, 12, 10_000))
-    lines[row] = " ".join(words)
+    lines[row] = between.join(words)
     if kind == "drop":
         del lines[row : row + rng.choice((1, 2, 1000))]
     elif kind == "repeat":
@@ -334,6 +338,17 @@ def zip_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
         # An earlier change broke the archive, or marked a member as encrypted (a RuntimeError).
         return bytes_changed(data, rng)
     return made.getvalue(), f"member {spoilt}: {how}"
+
+
+def gzip_changed(data: bytes, rng: Random) -> tuple[bytes, str]:
+    """Change what is packed by gzip, whose checksum stays right."""
+    try:
+        inner = gzip.decompress(data)
+    except (OSError, EOFError, zlib.error):
+        return bytes_changed(data, rng)
+    change = rng.choice((bytes_changed, words_changed)) if _is_text(inner) else bytes_changed
+    inner, how = change(inner, rng)
+    return gzip.compress(inner, 1, mtime=0), f"packed: {how}"
 
 
 def _is_text(data: bytes) -> bool:

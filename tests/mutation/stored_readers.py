@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -9,16 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from dreamdrive.data.feature_file import FeatureFile, read_features, write_features
+from dreamdrive.data.truth_folder import read_world
 from dreamdrive.errors import InputError
 from dreamdrive.run import codec
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.stored import folder as scene_folder
-from dreamdrive.stored import load_scene, save_scene
-from dreamdrive.world.files import read_world, write_world
+from dreamdrive.stored import folder as scene_folder, load_scene, save_scene
+from streetworld.files import write_world
 from tests.mutation.reader import Reader
-from tests.scene.scenes import make_baseline, make_scene
+from tests.scene.scenes import make_baseline, make_scene, per_frame_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 
@@ -71,25 +73,39 @@ def _read_features(folder: Path) -> None:
     assert all(np.isfinite(array).all() and len(array) == 2 for array in chosen.arrays.values())
 
 
+def _use(scene: Scene) -> None:
+    """What is read can be drawn, or is refused where it is."""
+    for part in (scene.static, scene.dynamic):
+        assert part.problem() is None
+    with suppress(InputError):
+        scene.at(float(scene.times_s[0]))
+
+
 _RESULT = (InputError, codec.DamagedError)
 
 STORED: tuple[Reader, ...] = (
     Reader(
         "scene",
         lambda folder: save_scene(make_scene(), folder / "scene"),
-        lambda folder: load_scene(folder / "scene"),
+        lambda folder: _use(load_scene(folder / "scene")),
         mend=_mend_scene,
     ),
     Reader(
         "scene-hexplane",
         lambda folder: save_scene(make_baseline("hexplane"), folder / "scene"),
-        lambda folder: load_scene(folder / "scene"),
+        lambda folder: _use(load_scene(folder / "scene")),
         mend=_mend_scene,
     ),
     Reader(
         "scene-vibration",
         lambda folder: save_scene(make_baseline("vibration"), folder / "scene"),
-        lambda folder: load_scene(folder / "scene"),
+        lambda folder: _use(load_scene(folder / "scene")),
+        mend=_mend_scene,
+    ),
+    Reader(
+        "scene-per-frame",
+        lambda folder: save_scene(per_frame_scene(), folder / "scene"),
+        lambda folder: _use(load_scene(folder / "scene")),
         mend=_mend_scene,
     ),
     Reader(

@@ -13,28 +13,27 @@ from dreamdrive.errors import InputError
 from tests.mutation import runner
 from tests.mutation.reader import Reader
 from tests.mutation.readers import READERS
-from tests.mutation.runner import Case, run
+from tests.mutation.runner import Case, cases, run
 
 QUICK, SLOW = 8, 5000
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def check(each: int, seed: int) -> None:
-    """In a process of its own: one that has run torch's threads cannot be forked."""
-    count = str(each * len(READERS))
-    command = [sys.executable, "-m", "tests.mutation", "--cases", count, "--seed", str(seed)]
-    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert made.returncode == 0, f"{made.stdout}\n{made.stderr}"
-    assert len(made.stdout.splitlines()) == 1 + len(READERS)
-
-
-def test_few_cases_of_every_reader() -> None:
-    check(QUICK, seed=0)
+@pytest.mark.parametrize("reader", READERS)
+def test_few_cases_of_every_reader(tmp_path: Path, reader: str) -> None:
+    """Without the bounds that a process of its own has."""
+    outcomes = [runner.tried(case, tmp_path) for case in cases([reader], QUICK, seed=0)]
+    assert [str(outcome) for outcome in outcomes if outcome.verdict == "wrong"] == []
 
 
 @pytest.mark.slow
 def test_many_cases_of_every_reader() -> None:
-    check(SLOW // len(READERS) + 1, seed=1)
+    """In a process of its own: one that has run torch's threads cannot be forked."""
+    count = str((SLOW // len(READERS) + 1) * len(READERS))
+    command = [sys.executable, "-m", "tests.mutation", "--cases", count, "--seed", "1"]
+    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert made.returncode == 0, f"{made.stdout}\n{made.stderr}"
+    assert len(made.stdout.splitlines()) == 1 + len(READERS)
 
 
 def trusting(folder: Path) -> None:

@@ -8,32 +8,42 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from dreamdrive.cli.arguments import EXAMPLES, parse_action
-from dreamdrive.data.argoverse import read_argoverse
-from dreamdrive.data.intrinsics import read_intrinsics
+from dreamdrive.cli.terminal.arguments import EXAMPLES, parse_action
+from dreamdrive.data.cameras.intrinsics import read_intrinsics
+from dreamdrive.data.cameras.poses import (
+    of_frames,
+    read_pose_file,
+    read_trajectories,
+    read_trajectory,
+    write_trajectory,
+)
+from dreamdrive.data.companions import frames_among
+from dreamdrive.data.frames.name_times import times_of_names
 from dreamdrive.data.layout_file import read_layout, write_layout
-from dreamdrive.data.poses import of_frames, read_pose_file, read_trajectory, write_trajectory
+from dreamdrive.data.pictures.images import SUFFIXES
 from dreamdrive.data.rig import read_rig, write_rig
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.geometry_truth import read_geometry_truth
+from dreamdrive.evaluate.truth.geometry import read_geometry_truth
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import read_text
 from dreamdrive.geometry.backends.dust3r.network.config import config_from_call, config_from_json
 from dreamdrive.geometry.backends.files import attach, bent_model
 from dreamdrive.geometry.backends.files.formats import companions
-from dreamdrive.plan import read_results
+from dreamdrive.options import QUALITIES
 from dreamdrive.prior.magicdrive.config import read_settings
-from dreamdrive.scene.action import check_action
+from dreamdrive.run.options_file import read_options
+from dreamdrive.run.report.outcome import lines_of, read_outcome
 from dreamdrive.scene.camera import FARTHEST_M
+from dreamdrive.scene.control import check_action
 from dreamdrive.scene.trajectory import Trajectory
-from tests.data import test_argoverse as argoverse
-from tests.evaluate.test_geometry_truth import asking, pandaset, recording
+from dreamdrive.tasks.plan import read_results
+from tests.evaluate.truth.test_geometry import asking, pandaset, recording
 from tests.geometry.backends.dust3r.network.test_config import CALL, HUB
 from tests.geometry.backends.files import drives
 from tests.mutation.reader import Reader
-from tests.plan.test_results import PLANS, as_json, as_pickle, as_table
 from tests.prior.magicdrive.tiny import official_configs
 from tests.streets import small_street
+from tests.tasks.plan.recorded.test_results import PLANS, as_json, as_pickle, as_table
 
 _NAMES = [f"{i:04d}.jpg" for i in range(4)]
 _TRUTH = np.array([drives.pose((0, 0.02 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(4)])
@@ -137,7 +147,7 @@ def _rig(folder: Path) -> None:
 
 
 def _layout(folder: Path) -> None:
-    write_layout(small_street(frames=2, size=(24, 16), parked=1).layout, folder / "layout.json")
+    write_layout(small_street(frames=3, size=(24, 16), parked=1).layout, folder / "layout.json")
 
 
 def _magicdrive(folder: Path) -> None:
@@ -148,6 +158,51 @@ def _magicdrive(folder: Path) -> None:
 def _action(folder: Path) -> None:
     for line in read_text(folder / "actions.txt").split("\n"):
         check_action(parse_action(line))
+
+
+_LISTED = [f"1557539924.{k}49981.png" for k in range(3)] + [
+    "1557539924.049981_mask.png",
+    "a_1.jpg",
+    "b_1.jpg",
+]
+_REPORT = {
+    "frames": {"count": 24, "size": [320, 180]},
+    "gaussians": {"static": 7, "dynamic": 2},
+    "stages": {"fit": {"seconds": 12.5}},
+    "actors": [{}],
+    "held_out": {"3": {}},
+    "held_out_mean": {"psnr": 25.0},
+    "baselines": {"flow_interpolation": {"mean": {"psnr": 20.0}}},
+    "rough": ["there are only 3 frames"],
+    "limits": ["from the height of the camera"],
+}
+
+
+def _options(folder: Path) -> None:
+    text = 'representation = "static"\n\n[fit]\nsteps = 600\n\n[geometry]\ncamera_height_m = 1.5\n'
+    (folder / "o.toml").write_text(text)
+
+
+def _names(folder: Path) -> None:
+    (folder / "names.txt").write_text("\n".join(_LISTED))
+
+
+def _read_names(folder: Path) -> None:
+    names = [Path(line) for line in read_text(folder / "names.txt").split("\n")]
+    files = [name for name in names if name.suffix.lower() in SUFFIXES]
+    if files:
+        frames_among(files)
+    times_s = times_of_names(files)
+    assert times_s is None or (np.diff(times_s) >= 0).all()
+
+
+def _trajectories(folder: Path) -> None:
+    one = {"world_from_camera": _TRUTH.tolist(), "times_s": _TIMES_S.tolist()}
+    (folder / "t.json").write_text(json.dumps([one, one]))
+
+
+def _read_report(folder: Path) -> None:
+    lines_of(read_outcome(folder / "report.json", already_finished=True))
 
 
 TEXT: tuple[Reader, ...] = (
@@ -198,7 +253,12 @@ TEXT: tuple[Reader, ...] = (
             ("table", as_table, "table.npz"),
         )
     ),
-    Reader("argoverse", argoverse.write, read_argoverse),
+    Reader("options", _options, lambda f: read_options(f / "o.toml", QUALITIES["draft"])),
+    Reader(
+        "names", lambda f: (f / "names.txt").write_text("\n".join(_LISTED)), _read_names, names_file=False
+    ),
+    Reader("trajectories", _trajectories, lambda f: read_trajectories(f / "t.json")),
+    Reader("report", _json("report.json", _REPORT), _read_report),
     Reader(
         "dust3r-json",
         _json("config.json", HUB),

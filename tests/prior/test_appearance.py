@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.data.pictures import texture
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.prior.appearance import NAMES, appearance
+from tests.data.textures import texture
 
 
 def clip(count: int = 3, size=(64, 48)) -> tuple[np.ndarray, np.ndarray]:
@@ -12,7 +11,7 @@ def clip(count: int = 3, size=(64, 48)) -> tuple[np.ndarray, np.ndarray]:
     return frames, np.ones(frames.shape[:3], dtype=bool)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(st.integers(50, 90), st.integers(50, 90), st.integers(1, 3))
 def test_every_channel_has_mean_0_and_variance_1(width, height, count):
     features = appearance(*clip(count, (2 * width, 2 * height)))

@@ -6,16 +6,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.data.pictures import texture
-from tests.prior.paths import circle
-from tests.prior.tiny_pipelines import write_cosmos
 
 from dreamdrive.data import write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import choose_prior, cosmos
 from dreamdrive.prior.cosmos import relative_poses
-from dreamdrive.scene.action import Command
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Command, Control
+from tests.data.textures import texture
+from tests.prior.paths import circle
+from tests.prior.tiny_pipelines import write_cosmos
 
 pytest.importorskip("diffusers")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
@@ -114,7 +113,7 @@ def test_what_cannot_be_made_is_refused(photo, path, weights, tmp_path):
     prior = choose_prior("cosmos")
     with pytest.raises(InputError, match="needs --trajectory FILE: a path of at least 6 s"):
         prior(Control(photo, weights=weights))
-    with pytest.raises(InputError, match="takes no action"):
+    with pytest.raises(InputError, match="takes no --action"):
         prior(Control(photo, weights=weights, action=Command("left")))
     with pytest.raises(InputError, match="--size 480x270: Cosmos 3 makes 320x192"):
         prior(control(photo, path, weights, size=(480, 270)))

@@ -6,13 +6,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.data.pictures import texture
-from tests.prior.tiny_pipelines import write_ltx
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior import choose_prior
 from dreamdrive.prior.diffusers_i2v import find_kind
 from dreamdrive.scene.control import Control
+from tests.data.textures import texture
+from tests.prior.tiny_pipelines import write_ltx
 
 pytest.importorskip("diffusers")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
@@ -163,7 +163,7 @@ def test_what_it_cannot_do_is_refused(photo, weights, tmp_path):
         prior(Control(photo, weights=weights, size=(60, 40)))
     with pytest.raises(InputError, match=r"LTXImageToVideoPipeline refuses .* divisible by 32"):
         prior(Control(photo, weights=weights, size=(48, 16), steps=1, frames="0:9"))
-    with pytest.raises(InputError, match="takes no trajectory"):
+    with pytest.raises(InputError, match="takes no --trajectory"):
         prior(Control(photo, weights=weights, trajectory=photo))
     with pytest.raises(InputError, match="--steps 0: expected 1 or more"):
         prior(Control(photo, weights=weights, steps=0))

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
-from tests.prior.paths import circle
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.path import (
@@ -16,11 +14,12 @@ from dreamdrive.prior.path import (
     path_of,
     waypoints_by_round,
 )
-from dreamdrive.scene.action import AT_S, Goal, Steering, Waypoints, check_action
+from dreamdrive.scene.control import AT_S, Goal, Steering, Waypoints, check_action
 from dreamdrive.scene.trajectory import Trajectory
+from tests.prior.paths import circle
 
 TIMES_S = np.arange(25) / 10
-quick = settings(max_examples=40, deadline=None, derandomize=True)
+quick = settings(max_examples=40)
 
 
 def four(least: float, most: float) -> st.SearchStrategy[tuple[float, ...]]:

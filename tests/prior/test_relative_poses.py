@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.prior.paths import circle
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.cosmos import PER_METRE, relative_poses
+from tests.prior.paths import circle
 
 
 def accumulated(rows: np.ndarray) -> np.ndarray:
@@ -21,7 +20,7 @@ def accumulated(rows: np.ndarray) -> np.ndarray:
     return np.stack(poses)
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(st.floats(0, 30), st.floats(-0.1, 0.1), st.integers(1, 60))
 def test_steps_lead_back_to_the_path(speed, left_per_m, steps):
     path = circle(speed, left_per_m, seconds=6.0)

@@ -5,15 +5,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.data.pictures import texture
-from tests.prior.paths import circle
 
 from dreamdrive.data import read_clip, write_trajectory
 from dreamdrive.errors import InputError
 from dreamdrive.prior import PRIORS, choose_prior
-from dreamdrive.prior.replay import replay
-from dreamdrive.scene.action import Command
-from dreamdrive.scene.control import Control
+from dreamdrive.prior.replay import REPLAY, replay
+from dreamdrive.scene.control import Command, Control
+from tests.data.textures import texture
+from tests.prior.paths import circle
 
 
 @pytest.fixture
@@ -24,7 +23,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_replay_is_the_recording_with_features(folder):
-    clip = replay(Control(folder, frames="0:6:2", fps=4.0, size=(32, 24), hold_out=2, hfov_deg=80.0))
+    clip = REPLAY(Control(folder, frames="0:6:2", fps=4.0, size=(32, 24), hold_out=2, hfov_deg=80.0))
     read = read_clip(folder, frames="0:6:2", fps=4.0, size=(32, 24), hold_out=2, hfov_deg=80.0)
     np.testing.assert_array_equal(clip.frames, read.frames)
     np.testing.assert_array_equal(clip.times_s, read.times_s)
@@ -34,13 +33,13 @@ def test_replay_is_the_recording_with_features(folder):
 
 def test_every_control_reaches_the_reader():
     """What it says it takes must be handed on: both have the same names."""
-    of_data_sets = {"dataset", "scene", "cameras"}
-    assert choose_prior("replay").takes == of_data_sets | set(inspect.signature(read_clip).parameters)
+    of_others = {"dataset", "scene", "cameras"}
+    assert choose_prior("replay").takes == of_others | set(inspect.signature(read_clip).parameters)
 
 
 def test_replay_needs_an_input():
     with pytest.raises(InputError, match="needs an input"):
-        replay(Control())
+        REPLAY(Control())
 
 
 def test_priors_are_found_by_name():
@@ -52,7 +51,7 @@ def test_priors_are_found_by_name():
 
 def test_the_path_that_a_recording_was_asked_for_is_kept(folder, tmp_path):
     write_trajectory(circle(5.0, 0.02, seconds=0.5), tmp_path / "asked.json")
-    clip = replay(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "asked.json"))
+    clip = REPLAY(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "asked.json"))
     assert clip.requested is not None
     assert clip.known.world_from_camera is None
     np.testing.assert_allclose(clip.requested.times_s, [0, 0.2, 0.4])
@@ -61,7 +60,7 @@ def test_the_path_that_a_recording_was_asked_for_is_kept(folder, tmp_path):
     )
     write_trajectory(circle(5.0, seconds=9.0, rate_hz=1), tmp_path / "other.json")
     with pytest.raises(InputError, match=r"--trajectory .* do not meet the 3 selected frames"):
-        replay(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "other.json"))
+        REPLAY(Control(folder, frames="1:6:2", fps=10.0, trajectory=tmp_path / "other.json"))
 
 
 def test_contradictions_are_refused():

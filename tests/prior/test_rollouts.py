@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dreamdrive.choices import PRIORS
 from dreamdrive.data import read_trajectories
 from dreamdrive.errors import InputError
+from dreamdrive.prior import PRIORS
 from dreamdrive.prior.rollouts import rollouts_of, together
-from dreamdrive.scene.action import Command
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Command, Control
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -92,5 +91,5 @@ def test_only_one_way_of_asking_counts(tmp_path: Path) -> None:
     PRIORS.choose("photo").check(control)
     with pytest.raises(InputError, match="give one of them"):
         PRIORS.choose("photo").check(replace(control, trajectories=tmp_path / "paths.json"))
-    with pytest.raises(InputError, match="takes no actions"):
+    with pytest.raises(InputError, match="takes no --action"):
         PRIORS.choose("street-world").check(control)

@@ -1,78 +1,70 @@
 """Scenes of data sets as streets: what map-conditioned priors are given."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.logs import ego, log
 
-from dreamdrive.data import log_of, read_dataset
+from dreamdrive.data.input import log_of, read_dataset
 from dreamdrive.data.layout_file import write_layout
-from dreamdrive.data.lidar_file import read_points
-from dreamdrive.data.log_layout import layout_of_log
-from dreamdrive.data.nuscenes import read_nuscenes, write_nuscenes
+from dreamdrive.data.planned import Planned
+from dreamdrive.datasets.log_layout import layout_of_log
+from dreamdrive.datasets.logs import told_of_street
+from dreamdrive.datasets.nuscenes import read_nuscenes
 from dreamdrive.errors import InputError
 from dreamdrive.export import export_world
+from dreamdrive.files.digest import digest
+from dreamdrive.prior.replay import REPLAY
 from dreamdrive.prior.street import (
+    StreetSource,
     map_from_cameras,
     place_in_log,
     read_street,
-    told_of_street,
     wanted_frames,
 )
-from dreamdrive.prior.street_world import street_world
-from dreamdrive.run import digest
-from dreamdrive.run.cost import Planned, plan
-from dreamdrive.run.request import digest_of_log, request_of
+from dreamdrive.run.request import request_of
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.layout import track_function
-from dreamdrive.scene.log import LogMap
-from dreamdrive.world import MOUNTS, Drive, Mount, StreetOptions, draw_street, drive
+from dreamdrive.scene.street.layout import track_function
+from dreamdrive.scene.street.log import LogMap
+from dreamdrive.scene.street.truth import MOUNTS, DriveTruth, Mount
+from streetworld import StreetOptions, World, draw_street, drive
+from streetworld.prior import STREET_WORLD
+from tests.logs import ego
 
 
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data set, to be read only."""
-    folder = tmp_path_factory.mktemp("streets")
-    write_nuscenes([log(folder / "made")], folder / "set", read_points)
-    return folder / "set"
+def street_at(path: Path, without: str | None = None, **chosen: str) -> StreetSource:
+    return read_street(STREET_WORLD.open(Control(path, **chosen)), path, without)  # type: ignore[arg-type]
 
 
-@pytest.fixture
-def own(tmp_path: Path) -> Path:
-    """A data set that may be changed."""
-    write_nuscenes([log(tmp_path / "made")], tmp_path / "set", read_points)
-    return tmp_path / "set"
-
-
-def test_a_scene_is_a_street_with_the_cameras_that_are_asked_for(shared: Path) -> None:
-    street = read_street(Control(), shared)
-    drive = log_of(Control(shared))
+def test_a_scene_is_a_street_with_the_cameras_that_are_asked_for(one_drive: Path) -> None:
+    street = street_at(one_drive)
+    drive = log_of(Control(one_drive))
     assert drive is not None
     assert street.layout == layout_of_log(drive)
     assert street.name == "the scene scene-0001 of set"
     assert [camera.name for camera in street.cameras] == ["CAM_FRONT"]
-    both = read_street(Control(), shared, without="all")
+    both = street_at(one_drive, without="all")
     assert [camera.name for camera in both.cameras] == ["CAM_FRONT", "CAM_BACK_LEFT"]
-    back = read_street(Control(cameras="back_left"), shared, without="all")
+    back = street_at(one_drive, cameras="back_left", without="all")
     assert [camera.name for camera in back.cameras] == ["CAM_BACK_LEFT"]
 
 
 def test_a_layout_has_no_scenes_and_a_folder_without_any_is_none(tmp_path: Path) -> None:
     write_layout(draw_street(3), tmp_path / "street.json")
-    assert read_street(Control(), tmp_path / "street.json").log is None
+    assert street_at(tmp_path / "street.json").log is None
     with pytest.raises(InputError, match=r"^--scene and --cameras choose of a data set, and .*street\.json"):
-        read_street(Control(scene="0", cameras="all"), tmp_path / "street.json")
+        street_at(tmp_path / "street.json", scene="0", cameras="all")
     with pytest.raises(InputError, match="is a folder that holds no scenes with maps and boxes; expected a"):
-        read_street(Control(), tmp_path)
+        street_at(tmp_path)
     with pytest.raises(InputError, match="--cameras choose of a data set, and there is no input"):
-        street_world(Control(cameras="all"))
+        STREET_WORLD(Control(cameras="all"))
 
 
-def test_a_scene_ends_with_its_last_label(shared: Path) -> None:
-    street = read_street(Control(), shared)
+def test_a_scene_ends_with_its_last_label(one_drive: Path) -> None:
+    street = street_at(one_drive)
     assert wanted_frames(Control(), 24, 10.0, street) == range(11)
     assert wanted_frames(Control(frames="2:"), 4, 10.0, street) == range(2, 6)
     assert wanted_frames(Control(frames="-3:"), 24, 10.0, street) == range(8, 11)
@@ -84,8 +76,8 @@ def test_a_scene_ends_with_its_last_label(shared: Path) -> None:
         wanted_frames(Control(), 24, 0.0, street)
 
 
-def test_cameras_stand_where_they_are_mounted(shared: Path) -> None:
-    street = read_street(Control(), shared, without="all")
+def test_cameras_stand_where_they_are_mounted(one_drive: Path) -> None:
+    street = street_at(one_drive, without="all")
     times_s = np.array([0.0, 0.5])
     poses = map_from_cameras(street, times_s)
     assert poses.shape == (2, 2, 4, 4)
@@ -101,10 +93,10 @@ def test_cameras_stand_where_they_are_mounted(shared: Path) -> None:
     np.testing.assert_allclose(poses[:, 0, :3, :3], whole[:, :3, :3], atol=1e-6)
 
 
-def test_frames_have_the_pinholes_of_the_recording(shared: Path) -> None:
+def test_frames_have_the_pinholes_of_the_recording(one_drive: Path) -> None:
     """And its mountings and poses, up to the tilt of a car that is level here as well."""
-    asked = Control(shared, cameras="all", frames="0:3", size=(32, 24))
-    clip = street_world(asked)
+    asked = Control(one_drive, cameras="all", frames="0:3", size=(32, 24))
+    clip = STREET_WORLD(asked)
     read = read_dataset(asked)
     assert [camera.matrix.tolist() for camera in clip.rig] == [camera.matrix.tolist() for camera in read.rig]
     for made, real in zip(clip.rig, read.rig, strict=True):
@@ -120,7 +112,7 @@ def test_frames_have_the_pinholes_of_the_recording(shared: Path) -> None:
     front, real = (each.known.world_from_camera[::2] for each in (clip, later))  # the others are late
     np.testing.assert_allclose(front, real, atol=2e-3)
     assert clip.provenance["cameras"] == ["CAM_FRONT", "CAM_BACK_LEFT"]
-    one = street_world(replace(asked, cameras=None))
+    one = STREET_WORLD(replace(asked, cameras=None))
     assert (one.rig[0].world_from_camera == np.eye(4)).all()
     np.testing.assert_array_equal(one.frames, clip.frames[::2])
 
@@ -129,8 +121,9 @@ def test_frames_have_the_pinholes_of_the_recording(shared: Path) -> None:
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A level street that bends, as six cameras of a car that nods and rolls see it."""
     layout = draw_street(4, StreetOptions(seconds=1.2))
-    seen: dict[Mount, Drive] = {
-        m: drive(layout, 11, 10.0, (32, 24), mount=m, antialiased=False) for m in MOUNTS
+    world = World(layout)
+    seen: dict[Mount, DriveTruth] = {
+        m: drive(layout, 11, 10.0, (32, 24), world=world, mount=m, antialiased=False) for m in MOUNTS
     }
     folder = tmp_path_factory.mktemp("drawn") / "street"
     export_world(seen, "street", folder)
@@ -141,7 +134,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_clip_lies_where_the_cameras_of_its_log_are(drawn: Path, cameras: str | None, count: int) -> None:
     """The layout has the car's way at labels, each half a second, and a spline between: not when it swerves,
     as drawn cars do in their first half second."""
-    clip = street_world(Control(drawn, cameras=cameras, frames="6:11", size=(32, 24)))
+    clip = STREET_WORLD(Control(drawn, cameras=cameras, frames="6:11", size=(32, 24)))
     recorded = read_nuscenes(drawn, "street")
     link, poses = clip.log, clip.known.world_from_camera
     assert link is not None
@@ -157,9 +150,9 @@ def test_a_clip_lies_where_the_cameras_of_its_log_are(drawn: Path, cameras: str 
         assert abs((yaw - true + np.pi) % (2 * np.pi) - np.pi) < np.deg2rad(0.5)
 
 
-def test_a_level_road_lies_as_high_as_the_car_at_the_start(shared: Path) -> None:
+def test_a_level_road_lies_as_high_as_the_car_at_the_start(one_drive: Path) -> None:
     """The log climbs, and its car is pitched; the layout knows nothing of it."""
-    street = read_street(Control(), shared, without="all")
+    street = street_at(one_drive, without="all")
     assert street.log is not None
     slope = np.eye(4)
     slope[[0, 0, 2, 2], [0, 2, 0, 2]] = np.cos(0.1), -np.sin(0.1), np.sin(0.1), np.cos(0.1)
@@ -177,11 +170,11 @@ def test_a_level_road_lies_as_high_as_the_car_at_the_start(shared: Path) -> None
 
 def test_a_layout_is_of_no_log(tmp_path: Path) -> None:
     write_layout(draw_street(3), tmp_path / "street.json")
-    assert street_world(Control(tmp_path / "street.json", frames="0:2", size=(32, 24))).log is None
+    assert STREET_WORLD(Control(tmp_path / "street.json", frames="0:2", size=(32, 24))).log is None
 
 
-def test_what_a_scene_does_not_tell_is_said(shared: Path) -> None:
-    notes = " ".join(street_world(Control(shared, frames="0:1", size=(32, 24))).provenance["notes"])
+def test_what_a_scene_does_not_tell_is_said(one_drive: Path) -> None:
+    notes = " ".join(STREET_WORLD(Control(one_drive, frames="0:1", size=(32, 24))).provenance["notes"])
     assert (
         "simulated: frames of the scene scene-0001 of set, handed over with exact intrinsics and poses"
         in notes
@@ -190,21 +183,23 @@ def test_what_a_scene_does_not_tell_is_said(shared: Path) -> None:
     assert "of these kinds are not drawn: movable_object.trafficcone" in notes
 
 
-def test_without_a_map_all_is_grass(own: Path) -> None:
+def test_without_a_map_all_is_grass(one_drive: Path, tmp_path: Path) -> None:
+    own = shutil.copytree(one_drive, tmp_path / "set")
     for name in ("map", "log"):
         (own / "v1.0-mini" / f"{name}.json").unlink()
-    notes = street_world(Control(own, frames="0:1", size=(32, 24))).provenance["notes"]
+    notes = STREET_WORLD(Control(own, frames="0:1", size=(32, 24))).provenance["notes"]
     assert any("walkway" in note and "all ground is grass" in note for note in notes)
 
 
-def test_boxes_map_and_calibration_count_and_pictures_do_not(own: Path) -> None:
+def test_boxes_map_and_calibration_count_and_pictures_do_not(one_drive: Path, tmp_path: Path) -> None:
+    own = shutil.copytree(one_drive, tmp_path / "set")
     control = Control(own)
-    before = digest_of_log(control, "street-world"), digest_of_log(control, "replay")
+    before = (STREET_WORLD.open(control).digest, REPLAY.open(control).digest)
     assert request_of(control, prior="street-world").digests["input"] == before[0]
     drive = log_of(control)
     assert drive is not None
     drive.cameras[0].files[0].write_bytes(drive.cameras[0].files[1].read_bytes())
-    after = digest_of_log(control, "street-world"), digest_of_log(control, "replay")
+    after = (STREET_WORLD.open(control).digest, REPLAY.open(control).digest)
     assert after[0] == before[0]
     assert after[1] != before[1]
     seen = {before[0], digest(told_of_street(replace(drive, map=LogMap())))}
@@ -214,16 +209,16 @@ def test_boxes_map_and_calibration_count_and_pictures_do_not(own: Path) -> None:
         for row in rows:
             row[key] = [value + 0.1 for value in row[key]]
         file.write_text(json.dumps(rows))
-        seen.add(digest_of_log(control, "street-world"))
+        seen.add(STREET_WORLD.open(control).digest)
     assert len(seen) == 4
 
 
 def test_a_layout_has_the_digest_of_its_file(tmp_path: Path) -> None:
     write_layout(draw_street(3), tmp_path / "street.json")
-    assert digest_of_log(Control(tmp_path / "street.json"), "street-world") is None
+    assert STREET_WORLD.open(Control(tmp_path / "street.json")).digest is None
 
 
-def test_the_cost_is_that_of_the_scene(shared: Path) -> None:
-    planned = plan(Control(shared, cameras="all", frames="0:10:3"), "street-world")
+def test_the_cost_is_that_of_the_scene(one_drive: Path) -> None:
+    planned = STREET_WORLD.open(Control(one_drive, cameras="all", frames="0:10:3")).plan
     assert planned == Planned(4, 2, (64, 48), None, 0, 3, chosen=True)
-    assert plan(Control(shared), "street-world") == Planned(11, 1, (64, 48), None, 0, 1, chosen=True)
+    assert STREET_WORLD.open(Control(one_drive)).plan == Planned(11, 1, (64, 48), None, 0, 1, chosen=True)

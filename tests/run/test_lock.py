@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -86,3 +87,14 @@ def test_a_lock_that_is_something_else_is_left_alone(tmp_path: Path, kind: str) 
         pass
     assert victim.read_text() == "mine"
     assert (out / NAME).exists()
+
+
+def test_what_killed_runs_left_among_temporary_files_goes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    left = tmp_path / "dreamdrive-left"
+    (left / "deep").mkdir(parents=True)
+    os.utime(left, (0, 0))
+    with only_run(tmp_path / "out"):
+        assert not left.exists()

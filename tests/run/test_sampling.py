@@ -5,17 +5,18 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.data.pictures import texture
 
 from dreamdrive.errors import InputError
+from dreamdrive.prior import Input
 from dreamdrive.prior.replay import REPLAY
 from dreamdrive.run import sampling
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
+from tests.data.textures import texture
 
 
-def first(control: Control, progress: object) -> Clip:
-    clip = REPLAY.make(control, lambda done, total: None)
+def first(opened: Input, progress: object) -> Clip:
+    clip = REPLAY.make(opened, lambda done, total: None)
     names = ("frames", "times_s", "camera", "valid", "held_out", "source_index")
     return replace(clip, features={}, **{name: getattr(clip, name)[:1] for name in names})
 

@@ -7,16 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.streets import small_street, street_clip, true_geometry
 
 from dreamdrive import progress
 from dreamdrive.errors import InputError
+from dreamdrive.files.digest import digest, file_digest, stage_seed
 from dreamdrive.run import codec, stages
-from dreamdrive.run.stages import STAGES, Stages, digest, file_digest, stage_seed
+from dreamdrive.run.stages import STAGES, Stages
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.log import OfLog
-from dreamdrive.scene.look import RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.log import OfLog
+from dreamdrive.scene.street.look import RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.scene.scenes import make_scene
+from tests.streets import small_street, street_clip, true_geometry
+
+old = stages.program_of
 
 
 class Work:
@@ -89,6 +94,15 @@ def test_damage_is_noticed_and_repaired(tmp_path: Path, damage: str) -> None:
     again = Work(tmp_path)
     again.chain()
     assert again.calls == []
+
+
+def test_gaussians_that_cannot_be_drawn_are_no_result(tmp_path: Path) -> None:
+    fine = make_scene().static
+    codec.write(tmp_path, fine, {})
+    assert len(codec.read(tmp_path, Gaussians)) == len(fine)
+    codec.write(tmp_path, replace(fine, quaternions=torch.zeros(len(fine), 4)), {})
+    with pytest.raises(codec.DamagedError, match="quaternions of length 0"):
+        codec.read(tmp_path)
 
 
 def test_a_kill_between_the_two_files_leaves_no_mixture(tmp_path: Path) -> None:
@@ -177,12 +191,20 @@ def test_a_stage_of_other_storage_is_kept_as_well(tmp_path: Path, monkeypatch: p
     assert Work(tmp_path).stages("fit", None, lambda _: "again") == "again"
 
 
-def test_another_program_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_changed_program_computes_its_stage_and_what_follows_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     Work(tmp_path).chain()
-    monkeypatch.setattr(stages, "program_digest", lambda: "of another version")
-    work = Work(tmp_path)
+    monkeypatch.setattr(stages, "program_of", lambda name: "another" if name == "geometry" else old(name))
+    work, said = Work(tmp_path), list[str]()
+    work.stages.say = said.append
     work.chain()
-    assert work.calls == ["prior", "geometry", "initialise"]
+    assert work.calls == ["geometry", "initialise"]
+    assert said == ["The program has changed since: geometry and what rests on it are computed again."]
+    again = Work(tmp_path)
+    again.stages.say = said.append
+    again.chain()
+    assert (again.calls, len(said)) == ([], 1)
 
 
 def test_what_is_given_is_not_computed_and_counts_by_its_content(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from dreamdrive.motion import (
     Vibration,
     VibrationConfig,
 )
-from dreamdrive.scene.actor import Actor, Box, Track
+from dreamdrive.scene.actor import Actor, ActorBox, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
@@ -61,7 +61,7 @@ def make_scene(dynamic: int = 4, full: bool = True) -> Scene:
                 "vehicle",
                 2,
                 Track(np.array([0.0, 0.1]), np.ones((2, 3)) / 3, np.array([0.0, 0.1])),
-                Box(np.array([4.4, 1.8, 1.5]), np.array([0.0, 0.6, 0.8])),
+                ActorBox(np.array([4.4, 1.8, 1.5]), np.array([0.0, 0.6, 0.8])),
                 np.ones(2),
             ),
         )
@@ -96,7 +96,7 @@ def _moved_by(kind: str, dynamic: Gaussians) -> tuple[Gaussians, Motion]:
     return swinging, Vibration(VibrationConfig(interval_s=0.25))
 
 
-def drifting_scene() -> Scene:
+def per_frame_scene() -> Scene:
     """One whose street is of single frames; its Gaussian i is in place at i / 10 s, and goes i m/s ahead."""
     scene = make_scene()
     number = torch.arange(len(scene.static), dtype=torch.float32)

@@ -1,6 +1,7 @@
 """Frames of several cameras."""
 
 import numpy as np
+
 from tests.rigs import rig_clip
 
 

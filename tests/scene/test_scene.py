@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import drifting_scene, make_scene
 
-from dreamdrive.scene.actor import Actor, Box, Track
+from dreamdrive.scene.actor import Actor, ActorBox, Track
 from dreamdrive.scene.scene import Scene
+from tests.scene.scenes import make_scene, per_frame_scene
 
 
 def test_the_scene_at_a_time_is_static_then_dynamic_without_gradients() -> None:
@@ -105,7 +105,7 @@ def test_scenes_are_frozen() -> None:
 
 def test_a_box_points_where_its_actor_turns() -> None:
     up = np.array([0.0, -1.0, 0.0])
-    box = Box(np.array([4.4, 1.8, 1.5]), np.array([0.0, 0.0, 1.0]))
+    box = ActorBox(np.array([4.4, 1.8, 1.5]), np.array([0.0, 0.0, 1.0]))
     np.testing.assert_allclose(box.pointing(0.0, up), [0, 0, 1])
     np.testing.assert_allclose(box.pointing(np.pi / 2, up), [-1, 0, 0], atol=1e-12)
 
@@ -113,13 +113,13 @@ def test_a_box_points_where_its_actor_turns() -> None:
 @pytest.mark.parametrize(("size_m", "ahead"), [([4.4, 0, 1.5], [0, 0, 1]), ([4.4, 1.8, 1.5], [0, 0, 2])])
 def test_a_box_has_lengths(size_m: list[float], ahead: list[float]) -> None:
     with pytest.raises(ValueError, match="box: "):
-        Box(np.array(size_m), np.array(ahead, float))
+        ActorBox(np.array(size_m), np.array(ahead, float))
 
 
 def test_a_street_that_drifts_is_where_its_velocities_take_it() -> None:
-    scene = drifting_scene()
-    assert scene.drifts
-    assert not make_scene().drifts
+    scene = per_frame_scene()
+    assert scene.moves_per_frame
+    assert not make_scene().moves_per_frame
     then = scene.static_at(0.3)
     number = torch.arange(len(then), dtype=torch.float32)
     assert torch.allclose(
@@ -130,7 +130,7 @@ def test_a_street_that_drifts_is_where_its_velocities_take_it() -> None:
     assert then.velocity is None
     assert then.lifespan is None
     with pytest.raises(ValueError, match="need life spans"):
-        replace(scene.static, lifespan=None).drifted_at(0.0)
+        replace(scene.static, lifespan=None).moved_to(0.0)
 
 
 def test_more_that_stands_is_drawn_beside_what_was_fitted() -> None:

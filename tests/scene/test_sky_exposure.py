@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
@@ -12,7 +11,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure, transform_colour
 from dreamdrive.scene.sky import Sky
 from dreamdrive.splat import set_threads, threads
-from splat import plain_step as plain
+from dreamdrive_bench.splat import plain_step as plain
 
 
 def camera(yaw_deg: float = 0.0, pitch_deg: float = 0.0, position: tuple[float, ...] = (0, 0, 0)) -> Camera:
@@ -32,7 +31,7 @@ def compass(height: int = 90, width: int = 360) -> Sky:
 
 
 @given(st.floats(-170, 170), st.floats(5, 80))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_every_pixel_gets_the_colour_of_its_direction(yaw_deg: float, pitch_deg: float) -> None:
     view = camera(yaw_deg, pitch_deg)
     rays = view.rays() @ view.world_from_camera[:3, :3].T

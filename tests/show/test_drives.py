@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.scene.scenes import make_scene
 
 from dreamdrive.show import draw_drives
+from tests.scene.scenes import make_scene
 
 
 def test_each_drive_is_a_row_and_a_rig_on_a_car_is_none() -> None:

@@ -1,12 +1,16 @@
 """The report picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from tests.geometry import toy
 
 from dreamdrive.geometry.dense import densify
+from dreamdrive.scene.actor import Track
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.show.geometry import draw_geometry
+from dreamdrive.show.geometry import _PATH_PX, draw_geometry
+from tests.geometry import toy
+from tests.show.test_ids import scene as there
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,26 @@ def test_fixed_regions_are_tinted_and_moving_evidence_is_outlined(made):
     assert (tinted[..., 0] > tinted[..., 1]).mean() > 0.9
     assert (first[60, 110] == (255, 40, 40)).all()
     assert (first[70, 120] == plain[70, 120]).all()
+
+
+def test_ids_of_what_moves_stand_on_the_frames(made):
+    street, geometry = made
+    scene = replace(there(0.0, 10.0), cameras=geometry.cameras, times_s=street.clip.times_s)
+    track = Track(np.array([0.0, 9.0]), np.tile([[0.0, 1.5, 10.0]], (2, 1)), np.zeros(2))
+    scene = replace(scene, actors=(replace(scene.actors[0], track=track),))
+    plain, marked = draw_geometry(street.clip, geometry), draw_geometry(street.clip, geometry, scene)
+    changed = (plain != marked).any(axis=2)
+    assert changed[: toy.HEIGHT, : toy.WIDTH].any()
+    assert not changed[:, toy.WIDTH :].any()
+
+
+def test_words_that_do_not_fit_a_line_go_on_in_the_next(made):
+    street, geometry = made
+    told = replace(geometry, scale=replace(geometry.scale, source="seen " * 40))
+    rows = len(draw_geometry(street.clip, told)) - _PATH_PX
+    words = draw_geometry(street.clip, told)[rows : rows + 60, :40]
+    dark = (words == 0).all(axis=2).any(axis=1)
+    assert dark[5:40].all()  # three lines, where one has 17 rows
 
 
 def test_a_standing_path_is_drawn_too():

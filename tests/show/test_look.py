@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.scene.test_look import small_look
 
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
 from dreamdrive.show import draw_look
 from dreamdrive.show.look import COLOURS
+from tests.scene.street.test_look import small_look
 
 FRAME = np.full((8, 12, 3), 100, np.uint8)
 

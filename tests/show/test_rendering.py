@@ -9,26 +9,25 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
 
 from dreamdrive.data import read_trajectory
-from dreamdrive.data.intrinsics import read_intrinsics
+from dreamdrive.data.cameras.intrinsics import read_intrinsics
 from dreamdrive.drive.drives import Drive
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.show import panels, rendering
+from dreamdrive.show import panels
 from dreamdrive.show.rendering import (
     RenderOptions,
-    check_size,
     depth_png,
     video_rate,
     view_camera,
     write_drive,
 )
 from dreamdrive.splat.scene_view import SceneView, render_scene
+from tests.scene.scenes import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -50,34 +49,6 @@ def nothing(done: int) -> None:
 def view(scene: Scene, drive: Drive, i: int, part: str = "all") -> SceneView:
     camera = scene.cameras[0].at(drive.path.world_from_camera[i])
     return render_scene(scene, camera, float(drive.path.times_s[i]), part=part)  # pyright: ignore
-
-
-def refusal(options: RenderOptions) -> str:
-    with pytest.raises(InputError) as error:
-        check_size(options)
-    return str(error.value)
-
-
-def test_sizes_that_cannot_be_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    for size in ((0, 0), (15, 40)):
-        refused = f"--size {size[0]}x{size[1]}: expected sides of at least 16 pixels"
-        assert refusal(RenderOptions(size=size, format="png")) == refused
-    for size in ((99999, 99999), (8194, 16), (8192, 8192)):
-        assert refusal(RenderOptions(size=size, format="png")) == (
-            f"--size {size[0]}x{size[1]}: too large for H.264 video; expected 8192 pixels a side and 8.9 "
-            "million in all at most, such as 3840x2160"
-        )
-    assert refusal(RenderOptions(size=(321, 193))) == (
-        "--size 321x193: a video has even sides; choose 320x192, or --format png"
-    )
-    monkeypatch.setattr(rendering, "free_bytes", lambda: 10**9)
-    assert refusal(RenderOptions(size=(3840, 2160))) == (
-        "--size 3840x2160 takes about 1.7 GB, and 1.0 GB of memory are free; choose a smaller size"
-    )
-    monkeypatch.setattr(rendering, "free_bytes", lambda: None)
-    check_size(RenderOptions(size=(3840, 2160)))
-    check_size(RenderOptions(size=(321, 193), format="png"))
-    check_size(RenderOptions())
 
 
 def test_another_size_keeps_the_field_of_view_and_the_shape_of_pixels() -> None:

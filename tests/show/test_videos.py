@@ -1,22 +1,25 @@
 """Videos and held-out frames: the right number, size, rate and distortion."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from tests.scene.scenes import make_scene
+import pytest
 
-from dreamdrive.data import Lens
-from dreamdrive.data.distortion import Distortion
-from dreamdrive.drive.manoeuvres import frame_rate, smooth, up_of
+from dreamdrive.data import SourceLens
+from dreamdrive.data.cameras.distortion import Distortion
+from dreamdrive.drive.manoeuvres import frame_rate, manoeuvre, smooth
 from dreamdrive.scene.scene import Provenance, Scene
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.show.videos import _surround, as_recorded, lens_of, write_held_out
+from dreamdrive.show import videos
+from dreamdrive.show.videos import _surround, as_recorded, lens_of, write_held_out, write_videos
+from tests.scene.scenes import make_scene
 
 
 def distorted(scene: Scene) -> Scene:
-    lens = Lens(Distortion("opencv", (-0.3, 0.05, 0.0, 0.0)), scene.cameras[0])
+    lens = SourceLens(Distortion("opencv", (-0.3, 0.05, 0.0, 0.0)), scene.cameras[0])
     return replace(scene, provenance=Provenance(lens=lens.to_json(), up=(0.0, -0.8, 0.6)))
 
 
@@ -26,6 +29,30 @@ def test_held_out_frames_carry_their_source_index_and_size(tmp_path: Path) -> No
     image = cv2.imread(str(tmp_path / "0022.png"))
     assert image is not None
     assert image.shape == (24, 33, 3)
+
+
+def test_a_drive_from_aside_is_written_where_one_is_wanted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, drives = make_scene(), dict[str, np.ndarray]()
+
+    def keep(path: Path, frames: Iterator[np.ndarray], fps: float) -> None:
+        drives[path.stem] = np.stack(list(frames))
+
+    monkeypatch.setattr(videos, "write_video", keep)
+    recorded = np.zeros((3, 24, 33, 3), np.uint8)
+    steps: list[tuple[int, int]] = []
+    write_videos(tmp_path, scene, recorded, None, lambda *step: steps.append(step), shift_m=None)
+    assert list(drives) == ["drive", "recorded_beside_rendered", "panels"]
+    assert steps[-1][0] == steps[-1][1] == len(steps)
+    write_videos(tmp_path, scene, recorded, None, lambda *step: steps.append(step), shift_m=-2.0)
+    assert list(drives)[-1] == "shift"
+    assert steps[-1][0] == steps[-1][1]
+    left = manoeuvre("shift", smooth(scene.trajectory), scene.up, -2.0)
+    expected = as_recorded(
+        scene, scene.cameras[0].at(left.world_from_camera[0]), float(left.times_s[0]), None
+    )
+    np.testing.assert_array_equal(drives["shift"][0], expected)
 
 
 def test_views_carry_the_distortion_of_the_source(tmp_path: Path) -> None:
@@ -44,8 +71,8 @@ def test_views_carry_the_distortion_of_the_source(tmp_path: Path) -> None:
 def test_what_a_scene_remembers_of_its_making() -> None:
     scene = make_scene()
     assert lens_of(replace(scene, provenance=Provenance())) is None
-    assert up_of(replace(scene, provenance=Provenance())).tolist() == [0, -1, 0]
-    assert up_of(distorted(scene)).tolist() == [0, -0.8, 0.6]
+    assert replace(scene, provenance=Provenance()).up.tolist() == [0, -1, 0]
+    assert distorted(scene).up.tolist() == [0, -0.8, 0.6]
 
 
 def test_drives_are_made_smooth_without_moving_recorded_frames() -> None:

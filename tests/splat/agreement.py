@@ -9,8 +9,6 @@ their value may differ by what the edge is worth, and no more. Everything else h
 from dataclasses import dataclass, replace
 
 import torch
-from tests.splat.drawn import Case, arguments
-from tests.splat.scenes import IMAGES
 from torch import Tensor
 
 from dreamdrive.scene.render import Render
@@ -24,6 +22,8 @@ from dreamdrive.splat.reference import (
     offsets_from,
     project,
 )
+from tests.splat.drawn import Case, arguments
+from tests.splat.scenes import IMAGES
 
 EDGE = 1e-3  # relative error of alpha that rounding of a float32 projection may cause
 CAP_EDGE = 1e-4  # the same at the cap, where the power is nearly zero

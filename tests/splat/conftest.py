@@ -4,7 +4,7 @@ from collections.abc import Generator
 
 import pytest
 
-from dreamdrive.splat import one_torch_thread
+from dreamdrive.compute.threads import one_torch_thread
 
 
 @pytest.fixture(scope="package", autouse=True)

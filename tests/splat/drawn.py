@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import torch
 from hypothesis import strategies as st
-from tests.splat.scenes import IMAGES
 from torch import Tensor
 from torch.nn.functional import normalize
 
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.splat.arguments import SplatArguments
 from dreamdrive.splat.reference import FAR_M, MIN_ALPHA, rotation_matrices, sh_basis
+from tests.splat.scenes import IMAGES
 
 KINDS = (
     "plain", "needle", "huge", "tiny", "flat", "near", "behind", "far", "beside", "opaque", "faint", "absent",

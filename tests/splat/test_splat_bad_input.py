@@ -5,16 +5,15 @@ from contextlib import nullcontext
 
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.splat.agreement import pull
-from tests.splat.drawn import Case, build
-from tests.splat.scenes import IMAGES, pinhole, random_scene, render_with_gradients
+from hypothesis import given, settings, strategies as st
 from torch import Tensor
 
 from dreamdrive import _native
 from dreamdrive.splat import rasterize
 from dreamdrive.splat.arguments import SplatArguments, check_shapes, check_values
+from tests.splat.agreement import pull
+from tests.splat.drawn import Case, build
+from tests.splat.scenes import IMAGES, pinhole, random_scene, render_with_gradients
 
 NAN, INF = float("nan"), float("inf")
 FLOATS = ("means", "quaternions", "scales", "opacities", "sh", "channels", "screen_offsets_px")
@@ -130,7 +129,7 @@ SPECIAL = (
     whole_row=st.booleans(),
     n=st.sampled_from((1, 2, 17, 4095, 4097, 9000)),
 )
-@settings(derandomize=True, deadline=None, database=None, max_examples=300)
+@settings(max_examples=300)
 def test_the_native_pass_finds_what_the_named_check_finds(name, place, special, whole_row, n):
     tensors = {
         "means": torch.zeros(n, 3),

@@ -4,8 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
+from torch import Tensor
+
+from dreamdrive.motion import multiply_quaternions
+from dreamdrive.scene.render import Render
+from dreamdrive.splat import rasterize, set_threads, threads
 from tests.splat.agreement import (
     assert_gradients_agree,
     assert_images_agree,
@@ -14,13 +18,7 @@ from tests.splat.agreement import (
 )
 from tests.splat.drawn import KINDS, Case, build, cases, random_rotation, select
 from tests.splat.scenes import IMAGES
-from torch import Tensor
 
-from dreamdrive.motion import multiply_quaternions
-from dreamdrive.scene.render import Render
-from dreamdrive.splat import rasterize, set_threads, threads
-
-DETERMINISTIC = settings(derandomize=True, deadline=None, database=None)
 UNTIED = tuple(kind for kind in KINDS if kind != "tied")
 ALL = torch.ones((), dtype=torch.bool)
 
@@ -38,7 +36,7 @@ def joined(a: dict[str, Tensor], b: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 @given(cases(UNTIED), st.randoms(use_true_random=False))
-@settings(DETERMINISTIC, max_examples=20)
+@settings(max_examples=20)
 def test_the_order_of_gaussians_in_memory_does_not_matter(case, random):
     scene = build(case)
     rows = list(range(len(scene["means"])))
@@ -76,7 +74,7 @@ def test_equal_depths_keep_index_order_among_many():
 
 
 @given(cases())
-@settings(DETERMINISTIC, max_examples=20)
+@settings(max_examples=20)
 def test_nothing_behind_an_opaque_wall_counts(case):
     """Two sheets: the first leaves 0.001 of the light; the second would leave 1e-6 and ends every pixel."""
     scene = build(case)
@@ -98,7 +96,7 @@ def test_nothing_behind_an_opaque_wall_counts(case):
 
 
 @given(cases(UNTIED), st.integers(0, 2**20))
-@settings(DETERMINISTIC, max_examples=20)
+@settings(max_examples=20)
 def test_moving_camera_and_world_together_changes_nothing(case, seed):
     """Colours of degree 0: higher harmonics would have to be rotated too."""
     case = replace(case, degree=0, stored=0)
@@ -124,7 +122,7 @@ def test_moving_camera_and_world_together_changes_nothing(case, seed):
 
 
 @given(cases(("plain", "needle", "opaque", "near", "tied")), st.data())
-@settings(DETERMINISTIC, max_examples=20)
+@settings(max_examples=20)
 def test_a_crop_is_rendered_by_shifting_the_principal_point(case, data):
     """Of Gaussians whose centres lie in the crop: the clamp of x/z belongs to the image that is rendered."""
     scene = build(case)
@@ -152,7 +150,7 @@ def floats(scene: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 @given(cases(most=200))
-@settings(DETERMINISTIC, max_examples=15)
+@settings(max_examples=15)
 def test_thread_count_changes_no_byte(case):
     scene, before = build(case), threads()
     results = []
@@ -188,7 +186,7 @@ def test_buffers_of_a_huge_scene_leave_no_trace():
 
 
 @given(cases())
-@settings(DETERMINISTIC, max_examples=15)
+@settings(max_examples=15)
 def test_twice_the_upstream_gradient_is_exactly_twice_the_gradient(case):
     scene = build(case)
     (value, once), (again, twice) = pull(case, scene, ALL), pull(case, scene, ALL, factor=2)
@@ -196,7 +194,7 @@ def test_twice_the_upstream_gradient_is_exactly_twice_the_gradient(case):
 
 
 @given(cases())
-@settings(DETERMINISTIC, max_examples=15)
+@settings(max_examples=15)
 def test_channels_that_repeat_the_depth_are_the_depth(case):
     """Extra channels take another path through the compositing than colour, alpha and depth."""
     scene = floats(build(case))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import torch
-from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.splat import native_info, rasterize, render, set_threads, threads
+from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 
 def test_thread_count_changes_no_bit():

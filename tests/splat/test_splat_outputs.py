@@ -2,9 +2,9 @@
 
 import pytest
 import torch
-from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 from dreamdrive.splat import rasterize
+from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 
 def small(scene: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.splat.gsplat_on_cpu import nerfacc_stand_in
-from tests.splat.scenes import relative
 from torch import Tensor
 
 from dreamdrive.scene.gaussians import SH_C0
 from dreamdrive.splat import rasterize
 from dreamdrive.splat.arguments import SplatArguments
 from dreamdrive.splat.reference import project
+from tests.splat.gsplat_on_cpu import nerfacc_stand_in
+from tests.splat.scenes import relative
 
 
 @pytest.fixture(scope="module")

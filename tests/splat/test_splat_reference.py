@@ -2,9 +2,9 @@
 
 import pytest
 import torch
-from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 from dreamdrive.splat import rasterize
+from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_with_gradients
 
 
 def assert_backends_agree(scene, **options):

@@ -2,10 +2,10 @@
 
 import pytest
 import torch
-from tests.splat.scenes import relative
 
 from dreamdrive.splat import set_threads, ssim, ssim_map, threads
 from dreamdrive.splat.ssim import ssim_map_reference
+from tests.splat.scenes import relative
 
 
 def pair(height: int, width: int) -> tuple[torch.Tensor, torch.Tensor]:

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import drifting_scene, make_baseline, make_scene
-from tests.stored.test_hostile_folder import change
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import MARK
-from dreamdrive.scene.log import OfLog
 from dreamdrive.scene.scene import Provenance
+from dreamdrive.scene.street.log import OfLog
 from dreamdrive.stored import load_scene, save_scene
+from tests.scene.scenes import make_baseline, make_scene, per_frame_scene
+from tests.stored.test_hostile_folder import change
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -58,7 +58,7 @@ def test_round_trip_of_the_other_motions(tmp_path: Path, kind: str) -> None:
 
 def test_a_scene_is_of_the_first_format_that_can_hold_it(tmp_path: Path) -> None:
     versions = {}
-    scenes = {"old": make_scene(), "new": make_baseline("vibration"), "drifts": drifting_scene()}
+    scenes = {"old": make_scene(), "new": make_baseline("vibration"), "drifts": per_frame_scene()}
     for name, scene in scenes.items():
         save_scene(scene, tmp_path / name)
         versions[name] = json.loads((tmp_path / name / "scene.json").read_text())["version"]
@@ -66,10 +66,10 @@ def test_a_scene_is_of_the_first_format_that_can_hold_it(tmp_path: Path) -> None
 
 
 def test_a_street_that_drifts_comes_back_and_needs_life_spans(tmp_path: Path) -> None:
-    scene = drifting_scene()
+    scene = per_frame_scene()
     save_scene(scene, tmp_path / "a")
     loaded = load_scene(tmp_path / "a")
-    assert loaded.drifts
+    assert loaded.moves_per_frame
     assert torch.equal(loaded.at(0.4).means, scene.at(0.4).means)
     save_scene(replace(scene, static=replace(scene.static, lifespan=None)), tmp_path / "b")
     with pytest.raises(InputError, match="no life spans"):

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 import torch
 from safetensors.torch import load_file, save
-from tests.scene.scenes import make_baseline, make_scene
 
 from dreamdrive.errors import InputError
+from dreamdrive.splat import render_scene
 from dreamdrive.stored import load_scene, save_scene
+from tests.scene.scenes import make_baseline, make_scene
 
 Index = dict[str, Any]
 
@@ -64,12 +65,15 @@ WRONG = {
     "cameras.0.fx_px": [0, -1, 1e300, None, "x", [1]],
     "cameras.0.width_px": [0, -5, 10**7, 10**9, 1.5, True, None],
     "cameras.0.world_from_camera": [[], [[1]], None, [[0] * 4] * 4, [[1e300] * 4] * 4],
-    "times_s": [[], [0.0], None, "x", [1.0, 0.5, 0.0], [0.0, 0.0, 0.0]],
+    "times_s": [[], [0.0], None, "x", [1.0, 0.5, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 1e300]],
     "held_out": [[True], None, [1, 0, 1]],
     "camera": [[0, 0], [0, 1, 10**9], "x"],
     "actors.0.positions_m": [[], [[1e300, 0, 0]], [[1, 2]], None],
     "actors.0.times_s": [[], None, [3.0, 2.0, 1.0]],
     "actors.0.count": [-1, 10**12, "x"],
+    "actors.0.times_s.1": [1e300],
+    "actors.0.yaw_rad": [[0.0], [1e300, 0.0]],
+    "actors.0.spread_m": [[1.0], [-1.0, 1.0]],
     "actors.0.size_m": [[0, 1, 1], [1, 1], [-1, 1, 1]],
     "actors.0.ahead": [[0, 0, 2], [0, 0], [1e300, 0, 0]],
     "deformation.width": [10**7, 0, -1, None, 1e300, "x"],
@@ -78,7 +82,8 @@ WRONG = {
     "deformation.actors": [10**7, -1],
     "deformation.position_frequencies": [10**7, -1],
     "sky": [None, {}, {"azimuth_rad": [0], "elevation_rad": [0, 1]}],
-    "sky.azimuth_rad": [[1, 0], [0, 1, 2], None],
+    "sky.azimuth_rad": [[1, 0], [0, 1, 2], None, [0, 1e300]],
+    "provenance.camera_height_m": [1e300, "x"],
     "provenance.log": [
         {"name": "a", "log_from_world": rows, "start_s": 0.0}
         for rows in ([], [[1.0]], [[0.0] * 4] * 4, [[1e300] * 4] * 4, "x")
@@ -129,6 +134,21 @@ CHANGED: dict[str, tuple[str, Callable[[dict[str, torch.Tensor]], object], str]]
     "NaN means": ("static", lambda t: t["means"].fill_(torch.nan), "means holds NaN or infinite numbers"),
     "far means": ("static", lambda t: t["means"].fill_(1e30), "Gaussians lie more than 1e"),
     "infinite scales": ("dynamic", lambda t: t["log_scales"].fill_(torch.inf), "log_scales holds NaN"),
+    "no rotation": ("static", lambda t: t["quaternions"][2].zero_(), "quaternions of length 0"),
+    "long rotation": ("dynamic", lambda t: t["quaternions"].mul_(1e12), "quaternions of length 0, or of no"),
+    "NaN rotation": ("static", lambda t: t["quaternions"].fill_(torch.nan), "quaternions holds NaN"),
+    "giants": ("static", lambda t: t["log_scales"][1].fill_(100.0), r"larger than exp\(40\) m"),
+    "glaring": ("dynamic", lambda t: t["sh"].fill_(1e30), "coefficients of colour beyond"),
+    "negative life": ("dynamic", lambda t: t["lifespan"].neg_(), "life spans below 0"),
+    "late life": ("dynamic", lambda t: t["lifespan"].fill_(1e30), "at no time that recordings have"),
+    "bright sky": ("sky", lambda t: t["texture"].fill_(1e30), "brighter or wider than skies are"),
+    "empty sky": ("sky", lambda t: t.update(texture=torch.zeros(0, 4, 3)), r"the sky has \(0, 4, 3\) texels"),
+    "bright exposure": ("exposure", lambda t: t["transforms"].fill_(1e30), "changes colours by more"),
+    "no exposure": (
+        "exposure",
+        lambda t: t.update(camera=torch.ones(2, dtype=torch.int64)),
+        "does not tell of all cameras",
+    ),
     "other type": ("static", lambda t: t.update(means=t["means"].double().int()), "Gaussians.means"),
     "short source": ("static", lambda t: t.update(source_frame=t["source_frame"][:1]), "source_frame"),
     "source beyond": ("static", lambda t: t["source_frame"].fill_(99), "frames beyond the"),
@@ -163,6 +183,28 @@ def test_wrong_tensors_are_refused(tmp_path: Path, name: str) -> None:
     change_part(folder, part, how)
     with pytest.raises(InputError, match=said):
         load_scene(folder)
+
+
+def test_speeds_are_bounded(tmp_path: Path) -> None:
+    save_scene(make_baseline("vibration"), tmp_path / "s")
+    change_part(tmp_path / "s", "dynamic", lambda t: t["velocity"].fill_(1e9))
+    with pytest.raises(InputError, match=r"faster than 1e\+07 m/s"):
+        load_scene(tmp_path / "s")
+
+
+def test_two_actors_of_one_id_are_refused(tmp_path: Path) -> None:
+    folder = stored(tmp_path)
+    change(folder, lambda index: index["actors"].append(dict(index["actors"][0])))
+    with pytest.raises(InputError, match="two actors have one id"):
+        load_scene(folder)
+
+
+def test_a_motion_that_leads_nowhere_is_said_where_it_is_used(tmp_path: Path) -> None:
+    folder = stored(tmp_path)
+    change_part(folder, "deformation", lambda t: t["head_mean.bias"].fill_(1e38))
+    scene = load_scene(folder)
+    with pytest.raises(InputError, match=r"motion cannot be used: at 0\.5 s Gaussians lie more than 1e"):
+        render_scene(scene, scene.cameras[0], 0.5)
 
 
 @pytest.mark.parametrize("kind", ["hexplane", "vibration"])

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.files.output import remove
 from dreamdrive.files.paths import inside
 
@@ -17,6 +18,7 @@ def clean(out: Annotated[Positional[Path], arg(metavar="OUT")]) -> None:
     Args:
         out: The folder that generate wrote.
     """
+    check_there(out, SCENE)
     from dreamdrive.run import check_ours, only_run
 
     check_ours(out)

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
-from dreamdrive.cli.arguments import DataSetName, commands_of
-from dreamdrive.cli.progress import Bars
-from dreamdrive.cli.tables import print_table
+from dreamdrive.cli.terminal.arguments import DataSetName, commands_of
+from dreamdrive.cli.terminal.progress import Bars
+from dreamdrive.cli.terminal.tables import print_table
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import DATASET, check_there
+from dreamdrive.files.output import check_ending
 
 if TYPE_CHECKING:
     from dreamdrive.data import Logs
-    from dreamdrive.scene.log import Log
+    from dreamdrive.scene.street.log import Log
 
 _BROKEN = 2
 """Exit code of a data set of which something is missing or broken."""
@@ -31,7 +33,7 @@ def list_(
         path: A folder of a data set.
         dataset: Which data set it is of; without it the one that recognises the path.
     """
-    from dreamdrive.choices import DATASETS
+    from dreamdrive.data.table import DATASETS
 
     console = Console(highlight=False, soft_wrap=True, markup=False)
     if path is None:
@@ -56,6 +58,7 @@ def check(
         dataset: Which data set it is of; without it the one that recognises the path.
         scene: Which scene, by its name or number; without it all.
     """
+    check_there(path, DATASET)
     from dreamdrive.data import choose_scene
 
     logs = _logs(path, dataset)
@@ -126,12 +129,10 @@ def show(
         scene: Which scene, by its name or number.
         step: Which of its labelled times, counted from 0; without it the middle.
     """
-    from dreamdrive.files.output import check_ending
-
     check_ending(output, ".png")
-    from dreamdrive.data.log_layout import layout_of_log
-    from dreamdrive.show import draw_log, write_png
-    from dreamdrive.world import draw_layout
+    check_there(path, DATASET)
+    from dreamdrive.datasets.log_layout import layout_of_log
+    from dreamdrive.show import draw_layout, draw_log, write_png
 
     log = _logs(path, dataset).open(path, scene)
     row = len(log.times_s) // 2 if step is None else step
@@ -147,11 +148,10 @@ def show(
 
 def _logs(path: Path, dataset: str | None) -> "Logs":
     """The drives of a data set; refuses a path that is a single recording."""
-    from dreamdrive.choices import DATASETS
-    from dreamdrive.data import dataset_of
+    check_there(path, DATASET)
+    from dreamdrive.data.input import dataset_of
+    from dreamdrive.data.table import DATASETS
 
-    if not path.exists():
-        raise InputError(f"{path} does not exist; expected a folder of a data set")
     chosen = dataset_of(dataset, path)
     if chosen.logs is None:
         own = [DATASETS.choose(name) for name in DATASETS.own]

@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,20 +11,46 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
-from dreamdrive.cli.arguments import DataSetName, commands_of, parse_size
-from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.arguments import DataSetName, commands_of, parse_size
+from dreamdrive.cli.terminal.machine import use_all_cores
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import DATASET, SCENE, check_there
+from dreamdrive.files.kinds import SAMPLES_KIND
+from dreamdrive.files.output import check_free
 
 if TYPE_CHECKING:
     from dreamdrive.data import Logs
-    from dreamdrive.perception import BevGrid, BevSample, ImageSize, PathOptions, SampleNote
-    from dreamdrive.scene.log import Log
     from dreamdrive.scene.scene import Scene
+    from dreamdrive.scene.street.log import Log
+    from dreamdrive.tasks.perception import BevGrid, BevSample, ImageSize, PathOptions, SampleNote
 
 _PUBLISHED = (480, 270)
 """Size to which the original resizes pictures, before 46 rows of the sky are cut off."""
+
+
+@dataclass(frozen=True)
+class SampleFlags:
+    """What samples hold, and where those of scenes are taken.
+
+    Attributes:
+        per_scene: Samples of each; without it 40 of a scene that is rendered, and all labelled times.
+        size: Width and height of the pictures, with the upper 17 % of 16:9 cut away as the original does.
+        cells: Cells of the labels each way, of 100 m.
+        aside: Most that new paths are to the left or right of the recorded one in metres.
+        turned: Most that they look to the left or right of the recorded direction in degrees.
+        format: Of the pictures.
+        seed: Of the paths.
+    """
+
+    per_scene: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    size: Annotated[str, arg(metavar="WxH")] = "480x224"
+    cells: Annotated[int, arg(metavar="N")] = 200
+    aside: Annotated[float, arg(metavar="M")] = 1.5
+    turned: Annotated[float, arg(metavar="DEG")] = 6.0
+    format: Literal["jpg", "png"] = "jpg"
+    seed: Annotated[int, arg(metavar="S")] = 0
 
 
 def make(
@@ -33,13 +60,7 @@ def make(
     labels: Annotated[Path | None, arg(metavar="DATASET", help_behavior_hint="")] = None,
     dataset: Annotated[DataSetName | None, arg(help_behavior_hint="")] = None,
     scene: Annotated[str | None, arg(metavar="NAME|N", help_behavior_hint="")] = None,
-    per_scene: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
-    size: Annotated[str, arg(metavar="WxH")] = "480x224",
-    cells: Annotated[int, arg(metavar="N")] = 200,
-    aside: Annotated[float, arg(metavar="M")] = 1.5,
-    turned: Annotated[float, arg(metavar="DEG")] = 6.0,
-    format: Literal["jpg", "png"] = "jpg",
-    seed: Annotated[int, arg(metavar="S")] = 0,
+    sample: OmitArgPrefixes[SampleFlags] = SampleFlags(),
     force: bool = False,
 ) -> None:
     """Make samples for networks that see a street from above: pictures of all cameras, and labels.
@@ -51,23 +72,20 @@ def make(
         labels: The data set with the boxes and the map of the drives that scenes were made of.
         dataset: Which data set it is; without it the one that recognises the path.
         scene: Which scene of a data set among the sources; without it all.
-        per_scene: Samples of each; without it 40 of a scene that is rendered, and all labelled times.
-        size: Width and height of the pictures, with the upper 17 % of 16:9 cut away as the original does.
-        cells: Cells of the labels each way, of 100 m.
-        aside: Most that new paths are to the left or right of the recorded one in metres.
-        turned: Most that they look to the left or right of the recorded direction in degrees.
-        format: Of the pictures.
-        seed: Of the paths.
+        sample: What samples hold, and where those of scenes are taken.
         force: Replace a set that is there already.
     """
+    width, height, cut = _cut_size(sample.size, sample.cells)
+    for path in (*sources, labels):
+        check_there(path, f"{SCENE}, or {DATASET}")
+    check_free(out, force, SAMPLES_KIND)
     use_all_cores()
-    from dreamdrive.files.output import check_free
-    from dreamdrive.perception import KIND, PathOptions, write_bev_set
+    from dreamdrive.tasks.perception import BevGrid, ImageSize, PathOptions, write_bev_set
 
-    check_free(out, force, KIND)
-    image, grid = _sizes(size, cells)
+    image, grid = ImageSize(height, width, cut), BevGrid(sample.cells, sample.cells)
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    made = _Maker(image, grid, PathOptions(aside_m=aside, turned_deg=turned), per_scene, seed)
+    paths = PathOptions(aside_m=sample.aside, turned_deg=sample.turned)
+    made = _Maker(image, grid, paths, sample.per_scene, sample.seed)
     plans = [plan for source in sources for plan in made.plans(source, labels, dataset, scene)]
     start = time.perf_counter()
     with Bars(console) as bars:
@@ -77,7 +95,7 @@ def make(
             image,
             grid,
             count=sum(count for _, _, count in plans),
-            suffix=format,
+            suffix=sample.format,
             left_out=made.left_out,
             replace=force,
             progress=partial(bars, "samples"),
@@ -104,7 +122,8 @@ class _Maker:
 
     def plans(self, source: Path, labels: Path | None, dataset: str | None, scene: str | None) -> list[_Plan]:
         """What is made of a source: with a scene if it is one, the drive, and about how many."""
-        from dreamdrive.data import choose_scene, dataset_of
+        from dreamdrive.data import choose_scene
+        from dreamdrive.data.input import dataset_of
 
         if (source / "scene" / "scene.json").is_file() or (source / "scene.json").is_file():
             made = open_scene(source)
@@ -125,7 +144,7 @@ class _Maker:
 
     def samples(self, plans: list[_Plan]) -> Iterator[tuple["SampleNote", "BevSample"]]:
         """All of them, one after the other."""
-        from dreamdrive.perception import draw_places, samples_of_log, samples_of_scene, span_of
+        from dreamdrive.tasks.perception import draw_places, samples_of_log, samples_of_scene, span_of
 
         named: Counter[str] = Counter()
         for number, (scene, log, count) in enumerate(plans):
@@ -146,9 +165,8 @@ class _Maker:
                     yield sample
 
 
-def _sizes(size: str, cells: int) -> tuple["ImageSize", "BevGrid"]:
-    from dreamdrive.perception import BevGrid, ImageSize
-
+def _cut_size(size: str, cells: int) -> tuple[int, int, int]:
+    """Width and height of the pictures, and the rows above that are cut away."""
     width, height = parse_size(size)
     whole = round(width * _PUBLISHED[1] / _PUBLISHED[0])
     if height > whole:
@@ -157,11 +175,11 @@ def _sizes(size: str, cells: int) -> tuple["ImageSize", "BevGrid"]:
         )
     if cells < 8:
         raise InputError(f"--cells {cells}: expected 8 or more")
-    return ImageSize(height, width, whole - height), BevGrid(cells, cells)
+    return width, height, whole - height
 
 
 def _logs(path: Path, dataset: str | None) -> "Logs":
-    from dreamdrive.data import dataset_of
+    from dreamdrive.data.input import dataset_of
 
     logs = dataset_of(dataset, path).logs
     if logs is None:

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from dreamdrive.choices import BACKENDS, DATASETS, PRIORS
-from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.errors import InputError
-from dreamdrive.machine import available_cores, free_bytes
+from dreamdrive.cli.terminal.machine import use_all_cores
+from dreamdrive.compute.machine import available_cores, free_bytes
+from dreamdrive.data.table import DATASETS
+from dreamdrive.errors import PIP, InputError
+from dreamdrive.export import EXPORTS
+from dreamdrive.geometry import BACKENDS
+from dreamdrive.prior import PRIORS
 
 if TYPE_CHECKING:
     from dreamdrive.data import DataSet
+    from dreamdrive.export import Export
     from dreamdrive.models import Backend
 
 _NEEDED_BYTES = 3e9
@@ -31,9 +35,7 @@ def doctor() -> None:
     versions = package_versions()
     for name, version in versions.items():
         table.add_row(name, version or "missing")
-    missing = [
-        f"{name} is missing: pip install {name}" for name, version in versions.items() if version is None
-    ]
+    missing = [f"{name} is missing: {PIP} {name}" for name, version in versions.items() if version is None]
     native, trouble = _native()
     table.add_row("native core", native)
     free = free_bytes()
@@ -67,7 +69,8 @@ def _native() -> tuple[str, list[str]]:
 
 def _backends(console: Console) -> None:
     """What ``generate`` offers by name; nothing of it is needed."""
-    for what, table in (("prior", PRIORS), ("geometry", BACKENDS), ("data set", DATASETS)):
+    tables = {"prior": PRIORS, "geometry": BACKENDS, "data set": DATASETS, "export": EXPORTS}
+    for what, table in tables.items():
         for name in table:
             try:
                 lines = _about(table[name])
@@ -94,14 +97,15 @@ def _choices(console: Console) -> None:
         ("a layout", Path("layout.json")),
     ):
         choice = auto_prior(path)
-        console.print(f"   {what}: {choice.name}, {choice.why}", highlight=False, soft_wrap=True)
+        console.print(f"   {what}: {choice.name}, as {choice.why}", highlight=False, soft_wrap=True)
 
 
-def _about(entry: "Backend | DataSet") -> list[str]:
+def _about(entry: "Backend | DataSet | Export") -> list[str]:
     """What an entry is, and what it takes to use it, a line each."""
     from dreamdrive.data import DataSet
+    from dreamdrive.export import Export
 
-    if isinstance(entry, DataSet):
+    if isinstance(entry, DataSet | Export):
         return [entry.about]
     takes = "ready" if entry.weights is None else f"give --weights, {entry.weights}"
     to_use = entry.missing_package() or takes

@@ -2,15 +2,17 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rich.console import Console
 from tyro.conf import Positional, arg
 
-from dreamdrive.choices import ExportKind
-from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.arguments import ExportName
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.export import EXPORTS, Export, function
+from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ _OF_WORLD = "Pictures, poses and boxes are those of the drawn street."
 def export(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
-    to: ExportKind,
+    to: ExportName,
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE|DIR")],
     force: bool = False,
 ) -> None:
@@ -33,82 +35,38 @@ def export(
     Args:
         out: The folder that generate wrote; for nuscenes, ncore and mcap also one of world make.
         to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
-            ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove.
+            ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove; colmap
+            and nerfstudio the frames with cameras and points; tum the path of the first camera.
         output: For ply NAME.ply for everything at the first recorded time; else a folder for static.ply and,
-            with everything at each recorded time, frames/NNNN.ply. For nuscenes and ncore a folder, for mcap
-            NAME.mcap.
+            with everything at each recorded time, frames/NNNN.ply. For mcap NAME.mcap, for tum NAME.txt; for
+            the others a folder.
         force: Replace what is there already, if dreamdrive wrote it.
     """
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    if to == "nuscenes":
-        _export_nuscenes(out, output, force)
-        console.print(str(output))
-    elif to == "ncore":
-        said = _export_ncore(out, output, force)
-        console.print(f"{output}\n{said}")
-    elif to == "mcap":
-        said = _export_mcap(out, output, force)
-        console.print(f"{output}\n{said}")
-    else:
-        from dreamdrive.export import check_ply, export_ply, left_out_of_ply
-
-        check_ply(output, force)
-        scene = open_scene(out)
-        export_ply(scene, output, replace=force)
-        console.print(str(output))
-        console.print(left_out_of_ply(scene, output))
+    check_there(out, SCENE)
+    chosen = EXPORTS.choose(to)
+    chosen.check(output, force)
+    said = _written(chosen, to, out, output, force)
+    Console(highlight=False, markup=False, soft_wrap=True).print("\n".join([str(output), *said]))
 
 
-def _export_nuscenes(out: Path, output: Path, force: bool) -> None:
-    from dreamdrive.data.nuscenes import KIND
-    from dreamdrive.export import export_scene, export_world
-    from dreamdrive.files.output import check_free
-    from dreamdrive.world import is_world, read_drives
+def _written(chosen: Export, to: str, out: Path, output: Path, force: bool) -> list[str]:
+    """Write it, and say what it holds."""
+    from dreamdrive.data.truth_folder import is_world, read_drives
 
-    check_free(output, force, KIND)
+    pictures = "clip" in chosen.takes
     with Bars(Console()) as bars:
-        said = partial(bars, "nuscenes")
-        if is_world(out):
-            export_world(read_drives(out), out.resolve().name, output, replace=force, progress=said)
-        else:
-            export_scene(open_scene(out), output, replace=force, progress=said)
-
-
-def _export_ncore(out: Path, output: Path, force: bool) -> str:
-    """Write it, and say what its pictures are."""
-    from dreamdrive.export import NCORE_KIND, need_ncore, scene_to_ncore, world_to_ncore
-    from dreamdrive.files.output import check_free
-    from dreamdrive.world import is_world, read_drives
-
-    need_ncore()
-    check_free(output, force, NCORE_KIND)
-    with Bars(Console()) as bars:
-        said = partial(bars, "ncore")
-        if is_world(out):
-            world_to_ncore(read_drives(out), output, replace=force, progress=said)
-            return _OF_WORLD
+        how: dict[str, Any] = {"replace": force, "progress": partial(bars, to)}
+        if chosen.world is not None and is_world(out):
+            named = {"name": out.resolve().name} if "name" in chosen.takes else {}
+            function(chosen.world)(read_drives(out), output, **named, **how)
+            return [_OF_WORLD] if pictures else []
         scene, stages = open_scene(out), _stages(out)
-        clip, geometry = _kept(stages, scene)
-        scene_to_ncore(scene, output, clip=clip, geometry=geometry, replace=force, progress=said)
-    return _of_pictures(clip, stages)
-
-
-def _export_mcap(out: Path, output: Path, force: bool) -> str:
-    """Write it, and say what its pictures are."""
-    from dreamdrive.export import check_mcap, need_foxglove, scene_to_mcap, world_to_mcap
-    from dreamdrive.world import is_world, read_drives
-
-    need_foxglove()
-    check_mcap(output, force)
-    with Bars(Console()) as bars:
-        said = partial(bars, "mcap")
-        if is_world(out):
-            world_to_mcap(read_drives(out), output, replace=force, progress=said)
-            return _OF_WORLD
-        scene, stages = open_scene(out), _stages(out)
-        clip, _ = _kept(stages, scene)
-        scene_to_mcap(scene, output, clip=clip, replace=force, progress=said)
-    return _of_pictures(clip, stages)
+        clip, geometry = _kept(stages, scene) if pictures else (None, None)
+        kept: dict[str, object] = {"clip": clip, "geometry": geometry}
+        how |= {name: kept[name] for name in chosen.takes & set(kept)}
+        function(chosen.scene)(scene, output, **how)
+    said = [] if chosen.left_out is None else [function(chosen.left_out)(scene, output)]
+    return [*said, _of_pictures(clip, stages)] if pictures else said
 
 
 def _stages(out: Path) -> Path:
@@ -127,9 +85,10 @@ def _kept(stages: Path, scene: "Scene") -> "tuple[Clip | None, Geometry | None]"
     """What the run kept of clip and geometry; ``InputError`` where they are not those of the scene."""
     import numpy as np
 
-    from dreamdrive.run import check, codec
+    from dreamdrive.run import codec
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
+    from dreamdrive.stored import check
 
     prior, geometry = inside(stages, "prior"), inside(stages, "geometry")
     if not (prior / codec.JSON_NAME).is_file():

@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rich.console import Console
 from tyro.conf import Positional, arg
 
-from dreamdrive.cli.arguments import parse_size
-from dreamdrive.cli.machine import stop_like_an_interruption, use_all_cores
-from dreamdrive.cli.progress import Bars
+from dreamdrive.cli.terminal.arguments import parse_size
+from dreamdrive.cli.terminal.machine import stop_like_an_interruption, use_all_cores
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import check_given
+from dreamdrive.files.kinds import LOOK_KIND
+from dreamdrive.files.output import check_free
 
 if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import UInt8
 
-    from dreamdrive.scene.look import CameraEstimate, Look
+    from dreamdrive.scene.street.look import CameraEstimate, Look
 
 _PIXEL_BYTES = 16
 """Of one frame with all that is seen in it."""
@@ -60,16 +63,16 @@ def look(
         camera_height: Height of the camera above the road in metres; without it depth is in such heights.
         force: Replace what is there already from an earlier look.
     """
+    wanted = None if size is None else parse_size(size)
+    check_given(input=input, intrinsics=intrinsics)
+    check_free(out, force, LOOK_KIND)
     use_all_cores()
-    from dreamdrive.files.output import check_free
-    from dreamdrive.knowledge import KIND, load_knowledge, write_look
-    from dreamdrive.knowledge import look as see
     from dreamdrive.show import draw_look
+    from dreamdrive.street_network import load_knowledge, look as see, write_look
 
     stop_like_an_interruption()
-    check_free(out, force, KIND)
     network = load_knowledge(knowledge)
-    given = _read(input, frames, None if size is None else parse_size(size), intrinsics, hfov)
+    given = _read(input, frames, wanted, intrinsics, hfov)
     _check_memory(given)
     console, start = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
     with Bars(console) as bars:
@@ -98,9 +101,9 @@ def _read(
     path: Path, frames: str | None, size: tuple[int, int] | None, intrinsics: Path | None, hfov: float | None
 ) -> _Pictures:
     from dreamdrive.data import read_clip
-    from dreamdrive.data.images import read_image
+    from dreamdrive.data.frames.size import choose_size
     from dreamdrive.data.photo import is_photo, read_photo
-    from dreamdrive.data.size import choose_size
+    from dreamdrive.data.pictures.images import read_image
 
     if is_photo(path):
         if frames is not None:
@@ -124,7 +127,7 @@ def _without_guesses(notes: "list[str] | tuple[str, ...]") -> list[str]:
 
 def _check_memory(given: _Pictures) -> None:
     """Refuse more frames than memory holds, before they are looked at."""
-    from dreamdrive.machine import free_bytes
+    from dreamdrive.compute.machine import free_bytes
 
     needed, free = _PIXEL_BYTES * given.frames[..., 0].size, free_bytes()
     if free is not None and needed > free:

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 from rich.console import Console
 from tyro.conf import Positional, arg
 
-from dreamdrive.choices import PlanMethod
-from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.machine import use_all_cores
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import SCENE, check_there
+from dreamdrive.names import PlanMethod
+from dreamdrive.scene.control import check_numbers
 
 if TYPE_CHECKING:
-    from dreamdrive.plan import Avoided, Instant, Plan
     from dreamdrive.scene.scene import Scene
     from dreamdrive.scene.trajectory import Trajectory
+    from dreamdrive.tasks.plan import Avoided, Instant, Plan
 
 CURRENT = "current"
 _LOOKS, _RATE_HZ = 2, 20.0
@@ -47,9 +49,12 @@ def plan(
         output: The folder to write; without it OUT/video/plan_NAME.
         force: Replace an older plan.
     """
+    if at is not None and not math.isfinite(at):
+        raise InputError(f"--at {at}: expected seconds on the clock of the scene")
+    check_numbers(shift_m, None)
+    check_there(out, SCENE)
     use_all_cores()
-    from dreamdrive.plan import path_of_plan
-    from dreamdrive.show import Planned, write_planned
+    from dreamdrive.tasks.plan import PlanResult, path_of_plan, write_planned
 
     scene = open_scene(out)
     name, path, now_s = _wanted(scene, trajectory, at, shift_m)
@@ -61,7 +66,7 @@ def plan(
     with Bars(console) as bars:
         said = partial(bars, "plan", total=len(drive))
         write_planned(
-            folder, scene, Planned(now_s, planned, after, instant, drive), force=force, progress=said
+            folder, scene, PlanResult(now_s, planned, after, instant, drive), force=force, progress=said
         )
     console.print(f"{folder}: {_told(after)}")
 
@@ -70,13 +75,10 @@ def _wanted(
     scene: "Scene", trajectory: str, at: float | None, shift_m: float
 ) -> "tuple[str, Trajectory | None, float]":
     """Name and path of the camera, None for going on as recorded, and the moment of planning."""
-    from dreamdrive.drive import check_numbers, drives_of
+    from dreamdrive.drive import drives_of
 
-    if at is not None and not math.isfinite(at):
-        raise InputError(f"--at {at}: expected seconds on the clock of the scene")
     if trajectory == CURRENT:
         return CURRENT, None, float(scene.trajectory.times_s[-1]) if at is None else at
-    check_numbers(shift_m, None)
     drive = drives_of(scene, [trajectory], shift_m, None)[0]
     first_s, last_s = float(drive.path.times_s[0]), float(drive.path.times_s[-1])
     return drive.name, drive.path, (first_s + last_s) / 2 if at is None else at
@@ -85,7 +87,7 @@ def _wanted(
 def _planned(scene: "Scene", path: "Trajectory | None", now_s: float) -> "tuple[Instant, Plan]":
     import numpy as np
 
-    from dreamdrive.plan import STEP_S, STEPS, Plan, instant_of, plan_of_path
+    from dreamdrive.tasks.plan import STEP_S, STEPS, Plan, instant_of, plan_of_path
 
     straight = np.column_stack([np.zeros(STEPS), STEP_S * np.arange(1, STEPS + 1)])
     count = STEPS
@@ -99,7 +101,7 @@ def _planned(scene: "Scene", path: "Trajectory | None", now_s: float) -> "tuple[
 
 
 def _moved(planned: "Plan", instant: "Instant", method: PlanMethod) -> "Avoided":
-    from dreamdrive.plan import avoid, avoid_as_uniad
+    from dreamdrive.tasks.plan import avoid, avoid_as_uniad
 
     how = avoid if method == "avoid" else avoid_as_uniad
     return how(planned, instant.speed_m_s, instant.obstacles_m)

@@ -6,11 +6,16 @@ from typing import Annotated
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
-from dreamdrive.choices import DeviceName, DtypeName
-from dreamdrive.cli.arguments import PriorName, commands_of, parse_action, parse_size
-from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.cli.progress import Bars
+from dreamdrive.cli.terminal.arguments import PriorName, commands_of, parse_action, parse_size
+from dreamdrive.cli.terminal.asked import asked
+from dreamdrive.cli.terminal.machine import use_all_cores
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import CLIP, check_there
+from dreamdrive.names import DeviceName, DtypeName
+
+_ASKED = ("frames", "fps", "size", "intrinsics", "hfov_deg", "trajectory", "action", "prompt", "steps")
+"""What a prior alone is asked for."""
 
 
 def convert(
@@ -28,6 +33,7 @@ def convert(
         dtype: float16 halves the folder and suits a GPU; the autoencoder stays in float32.
         force: Replace a folder that is there already.
     """
+    check_there(file, "vista.safetensors or svd_xt.safetensors")
     _check_packages()
     from dreamdrive.prior.vista.convert import convert as run
 
@@ -50,17 +56,9 @@ def sample(
     input: Annotated[Positional[Path | None], arg(metavar="INPUT", help_behavior_hint="")] = None,
     *,
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    asked: asked("prior sample", *_ASKED),  # pyright: ignore[reportInvalidTypeForm]
     prior: Annotated[PriorName | None, arg(help_behavior_hint="")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
-    frames: Annotated[str | None, arg(metavar="START:STOP:STEP", help_behavior_hint="")] = None,
-    fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
-    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
-    intrinsics: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    hfov: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="")] = None,
-    trajectory: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
-    action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
-    prompt: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
     device: DeviceName = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     force: bool = False,
@@ -70,39 +68,18 @@ def sample(
     Args:
         input: A photo, a recording or a layout, as the prior takes it.
         out: Folder to write.
+        asked: What is asked of the input; STOP of --frames says how many are made.
         prior: As for generate; without it the input decides.
         weights: Its network: a file, a folder, or the name of a model that the hub's cache holds.
-        frames: Frames to keep, counted from 0; STOP says how many are made.
-        fps: Rate of the frames, before the step of --frames.
-        size: Size of the frames.
-        intrinsics: Calibration of the input.
-        hfov: Horizontal field of view of the input, where there is no calibration.
-        trajectory: Path to drive: JSON or TUM.
-        action: What to do instead, as for generate, such as command=left.
-        prompt: What to show, in words.
-        steps: Steps of the sampler.
         device: Where the network runs.
         seed: Seed of everything random.
         force: Replace a folder that is there already.
     """
+    control = asked.control(input, seed)
     use_all_cores()
-    from dreamdrive.device import computing_on
+    from dreamdrive.compute.device import computing_on
     from dreamdrive.run import sample as run
-    from dreamdrive.scene.control import Control
 
-    control = Control(
-        path=input,
-        frames=frames,
-        fps=fps,
-        size=None if size is None else parse_size(size),
-        intrinsics=intrinsics,
-        hfov_deg=hfov,
-        trajectory=trajectory,
-        action=None if action is None else parse_action(action),
-        prompt=prompt,
-        steps=steps,
-        seed=seed,
-    )
     console = Console(highlight=False)
     with computing_on(device), Bars(console) as bars:
         clip = run(
@@ -162,9 +139,12 @@ def features(
         device: Where the network runs.
         seed: Seed of the noise.
     """
+    wanted = None if size is None else parse_size(size)
+    told = None if action is None else parse_action(action)
+    check_there(clip, CLIP)
     use_all_cores()
     _check_packages()
-    from dreamdrive.device import computing_on
+    from dreamdrive.compute.device import computing_on
     from dreamdrive.run import clip_features
 
     options = {"block": block, "sigma": sigma, "channels": channels}
@@ -176,8 +156,8 @@ def features(
             weights,
             {name: value for name, value in options.items() if value is not None},
             frames=frames,
-            size=None if size is None else parse_size(size),
-            action=None if action is None else parse_action(action),
+            size=wanted,
+            action=told,
             seed=seed,
             progress=lambda done, total: bars("features", done, total),
         )

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.choices import Format, Show
-from dreamdrive.cli.arguments import parse_size
-from dreamdrive.cli.machine import use_all_cores
-from dreamdrive.cli.progress import Bars
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.arguments import parse_size
+from dreamdrive.cli.terminal.machine import use_all_cores
+from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import SCENE, check_there
+from dreamdrive.names import Format, Show
+from dreamdrive.scene.control import check_numbers, check_render_size
 
 if TYPE_CHECKING:
     from dreamdrive.scene.scene import Scene
@@ -49,13 +51,16 @@ def render(
     """
     if not trajectory:
         raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
-    use_all_cores()
-    from dreamdrive.drive import check_numbers, drives_of
-    from dreamdrive.show import RenderOptions, check_size, places, video_rate, write_drive
-
-    options = RenderOptions(show, format, None if size is None else parse_size(size), fps)
+    wanted = None if size is None else parse_size(size)
+    if wanted is not None:
+        check_render_size(wanted, video=format == "mp4")
     check_numbers(shift_m, fps)
-    check_size(options)
+    check_there(out, SCENE)
+    use_all_cores()
+    from dreamdrive.drive import drives_of
+    from dreamdrive.show import RenderOptions, places, video_rate, write_drive
+
+    options = RenderOptions(show, format, wanted, fps)
     scene = _less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":

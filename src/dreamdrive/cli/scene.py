@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
@@ -14,15 +15,12 @@ def open_scene(out: Path) -> "Scene":
     """The scene in an output folder of ``generate``, or in a scene folder itself."""
     from dreamdrive.stored import load_scene
 
-    if not out.exists():
-        raise InputError(f"{out} does not exist; expected the folder that dreamdrive generate wrote")
+    check_there(out, SCENE)
     if (out / "scene.json").is_file():
         return load_scene(out)
     if not (out / "scene").is_dir():
         unfinished = (
             " (it is unfinished: run the same generate command again)" if (out / "stages").is_dir() else ""
         )
-        raise InputError(
-            f"{out} holds no scene{unfinished}; expected the folder that dreamdrive generate wrote"
-        )
+        raise InputError(f"{out} holds no scene{unfinished}; expected {SCENE}")
     return load_scene(inside(out, "scene"))

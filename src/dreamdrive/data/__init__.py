@@ -3,7 +3,19 @@
 All of them raise ``InputError`` where a file or an option cannot be used.
 """
 
-from dreamdrive.data.clip_reader import read_clip
-from dreamdrive.data.dataset import DataSet, Logs, choose_scene, dataset_of, log_of, read_dataset
-from dreamdrive.data.lens import Lens
-from dreamdrive.data.poses import read_trajectories, read_trajectory, write_trajectory
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.data.cameras.lens import SourceLens as SourceLens
+    from dreamdrive.data.cameras.poses import (
+        read_trajectories as read_trajectories,
+        read_trajectory as read_trajectory,
+        write_trajectory as write_trajectory,
+    )
+    from dreamdrive.data.clip_reader import read_clip as read_clip
+    from dreamdrive.data.dataset import DataSet as DataSet, Logs as Logs, choose_scene as choose_scene
+    from dreamdrive.data.input import dataset_of as dataset_of, log_of as log_of, read_dataset as read_dataset
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

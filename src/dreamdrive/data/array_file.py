@@ -21,6 +21,7 @@ ARRAY_BYTES = 256_000_000
 _DIRECTORY_BYTES = 1_000_000
 """Most that the table of contents of an NPZ may hold; each array takes about 100 bytes there."""
 _CHUNK = 1 << 20
+_MOST_SIDES = 8
 # A member of a zip is none of typing's kinds of files.
 _Stream = IO[bytes] | zipfile.ZipExtFile
 # What zipfile and NumPy raise on damaged files.
@@ -85,8 +86,9 @@ def _array(stream: _Stream, at_most: int) -> Shaped[np.ndarray, "*d"]:
     shape, fortran, dtype = _header(stream)
     if dtype.kind not in "biuf" or dtype.itemsize > 8:
         raise InputError(f"holds {dtype}; expected numbers of up to 64 bits")
-    if not all(type(side) is int and side >= 0 for side in shape):
-        raise InputError(f"says that its shape is {shape}")
+    # Long numbers are refused before they are multiplied.
+    if len(shape) > _MOST_SIDES or not all(type(side) is int and 0 <= side < 2**63 for side in shape):
+        raise InputError(f"says that its shape is {briefly(shape)}")
     count = math.prod(shape)
     if _takes(count, dtype) > at_most:
         raise InputError(

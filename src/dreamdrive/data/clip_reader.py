@@ -1,23 +1,24 @@
-"""A recording on disk becomes a clip: pinhole frames of one size, with times and whatever is known."""
+"""Reader of recordings: pinhole frames of one size, with times and whatever is known."""
 
 from collections.abc import Callable
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
-from dreamdrive.data.cuts import find_cuts
+from dreamdrive.data.cameras.intrinsics import Calibration, calibration
+from dreamdrive.data.cameras.poses import of_frames, read_pose_file
 from dreamdrive.data.dataset import DataSet
 from dreamdrive.data.feature_file import read_features
-from dreamdrive.data.images import ImageFolder, RawFrame
-from dreamdrive.data.intrinsics import Calibration, calibration
-from dreamdrive.data.poses import of_frames, read_pose_file
-from dreamdrive.data.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
-from dreamdrive.data.sampler import Sampler, check_pictures, most_frames, too_many
-from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.frames.cuts import find_cuts
+from dreamdrive.data.frames.remarks import of_cuts, of_damage, of_missing_images, of_time_jumps
+from dreamdrive.data.frames.select import MAX_FRAMES, Selection, held_out_mask, of_thinning, thinning
+from dreamdrive.data.pictures.images import ImageFolder, RawFrame
+from dreamdrive.data.pictures.sampler import Sampler, check_pictures, most_frames, too_many
+from dreamdrive.data.pictures.video import RATES_HZ, Video
 from dreamdrive.data.source import Source, one_frame, open_source
-from dreamdrive.data.video import RATES_HZ, Video
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.trajectory import Trajectory
@@ -48,7 +49,8 @@ def read_clip(
 
     Args:
         path: Video or folder of images.
-        frames: ``START:STOP:STEP`` over source indices (file or decode order); all without it.
+        frames: ``START:STOP:STEP`` over source indices (file or decode order). Without it all, or where
+            these are more than ``MAX_FRAMES`` every second one, every fourth, and so on.
         fps: Rate of the input before the step. Without it a video's own times count, and those that
             the names of images tell; else a folder has 10 Hz.
         size: Exact width and height; without it 480 wide, or the source's width if that is less.
@@ -66,10 +68,12 @@ def read_clip(
         raise InputError(f"--fps {fps:g}: expected a positive number of frames a second")
     source = open_source(path)
     chosen = Selection.parse(frames)
-    sampler, read = _gather(source, chosen, size, lambda of: calibration(of, intrinsics, hfov_deg))
+    thin = _thinning(source, fps) if chosen.is_whole else _all_of_them
+    sampler, read = _gather(source, chosen, size, lambda of: calibration(of, intrinsics, hfov_deg), thin)
     index, clock_s = np.array([raw.index for raw in read]), [raw.time_s for raw in read]
     times_s, said = _times(source, index, clock_s, fps)
     listed = source.notes if isinstance(source, ImageFolder) else ()
+    said += of_thinning(int(index[1] - index[0])) if chosen.is_whole else ()
     notes = [*listed, *said, *dict.fromkeys(note for raw in read for note in raw.notes), *sampler.notes]
 
     def poses_in(file: Path | None, option: str) -> Float[np.ndarray, "f 4 4"] | None:
@@ -81,16 +85,13 @@ def read_clip(
         return found
 
     known_poses, asked = poses_in(poses, "--poses"), poses_in(trajectory, "--trajectory")
-    valid = np.array([raw.opaque for raw in read], bool)
-    if not valid.any():
-        raise InputError(
-            f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
-        )
-    frames_rgb = np.stack([raw.rgb for raw in read])
-    check_pictures(frames_rgb, valid, path)
+    frames_rgb, valid = _stacked(read, path)
     found = find_cuts(frames_rgb, valid)
-    notes += of_damage([raw.index for raw in read if raw.damaged])
-    notes += [*_gaps(source, index, clock_s, fps), *of_cuts(found, index)]
+    notes += [
+        *of_damage([raw.index for raw in read if raw.damaged]),
+        *_gaps(source, index, clock_s, fps),
+        *of_cuts(found, index),
+    ]
     given = None if features is None else read_features(features).of_frames(index, source.count, features)
     return Clip(
         frames=frames_rgb,
@@ -113,17 +114,35 @@ def read_clip(
     )
 
 
+def _thinning(source: Source, fps: float | None) -> Callable[[int], int]:
+    """The step between frames of so many, none of which somebody chose."""
+    rate_hz = fps or (source.rate_hz if isinstance(source, Video) else None) or FOLDER_RATE_HZ
+    return partial(thinning, rate_hz=rate_hz, most=MAX_FRAMES)
+
+
+def _all_of_them(count: int) -> int:
+    """The step between frames that somebody chose."""
+    return 1
+
+
 def _gather(
     source: Source,
     selection: Selection,
     size: tuple[int, int] | None,
     calibrated: Callable[[tuple[int, int]], Calibration],
+    thin: Callable[[int], int],
 ) -> tuple[Sampler, list[RawFrame]]:
-    """The selected frames, each brought to the clip's size as it comes."""
+    """The selected frames, each brought to the clip's size as it comes; ``thin`` tells their step."""
     count = source.count() if selection.needs_count or isinstance(source, ImageFolder) else None
+    wanted = selection.resolve(count, str(source.path))
     sampler: Sampler | None = None
-    read, most = list[RawFrame](), 0
-    for raw in source.read(selection.resolve(count, str(source.path))):
+    read, most, step = list[RawFrame](), 0, 1
+    for raw in source.read(wanted if count is None else wanted[:: thin(count)]):
+        if count is None and (wider := thin(raw.index + 1)) > step:
+            # A video does not tell how many frames it has: those that were read are thinned.
+            read, step = read[:: wider // step], wider
+        if raw.index % step:
+            continue
         if sampler is None:
             sampler = Sampler.create(raw.size, size, calibrated(raw.size))
             most = most_frames(sampler.sizing.target)
@@ -139,6 +158,20 @@ def _gather(
     if sampler is None or len(read) < 2:
         raise one_frame(source.path)
     return sampler, read
+
+
+def _stacked(
+    read: list[RawFrame], path: Path
+) -> tuple[UInt8[np.ndarray, "f h w 3"], Bool[np.ndarray, "f h w"]]:
+    """The frames and where they hold a picture; refuses frames of nothing."""
+    valid = np.array([raw.opaque for raw in read], bool)
+    if not valid.any():
+        raise InputError(
+            f"{path}: every pixel is transparent or outside the calibrated lens; nothing is left"
+        )
+    frames_rgb = np.stack([raw.rgb for raw in read])
+    check_pictures(frames_rgb, valid, path)
+    return frames_rgb, valid
 
 
 def _times(

@@ -1,8 +1,9 @@
-"""What lies beside the frames in a folder: masks, depth, the same pictures again, other cameras."""
+"""Files beside the frames of a folder: masks, depth, the same pictures again, other cameras."""
 
+import filecmp
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,11 @@ _WORD = (
 """Words by which names tell what is no frame."""
 _BEHIND = re.compile(rf"(?:(?:[^a-z0-9]+|(?<=\d)){_WORD})+$")
 _BEFORE = re.compile(rf"^(?:{_WORD}(?:[^a-z0-9]+|(?=\d)))+")
+_COPY = re.compile(
+    r"^(?:copy (?:\(\d+\) )?of (?P<a>.+)"
+    r"|(?P<b>.+?)(?: \(\d+\)|(?: - |[ _-])(?:copy|kopie|copie|copia)(?:[ _-]?\(?\d+\)?)?))$"
+)
+"""Names that file managers give to copies."""
 _KEPT = (".png", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".jpg", ".jpeg")
 """Of the same picture in several kinds, the first of these is read: what loses nothing comes first."""
 _NAMED = 3
@@ -32,7 +38,7 @@ def frames_among(files: Sequence[Path]) -> Listed:
     """Those of the images of a folder that are frames, in the same order.
 
     An image beside a frame is none where its name is that of the frame with a word such as ``mask`` or
-    ``depth``, or where it is the same name in another kind of file.
+    ``depth``, where it is the same name in another kind of file, or a copy of it by its name and its bytes.
 
     Raises:
         InputError: The images are several series with the same numbers, such as those of two cameras.
@@ -44,15 +50,20 @@ def frames_among(files: Sequence[Path]) -> Listed:
     beside = [
         file for file in files if (stem := file.stem.casefold()) not in bare and _frame_of(stem) in bare
     ]
-    kept = [file for file in files if file not in set(beside)]
-    again = [file for file in kept if file is not _best(stems[file.stem.casefold()])]
-    frames = [file for file in kept if file not in set(again)]
+    left_out = set(beside)
+    kept = [file for file in files if file not in left_out]
+    best = {id(_best(twins)) for twins in stems.values()}
+    again = [file for file in kept if id(file) not in best]
+    copies = [file for file in kept if _is_copy(file, stems)]
+    without = {*again, *copies}
+    frames = [file for file in kept if file not in without]
     notes = [
         f"{len(out)} images beside the frames are {what} and left out, such as "
         f"{', '.join(file.name for file in out[:_NAMED])}."
         for out, what in (
             (beside, "no frames by their names"),
             (again, "the same ones in another kind of file"),
+            (copies, "copies of others in the folder"),
         )
         if out
     ]
@@ -63,6 +74,13 @@ def frames_among(files: Sequence[Path]) -> Listed:
 def _frame_of(stem: str) -> str:
     """The name without the words at its end or start that tell of no frame."""
     return _BEFORE.sub("", _BEHIND.sub("", stem))
+
+
+def _is_copy(file: Path, stems: Mapping[str, Sequence[Path]]) -> bool:
+    """Whether its name says that it is a copy of one of the others, and it is."""
+    match = _COPY.match(file.stem.casefold())
+    first = stems.get(match["a"] or match["b"], ()) if match else ()
+    return any(filecmp.cmp(file, other, shallow=False) for other in first)
 
 
 def _best(twins: Sequence[Path]) -> Path:

@@ -1,15 +1,13 @@
-"""What turns a path into the clip of a recording."""
+"""Data sets as readers: from a path to the clip of a recording."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from inspect import signature
 from pathlib import Path
 
-from dreamdrive.choices import DATASETS
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
-from dreamdrive.scene.log import Log
+from dreamdrive.scene.street.log import Log
 
 _SHOWN = 10
 """Names of scenes that a message lists."""
@@ -22,10 +20,13 @@ class Logs:
     Attributes:
         names: Of the drives at a path.
         read: A drive by its name.
+        clip: From a drive that is open and the keywords of ``DataSet.read``, but for path and scene, to its
+            clip; None where the data set opens it again for that.
     """
 
     names: Callable[[Path], tuple[str, ...]]
     read: Callable[[Path, str], Log]
+    clip: Callable[..., Clip] | None = None
 
     def open(self, path: Path, scene: str | None) -> Log:
         """A drive by its name or number, see ``choose_scene``."""
@@ -58,35 +59,6 @@ class DataSet:
     def takes(self) -> frozenset[str]:
         """Names of the fields of ``Control`` that it honours."""
         return frozenset(signature(self.read).parameters)
-
-
-def dataset_of(name: str | None, path: Path) -> DataSet:
-    """The data set of that name, or the first of dreamdrive's own that recognises the path.
-
-    Outside packages are asked by name only: what is installed beside it never changes what a command does.
-    """
-    if name is None:
-        return next(each for each in map(DATASETS.choose, DATASETS.own) if each.recognises(path))
-    chosen = DATASETS.choose(name)
-    if not chosen.recognises(path):
-        raise InputError(f"--dataset {name}: {path} is not one of it; expected {chosen.about}")
-    return chosen
-
-
-def read_dataset(control: Control) -> Clip:
-    """The clip of ``control.path``, whose data set takes every field that is given."""
-    assert control.path is not None
-    chosen = dataset_of(control.dataset, control.path)
-    control.check_taken(chosen.takes | {"dataset"}, f"{control.path} ({chosen.about})")
-    return chosen.read(**{name: getattr(control, name) for name in chosen.takes})
-
-
-def log_of(control: Control) -> Log | None:
-    """The drive that is asked for, of a data set that has logs; else None."""
-    if control.path is None:
-        return None
-    logs = dataset_of(control.dataset, control.path).logs
-    return None if logs is None else logs.open(control.path, control.scene)
 
 
 def choose_scene(names: tuple[str, ...], given: str | None, path: Path) -> str:

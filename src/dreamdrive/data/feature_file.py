@@ -16,8 +16,8 @@ from jaxtyping import Float, Int
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from dreamdrive.data.lens import Lens
-from dreamdrive.data.size import Sizing
+from dreamdrive.data.cameras.lens import SourceLens
+from dreamdrive.data.frames.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import parse_json
 from dreamdrive.files.output import new_file
@@ -77,7 +77,7 @@ class FeatureFile:
         return np.array([row_of[frame] for frame in index.tolist()])
 
     def cropped(
-        self, sizing: Sizing, lens: Lens | None, path: Path | None
+        self, sizing: Sizing, lens: SourceLens | None, path: Path | None
     ) -> dict[str, Float[np.ndarray, "f _ _ _"]]:
         """The features of what is left of the pictures in the clip; bilinear where something was cut away."""
         if lens is not None:

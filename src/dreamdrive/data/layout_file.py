@@ -9,7 +9,7 @@ import shapely
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.files.output import new_file
-from dreamdrive.scene.layout import Layout, Ring
+from dreamdrive.scene.street.layout import Layout, Ring
 
 MOST_BOXES = 255
 """Road users have labels of 8 bits, 0 for none."""

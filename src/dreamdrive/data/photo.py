@@ -1,4 +1,4 @@
-"""What a video model starts from: a photo, or the first frames of a recording."""
+"""Reader of the photo, or the first frames, that a video model starts from."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.data.exif import PhotoFacts, read_exif
-from dreamdrive.data.images import SUFFIXES, RawFrame, read_image
-from dreamdrive.data.intrinsics import Calibration, calibration
-from dreamdrive.data.lens import Lens, Undistorter
-from dreamdrive.data.panorama import USUAL_HFOV_DEG, is_panorama, view_of
-from dreamdrive.data.remarks import of_damage
-from dreamdrive.data.select import UNBOUNDED
-from dreamdrive.data.size import cover
+from dreamdrive.data.cameras.intrinsics import Calibration, calibration
+from dreamdrive.data.cameras.lens import SourceLens, Undistorter
+from dreamdrive.data.frames.remarks import of_damage
+from dreamdrive.data.frames.select import UNBOUNDED
+from dreamdrive.data.frames.size import cover
+from dreamdrive.data.pictures.exif import PhotoFacts, read_exif
+from dreamdrive.data.pictures.images import SUFFIXES, RawFrame, read_image
+from dreamdrive.data.pictures.panorama import USUAL_HFOV_DEG, is_panorama, view_of
+from dreamdrive.data.pictures.video import Video
 from dreamdrive.data.source import open_source
-from dreamdrive.data.video import Video
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -73,7 +73,7 @@ def read_photo(
     if known.distortion is None:
         rgb = sizing.apply(raw.rgb)
     else:
-        rgb = Undistorter.create(Lens(known.distortion, camera), known.camera, sizing).apply(raw.rgb)
+        rgb = Undistorter.create(SourceLens(known.distortion, camera), known.camera, sizing).apply(raw.rgb)
     cut = 1 - min(sizing.target[axis] / sizing.scaled[axis] for axis in (0, 1))
     if cut > _WORTH_A_NOTE:
         notes.append(f"{100 * cut:.0f} % of the photo was cut away to fit the model's {size[0]}x{size[1]}.")

@@ -17,20 +17,19 @@ from typing import Any
 
 import numpy as np
 
+from dreamdrive.data.cameras.poses import write_trajectory
 from dreamdrive.data.feature_file import FeatureFile, write_features
 from dreamdrive.data.formats.cameras import indexed_pinhole
-from dreamdrive.data.picture_file import write_picture
-from dreamdrive.data.poses import write_trajectory
+from dreamdrive.data.pictures.picture_file import write_picture
+from dreamdrive.data.pictures.video_writer import write_video
 from dreamdrive.data.rig import write_rig
-from dreamdrive.data.video_writer import write_video
 from dreamdrive.files.json_file import write_json
+from dreamdrive.files.kinds import RECORDING_KIND
 from dreamdrive.files.output import new_folder
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.trajectory import Trajectory
 
 ABOUT = "provenance.json"
-KIND = "recording"
-"""As what a folder that was written here is known."""
 _INTRINSICS = "intrinsics.json"
 
 
@@ -53,7 +52,7 @@ def write_recording(clip: Clip, folder: Path, about: dict[str, Any], *, replace:
         "log": None if clip.log is None else asdict(clip.log),
         "provenance": clip.provenance,
     }
-    with new_folder(folder, replace=replace, kind=KIND) as made:
+    with new_folder(folder, replace=replace, kind=RECORDING_KIND) as made:
         if len(clip.rig) == 1:
             _write_camera(clip, made)
         else:

@@ -36,7 +36,7 @@ class _Rig(msgspec.Struct):
 
 
 @dataclass(frozen=True)
-class Mounted:
+class _Mounted:
     """A camera of a rig: its frames, its calibration, and its pose in metres, x right, y down, z ahead."""
 
     frames: Path
@@ -49,7 +49,7 @@ def is_rig(path: Path) -> bool:
     return (path / RIG).is_file()
 
 
-def read_rig(path: Path) -> tuple[Mounted, ...]:
+def read_rig(path: Path) -> tuple[_Mounted, ...]:
     """The cameras of a rig; paths in its file count from its folder."""
     try:
         listed = of_type(read_json(path / RIG, "input"), _Rig, str(path / RIG)).cameras
@@ -109,12 +109,13 @@ def read_rig_clip(
         if len(part) != len(parts[0]) or part.size != parts[0].size:
             got, wanted = (f"{len(p)} frames of {p.size[0]}x{p.size[1]}" for p in (part, parts[0]))
             raise InputError(
-                f"{camera.frames} gives {got}, {cameras[0].frames} gives {wanted}; expected the same"
+                f"{camera.frames} gives {got}, {cameras[0].frames} gives {wanted}; expected the same: cut "
+                "the pictures to one shape, or leave the camera out of the rig"
             )
     return _woven(path, cameras, parts)
 
 
-def _mounted(path: Path, index: int, entry: _Entry) -> Mounted:
+def _mounted(path: Path, index: int, entry: _Entry) -> _Mounted:
     name, given = f"{path / RIG}: camera {index}", entry.intrinsics
     for each in (entry.frames, *([] if given is None else [given])):
         if not is_path(each):
@@ -124,10 +125,10 @@ def _mounted(path: Path, index: int, entry: _Entry) -> Mounted:
         check_rigid(pose, "car_from_camera")
     except ValueError as error:
         raise InputError(f"{name} has no rigid pose: {error}") from None
-    return Mounted(path / entry.frames, None if given is None else path / given, pose)
+    return _Mounted(path / entry.frames, None if given is None else path / given, pose)
 
 
-def _woven(path: Path, cameras: tuple[Mounted, ...], parts: list[Clip]) -> Clip:
+def _woven(path: Path, cameras: tuple[_Mounted, ...], parts: list[Clip]) -> Clip:
     """One clip in the order of time, the cameras of a time in the order of the rig."""
     steps, count = len(parts[0]), len(parts)
     part, row = np.tile(np.arange(count), steps), np.repeat(np.arange(steps), count)

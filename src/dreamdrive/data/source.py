@@ -1,10 +1,11 @@
-"""What an input path is: a video, a folder of images, or something that is no recording."""
+"""The kind of an input path: a video, a folder of images, or something that is no recording."""
 
 from pathlib import Path
 
-from dreamdrive.data.images import SUFFIXES, UNREAD, ImageFolder
-from dreamdrive.data.video import Video
+from dreamdrive.data.pictures.images import SUFFIXES, UNREAD, ImageFolder
+from dreamdrive.data.pictures.video import Video
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import CLIP, check_there
 
 Source = ImageFolder | Video
 """A numbered sequence of pictures."""
@@ -12,8 +13,7 @@ Source = ImageFolder | Video
 
 def open_source(path: Path) -> Source:
     """Open a recording; of a folder with ``frames`` in it, as ``world make`` writes, the images there."""
-    if not path.exists():
-        raise InputError(f"{path} does not exist; expected a video or a folder of images")
+    check_there(path, CLIP)
     if path.is_dir():
         frames = path / "frames"
         return ImageFolder.open(frames if frames.is_dir() else path)

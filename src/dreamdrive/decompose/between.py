@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from dreamdrive.decompose.flow import blended
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.trajectory import Trajectory
+from dreamdrive.vision.flow import blended
 
 
 def with_between(clip: Clip, geometry: Geometry) -> tuple[Clip, Geometry]:
@@ -53,7 +53,7 @@ def with_between(clip: Clip, geometry: Geometry) -> tuple[Clip, Geometry]:
     )
     maps = {name: empty(getattr(geometry, name)) for name in ("depth_m", "confidence", "sky", "moving")}
     return denser, replace(
-        geometry, cameras=tuple(cameras[i] for i in order), spread=None, users=None, **maps
+        geometry, cameras=tuple(cameras[i] for i in order), spread=None, road_users=None, **maps
     )
 
 

@@ -1,17 +1,18 @@
-"""Where static Gaussians fail: renders of the static fit and their distance from the frames (eq. 5-6)."""
+"""Error maps: renders of the static fit and their distance from the frames (eq. 5-6)."""
 
 import cv2
 import numpy as np
 import torch
 from jaxtyping import Float
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.windows import grown
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import render
+from dreamdrive.vision.windows import grown
 
 
 def error_maps(

@@ -12,42 +12,31 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from dreamdrive.decompose.density import density_labels, voted
-from dreamdrive.decompose.flow import carried, cells, neighbour_flow
 from dreamdrive.decompose.on_road import on_road
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.linked_pixels import linked_pixels
+from dreamdrive.vision.flow import carried, cells, neighbour_flow
+from dreamdrive.vision.linked_pixels import linked_pixels
 
 
 @dataclass(frozen=True)
 class GroupOptions:
-    """Constants of the grouping.
-
-    Figures are the mean IoU of what moves on four drawn streets with corrupted references and true poses
-    (``benchmarks/ablation.py``), 0.503 with these defaults but ``road=None``.
+    """Constants of the grouping; what they are worth: docs/results/ablation.md.
 
     Attributes:
-        threshold: tau of eq. 9: a Gaussian votes dynamic above it. With 0.2 0.469, 0.5 0.503, 0.65 0.492.
+        threshold: tau of eq. 9: a Gaussian votes dynamic above it.
         candidate: Only Gaussians above this score are clustered; the rest is one static mass.
         reach_depth: Neighbours of one source frame differ by at most this in the logarithm of depth.
-        link: A label that flow carries onto a cluster keeps its points if it has this share of the strongest
-            label's; weaker ones are noise.
-        link_depth: Flow carries a label only onto points whose depth differs by at most this in the
-            logarithm: a car that passes behind another stays itself.
+        link: Share of the strongest label's points that keeps a label which flow carries: less is noise.
+        link_depth: Log depth by which flow's labels may differ: a car that passes behind stays itself.
         join: Labels that hang together in this share of their common frames are one thing.
-        majority: Share of votes that makes a whole cluster dynamic ...
-        certain: ... if there is a core of members above this score ...
-        core: ... which is at least this share. Foliage and railings, which a short fit gets wrong everywhere
-            a little, cross tau but have no core.
+        majority: Share of votes that makes a whole cluster dynamic, if it has a core.
+        certain: Score above which a member is one of the core.
+        core: Least share of the core: foliage and railings, fitted badly everywhere a little, have none.
         smallest: Clusters with fewer Gaussians are static: a few stray points are no object.
-        road: What lies lower over the road plane than this share of the first camera's height is road, see
-            ``on_road``, if there is a plane. None lets shadows move with their cars (the paper): on eight
-            streets 0.505 in place of 0.529, and standing things seem to move 42 mm in place of 29.
-        clusters: What votes together: ``"flow"``, what hangs together in frames and along optical flow;
-            ``"density"``, clusters of HDBSCAN over all Gaussians, of which ``majority`` and ``smallest``
-            alone count (the paper); ``"none"``, each for itself: 0.495, but there are no things then that
-            could have tracks, and held-out frames lose 0.7 dB.
+        road: What lies lower over the road than this share of the camera's height is road; None: no test.
+        clusters: By ``"flow"``, by HDBSCAN (``"density"``, the paper), or each for itself (``"none"``).
         users: Whether a road user that the street network sees, and that was followed, is one cluster.
     """
 
@@ -127,9 +116,9 @@ def _labels(
     reach_px: float,
 ) -> Int[np.ndarray, " m"]:
     """One label a thing: road users that were followed are one each; flow joins the rest."""
-    if geometry.users is None or not options.users:
+    if geometry.road_users is None or not options.users:
         return _space_time_labels(clip, points, frames, options, reach_px)
-    user = geometry.users[frames, *cells(points, geometry.users.shape[1:])].astype(np.int64)
+    user = geometry.road_users[frames, *cells(points, geometry.road_users.shape[1:])].astype(np.int64)
     labels, rest = user - 1, user == 0
     others = _space_time_labels(clip, points[rest], frames[rest], options, reach_px)
     labels[rest] = others + int(user.max(initial=0))

@@ -9,44 +9,34 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.decompose.errors import smoothed
 from dreamdrive.motion import encode
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import render
 
 TargetName = Literal["error", "error_and_evidence"]
 
 
 @dataclass(frozen=True)
 class ScoreOptions:
-    """Constants of the scoring.
-
-    Figures are the mean IoU of what moves on four drawn streets with corrupted references and true poses
-    (``benchmarks/ablation.py``), where all defaults together, with shadows that move, reach 0.503; the
-    paper's target and window, without moving evidence among the features, 0.150.
+    """Constants of the scoring; what they are worth: docs/results/ablation.md.
 
     Attributes:
-        target: What the splatted scores are compared with: ``"error"`` is the paper's error map (eq. 8),
-            0.470; ``"error_and_evidence"`` also asks the recorded clip's moving evidence.
-        error_scale: Error that counts as 1: absolute, so that a street where nothing moves scores nothing.
-            With 0.1 0.482, with 0.4 0.483, relative to each frame's own errors 0.492.
+        target: The paper's error map (eq. 8), ``"error"``, or the recorded clip's moving evidence with it.
+        error_scale: Error that counts as 1: absolute, so that where nothing moves nothing scores.
         error_sigma_px: Blur of the error maps.
         steps: Training steps, one frame each.
         rate: Adam's step.
         width: Units of the two hidden layers.
         position_frequencies: Octaves of the encoding of the position.
         shrink: The splat of the scores is compared at this fraction of the size.
-        window: Scores are splatted only into frames within this many training frames of their source; None
-            splats all into all (the paper). A car's copy stands on empty road in all frames but a few:
-            averaged over all, its target is that of the road, and nothing fast ever crosses the threshold:
-            0.284.
-        balance: Share of the weight that what moves gets where it covers less: a walker alone is a thousandth
-            of a frame, and scores of a fit to so few pixels never reach the threshold. None weighs all pixels
-            alike (the paper).
-        most_weight: Of a pixel that moves, by balance.
+        window: Training frames around its source in which a score counts: elsewhere the road is empty.
+        balance: Least share of the weight for what moves: a walker is a thousandth of a frame.
+        most_weight: Most weight of a pixel that moves, by balance.
     """
 
     target: TargetName = "error_and_evidence"

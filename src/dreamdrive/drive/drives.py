@@ -1,7 +1,6 @@
-"""Which drives through a scene are asked for, and whether the scene has seen what lies along them."""
+"""Drives that are asked for, and whether the scene has seen what lies along them."""
 
 import logging
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,14 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.data import read_trajectory
-from dreamdrive.drive.manoeuvres import LANE_M, MANOEUVRES, manoeuvre, resampled, smooth, up_of
+from dreamdrive.drive.manoeuvres import LANE_M, MANOEUVRES, manoeuvre, resampled, smooth
 from dreamdrive.errors import InputError
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.splat import render_scene
 
-RATES_HZ = (0.1, 240.0)
-"""Rates that ``--fps`` takes: from a picture every ten seconds to the fastest that players show."""
 MAX_FRAMES = 100_000
 """Most frames of a drive: an hour and a half at 20 Hz."""
 LEAST_SEEN = 0.1
@@ -39,14 +36,6 @@ class Drive:
 
     name: str
     path: Trajectory
-
-
-def check_numbers(shift_m: float, fps: float | None) -> None:
-    """Refuse what no drive can be made with, before anything is loaded."""
-    if not math.isfinite(shift_m):
-        raise InputError(f"--shift-m {shift_m:g}: expected metres to the right, such as 2 or -2")
-    if fps is not None and not RATES_HZ[0] <= fps <= RATES_HZ[1]:
-        raise InputError(f"--fps {fps:g}: expected {RATES_HZ[0]:g} to {RATES_HZ[1]:g} frames a second")
 
 
 def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | None) -> list[Drive]:
@@ -71,7 +60,7 @@ def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | 
 
 def _drive(scene: Scene, wanted: str, shift_m: float, fps: float | None) -> Drive:
     if wanted in MANOEUVRES:
-        name, path = wanted, manoeuvre(wanted, smooth(scene.trajectory), up_of(scene), shift_m)
+        name, path = wanted, manoeuvre(wanted, smooth(scene.trajectory), scene.up, shift_m)
     else:
         file = Path(wanted)
         if not file.exists():

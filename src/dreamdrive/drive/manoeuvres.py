@@ -9,7 +9,6 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
-from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 
 TURN_RAD = np.deg2rad(30.0)
@@ -69,7 +68,7 @@ def lane_right(recorded: Trajectory, up: Up, right_m: float = LANE_M) -> Traject
     # The steepest slope of smoothstep is 1.5.
     largest = float(np.tan(STEEPEST_RAD)) * change_m / 1.5
     if abs(right_m) > largest:
-        short = "the drive is %.1f m long and moves %.1f of the wanted %.1f m"
+        short = "a drive of %.1f m is too short to change lanes: it moves %.1f of %.1f m to the side"
         _log.warning(short, recorded.length_m, largest, abs(right_m))
         right_m = float(np.clip(right_m, -largest, largest))
     if change_m == 0:
@@ -119,11 +118,6 @@ def smooth(path: Trajectory) -> Trajectory:
     """A drive with as many poses between the recorded ones as ``SMOOTH_HZ`` takes."""
     rate = frame_rate(path)
     return resampled(path, rate * float(np.ceil(SMOOTH_HZ / rate)))
-
-
-def up_of(scene: Scene) -> Float[np.ndarray, "3"]:
-    """Unit vector away from the road; that of a level camera where no road was found."""
-    return np.array(scene.provenance.up or (0.0, -1.0, 0.0))
 
 
 def _share(values: np.ndarray) -> np.ndarray:

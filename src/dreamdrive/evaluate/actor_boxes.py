@@ -8,13 +8,13 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import linear_sum_assignment
 
-from dreamdrive.evaluate.truth import Truth
+from dreamdrive.evaluate.truth.drawn import Truth
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity
+from dreamdrive.scene.street.truth import WorldBox
 from dreamdrive.splat import render_scene
-from dreamdrive.world import WorldBox
 
 LEAST_PX = 200
 """Pixels of a frame from which on a road user or an actor counts."""

@@ -1,4 +1,4 @@
-"""Where a scene shows the road users of a world, against where they are."""
+"""Errors of the places where a scene shows the road users of a world."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,12 +8,13 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from dreamdrive.evaluate.truth import Truth
+from dreamdrive.compute.threads import one_torch_thread
+from dreamdrive.evaluate.truth.drawn import Truth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import render
 
 LEAST_SHARE = 1e-3
 """Share of the picture that a road user has to fill at a time to be looked for."""

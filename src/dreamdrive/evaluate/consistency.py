@@ -1,9 +1,7 @@
-"""Whether a video keeps to the path it was asked for and shows one and the same world."""
+"""Consistency of a video: it keeps to the path it was asked for, and shows one and the same world."""
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,10 +9,11 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.epipolar import EpipolarShare, epipolar_share
-from dreamdrive.evaluate.paths import PathError, compare_paths
 from dreamdrive.evaluate.warp_error import WarpError, warp_error
+from dreamdrive.files.output import temporary_folder
 from dreamdrive.geometry.cameras import MIN_TRACKS, fill, odometry, settle, sfm
 from dreamdrive.geometry.evidence import Evidence, Features, features, observe, resized, working_frames
+from dreamdrive.metrics.paths import PathError, compare_paths
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Ground
@@ -176,8 +175,8 @@ def _recovered(
 
 
 def _mapped(clip: Clip, seen: Evidence, found: Sequence[Features], seed: int) -> Recovered | None:
-    with tempfile.TemporaryDirectory(prefix="dreamdrive-path-") as folder:
-        database = Path(folder) / "matches.db"
+    with temporary_folder() as folder:
+        database = folder / "matches.db"
         sfm.match(database, found, seen.working, seed)
         model = sfm.map_globally(database, len(clip), seed)
         if model is None or model.registered.mean() < MIN_PLACED:

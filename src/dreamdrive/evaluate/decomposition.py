@@ -1,4 +1,4 @@
-"""How well a scene tells what moves from what does not, against the truth of a simulated world."""
+"""Scores of a scene's decomposition against the truth of a simulated world."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.evaluate.actor_boxes import BoxError, box_error
 from dreamdrive.evaluate.actor_places import ActorError, actor_error
-from dreamdrive.evaluate.retrieval import Retrieval, retrieval
-from dreamdrive.evaluate.truth import Truth, views_of
+from dreamdrive.evaluate.truth.drawn import Truth, views_of
+from dreamdrive.metrics.retrieval import Retrieval, retrieval
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
@@ -157,18 +157,18 @@ def _look(scene: Scene, views: Sequence[Camera]) -> list[_Seen]:
     """Every frame, with the ways of the dynamic Gaussians as a further channel."""
     times_s = scene.times_s.tolist()
     centres = np.stack([places(scene, t_s)[len(scene.static) :] for t_s in times_s])
-    lives = _lives(scene)
+    alive = _alive(scene)
     seen: list[_Seen] = []
     for frame, (camera, t_s) in enumerate(zip(views, times_s, strict=True)):
         living = scene.dynamic.alive_at(t_s).numpy()
-        moves = _moves(centres[:, living], lives[:, living], frame)
+        moves = _moves(centres[:, living], alive[:, living], frame)
         channel = torch.cat([torch.zeros(len(scene.static)), torch.from_numpy(moves.astype(np.float32))])
         view = render_scene(scene, camera, t_s, channels=channel[:, None])
         seen.append(_Seen(view.dynamic_share.numpy(), view.alpha.numpy(), view.channels[..., 0].numpy()))
     return seen
 
 
-def _lives(scene: Scene) -> Float[np.ndarray, "f n"]:
+def _alive(scene: Scene) -> Float[np.ndarray, "f n"]:
     """Share of its opacity that each dynamic Gaussian has at each frame's time."""
     times_s = torch.from_numpy(scene.times_s)[:, None]
     if scene.dynamic.lifespan is None:
@@ -178,12 +178,12 @@ def _lives(scene: Scene) -> Float[np.ndarray, "f n"]:
 
 
 def _moves(
-    centres: Float[np.ndarray, "f n 3"], lives: Float[np.ndarray, "f n"], frame: int
+    centres: Float[np.ndarray, "f n 3"], alive: Float[np.ndarray, "f n"], frame: int
 ) -> Float[np.ndarray, " n"]:
-    """Mean distance (N,) from the place in a frame to those in the other frames, as far as it lives then."""
+    """Mean distance (N,) from the place in a frame to those in others, as far as it is alive there."""
     others = np.arange(len(centres)) != frame
     distance = np.linalg.norm(centres[others] - centres[frame], axis=2)
-    weight = lives[others]
+    weight = alive[others]
     return (weight * distance).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-9)
 
 

@@ -1,4 +1,4 @@
-"""Whether matched points lie where the poses of their frames allow."""
+"""Epipolar errors of matched points under given poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the geometry stage found for the frames of a scene."""
+"""The cameras and depth that the geometry stage found for the frames of a scene."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How good the cameras and the depth of a scene are, against known poses and lidar or exact depth."""
+"""Errors of a scene's cameras and depth against known poses and lidar or exact depth."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from scipy.stats import rankdata
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.estimate import Estimate
-from dreamdrive.evaluate.geometry_truth import GeometryTruth
-from dreamdrive.evaluate.paths import PathError, compare_paths
+from dreamdrive.evaluate.truth.geometry import GeometryTruth
+from dreamdrive.metrics.paths import PathError, compare_paths
 
 BANDS_M = ((0.0, 10.0), (10.0, 20.0), (20.0, 40.0), (40.0, 80.0))
 """Bands of true depth; the far end belongs to a band, the near end does not. Nothing beyond counts."""

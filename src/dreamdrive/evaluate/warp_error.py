@@ -1,4 +1,4 @@
-"""How much colours change along the motion of a video."""
+"""The warp error: how much colours change along the motion of a video."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.decompose import neighbour_flow
-from dreamdrive.geometry.depth import parallel, single_threaded_opencv
+from dreamdrive.compute.threads import parallel
 from dreamdrive.geometry.moving import pixel_grid
 from dreamdrive.scene.clip import Clip
+from dreamdrive.vision.flow import neighbour_flow, single_threaded_opencv
 
 _ROUND_TRIP_PX = 0.5
 _STEPS_KEPT = 64  # more than two threads need at once; a long clip's flows would fill the memory

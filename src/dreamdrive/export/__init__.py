@@ -1,33 +1,42 @@
 """Scenes and drawn streets in other formats."""
 
-from collections.abc import Callable
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dreamdrive.choices import ExportKind
-from dreamdrive.errors import InputError
-from dreamdrive.export.mcap import scene_to_mcap, world_to_mcap, write_mcap
-from dreamdrive.export.mcap_file import need_foxglove
-from dreamdrive.export.mcap_words import RecordedBox
-from dreamdrive.export.mcap_writer import DriveRecording, check_mcap, ground_pose
-from dreamdrive.export.ncore import scene_to_ncore, world_to_ncore
-from dreamdrive.export.ncore_words import need_ncore
-from dreamdrive.export.ncore_writer import KIND as NCORE_KIND
-from dreamdrive.export.ncore_writer import write_ncore
-from dreamdrive.export.nuscenes import export_scene, export_world
-from dreamdrive.export.ply import check_ply, export_ply, left_out_of_ply, write_ply
-from dreamdrive.scene.scene import Scene
+from dreamdrive.registry import offer
 
-KINDS: dict[ExportKind, Callable[[Scene, Path], None]] = {
-    "ply": export_ply,
-    "nuscenes": export_scene,
-    "ncore": scene_to_ncore,
-    "mcap": scene_to_mcap,
-}
-"""What ``export --to`` takes."""
+if TYPE_CHECKING:
+    from dreamdrive.export.cameras import (
+        scene_to_colmap as scene_to_colmap,
+        scene_to_nerfstudio as scene_to_nerfstudio,
+        scene_to_tum as scene_to_tum,
+    )
+    from dreamdrive.export.kinds import Export as Export, function as function
+    from dreamdrive.export.log import take as take
+    from dreamdrive.export.mcap.file import need_foxglove as need_foxglove
+    from dreamdrive.export.mcap.mcap import (
+        scene_to_mcap as scene_to_mcap,
+        world_to_mcap as world_to_mcap,
+        write_mcap as write_mcap,
+    )
+    from dreamdrive.export.mcap.words import RecordedBox as RecordedBox
+    from dreamdrive.export.mcap.writer import DriveRecording as DriveRecording, ground_pose as ground_pose
+    from dreamdrive.export.ncore.ncore import (
+        scene_to_ncore as scene_to_ncore,
+        world_to_ncore as world_to_ncore,
+    )
+    from dreamdrive.export.ncore.words import need_ncore as need_ncore
+    from dreamdrive.export.ncore.writer import write_ncore as write_ncore
+    from dreamdrive.export.nuscenes.nuscenes import export_scene as export_scene, export_world as export_world
+    from dreamdrive.export.nuscenes.writer import (
+        write_nuscenes as write_nuscenes,
+        write_points as write_points,
+    )
+    from dreamdrive.export.ply import (
+        export_ply as export_ply,
+        left_out_of_ply as left_out_of_ply,
+        write_ply as write_ply,
+    )
+    from dreamdrive.export.table import EXPORTS as EXPORTS, export as export
+    from dreamdrive.export.world_log import taken_of_world as taken_of_world
 
-
-def export(scene: Scene, kind: str, path: Path) -> None:
-    """Write a scene as one of :data:`KINDS`; ``InputError`` where there is none or it cannot be written."""
-    if kind not in KINDS:
-        raise InputError(f"unknown export kind {kind!r}; expected {', '.join(KINDS)}")
-    KINDS[kind](scene, path)
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

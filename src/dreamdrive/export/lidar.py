@@ -1,4 +1,4 @@
-"""What a lidar on the car would have measured, from the depth of cameras."""
+"""Lidar simulated from the depth of cameras."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What cameras of a car see of a scene becomes a log with files: pictures, lidar, labels."""
+"""Logs of what a car's cameras see of a scene, with files: pictures, lidar, labels."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from dreamdrive.data.nuscenes import write_points
-from dreamdrive.data.picture_file import write_picture
+from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
+from dreamdrive.export.nuscenes.writer import write_points
 from dreamdrive.files.output import plain_name
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, box_corners
+from dreamdrive.scene.street.log import BoxTrack, LidarSweep, Log, LogCamera, LogMap, box_corners
 from dreamdrive.scene.visibility import View, level_of, share_seen
 
 KEY_S = 0.5

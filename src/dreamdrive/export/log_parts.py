@@ -1,15 +1,15 @@
-"""What other formats want of a log: times as whole numbers, the path of the car, pictures as bytes."""
+"""Parts of a log as other formats want them: whole-number times, the car's path, pictures as bytes."""
 
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.picture_file import PICTURE_BYTES, parse_header
+from dreamdrive.data.pictures.picture_file import PICTURE_BYTES, parse_header
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_bytes
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import Log
+from dreamdrive.scene.street.log import Log
 
 US, NS = 1_000_000, 1_000_000_000
 """Microseconds and nanoseconds in a second."""

@@ -4,12 +4,11 @@ from pathlib import Path
 
 import torch
 
+from dreamdrive.files.kinds import PLY_KIND
 from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
+from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-
-KIND = "folder of PLY files"
-"""What ``export_ply`` writes to a name without an ending."""
 
 
 def write_ply(gaussians: Gaussians, path: Path) -> None:
@@ -24,7 +23,7 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
         partial.write_bytes(data)
 
 
-def export_ply(scene: Scene, path: Path, *, replace: bool = False) -> None:
+def export_ply(scene: Scene, path: Path, *, replace: bool = False, progress: Progress = silent) -> None:
     """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
 
     The single file holds everything as it is at the first recorded time. The folder holds ``static.ply``
@@ -36,11 +35,12 @@ def export_ply(scene: Scene, path: Path, *, replace: bool = False) -> None:
     if path.suffix.lower() == ".ply":
         write_ply(scene.at(float(scene.times_s[0])), path)
         return
-    with new_folder(path, replace=replace, kind=KIND) as folder:
+    with new_folder(path, replace=replace, kind=PLY_KIND) as folder:
         (folder / "static.ply").write_bytes(_encode(scene.static_at(float(scene.times_s[0]))))
         (folder / "frames").mkdir()
         for i, t_s in enumerate(scene.times_s):
             (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
+            progress(i + 1, len(scene.times_s))
 
 
 def check_ply(path: Path, replace: bool) -> None:
@@ -48,7 +48,7 @@ def check_ply(path: Path, replace: bool) -> None:
     if path.suffix.lower() == ".ply":
         check_new_file(path, replace)
     else:
-        check_free(path, replace, KIND)
+        check_free(path, replace, PLY_KIND)
 
 
 def left_out_of_ply(scene: Scene, path: Path) -> str:
@@ -58,7 +58,7 @@ def left_out_of_ply(scene: Scene, path: Path) -> str:
     parts = {
         "sky": scene.sky is not None,
         "exposure of the recording": scene.exposure is not None,
-        "motion" if alone else "motion in between": scene.drifts or len(scene.dynamic) > 0,
+        "motion" if alone else "motion in between": scene.moves_per_frame or len(scene.dynamic) > 0,
     }
     missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
     return f"PLY holds {shown}{': ' if missing else ''}{missing}."

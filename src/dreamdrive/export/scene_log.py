@@ -6,8 +6,8 @@ from jaxtyping import Float
 from dreamdrive.export.log import AXLE_M, Moved, RigCamera, Taken
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.level import level_from_world
-from dreamdrive.scene.log import LogMap
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.street.log import LogMap
 from dreamdrive.splat import render_scene
 
 CATEGORIES = {

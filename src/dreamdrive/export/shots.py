@@ -1,4 +1,4 @@
-"""What cameras saw becomes a log in which nothing is lost: every picture, and the boxes at every time.
+"""Logs in which nothing is lost: every picture that cameras took, and the boxes at every time.
 
 ``export.log`` labels twice a second, as nuScenes does, and its pictures are JPEG.
 """
@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from dreamdrive.data.nuscenes import write_points
-from dreamdrive.data.picture_file import write_picture
+from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
 from dreamdrive.export.log import START_US, Moved, Taken
+from dreamdrive.export.nuscenes.writer import write_points
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.log import BoxTrack, LidarSweep, Log, LogCamera
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.street.log import BoxTrack, LidarSweep, Log, LogCamera
 from dreamdrive.splat import render_scene
 
 

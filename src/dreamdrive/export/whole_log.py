@@ -9,9 +9,9 @@ from dreamdrive.export.shots import log_of, shots_of_scene, shots_of_world
 from dreamdrive.export.world_log import taken_of_world
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.log import Log
 from dreamdrive.scene.scene import Scene
-from dreamdrive.world import Drive, Mount
+from dreamdrive.scene.street.log import Log
+from dreamdrive.scene.street.truth import DriveTruth, Mount
 
 
 def log_of_scene(scene: Scene, name: str, clip: Clip | None, folder: Path, progress: Progress) -> Log:
@@ -27,14 +27,19 @@ def log_of_scene(scene: Scene, name: str, clip: Clip | None, folder: Path, progr
     Raises:
         InputError: The scene does not know the height of its camera, or the clip is of another scene.
     """
-    if clip is not None and clip.times_s.tolist() != scene.times_s.tolist():
-        raise InputError(f"the clip has {len(clip)} frames, which are not those of the scene; give its own")
+    check_clip(scene, clip)
     world_from_scene, _ = level_frame(scene)
     shots = shots_of_scene(scene, world_from_scene, clip)
     return log_of(taken_of_scene(scene, name), shots, folder, progress)
 
 
-def log_of_world(drives: Mapping[Mount, Drive], name: str, folder: Path, progress: Progress) -> Log:
+def check_clip(scene: Scene, clip: Clip | None) -> None:
+    """Raise ``InputError`` where a clip is of another scene."""
+    if clip is not None and clip.times_s.tolist() != scene.times_s.tolist():
+        raise InputError(f"the clip has {len(clip)} frames, which are not those of the scene; give its own")
+
+
+def log_of_world(drives: Mapping[Mount, DriveTruth], name: str, folder: Path, progress: Progress) -> Log:
     """A drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
     drive = taken_of_world(drives, name)
     return log_of(drive, shots_of_world(drive), folder, progress)

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.export.log import AXLE_M, Moved, RigCamera, Taken
-from dreamdrive.scene.layout import Layout
-from dreamdrive.scene.log import LogMap, Polygon
-from dreamdrive.world import Drive, Mount
+from dreamdrive.scene.street.layout import Layout
+from dreamdrive.scene.street.log import LogMap, Polygon
+from dreamdrive.scene.street.truth import DriveTruth, Mount
 
 CATEGORIES: Mapping[str, str] = {
     "car": "vehicle.car",
@@ -31,7 +31,7 @@ _CLEAR_M = 150.0
 """Pictures of maps begin at 0: the least place of a drive lies so far from it."""
 
 
-def taken_of_world(drives: Mapping[Mount, Drive], name: str) -> Taken:
+def taken_of_world(drives: Mapping[Mount, DriveTruth], name: str) -> Taken:
     """A drawn street as a drive to be written; its world is the street's map, moved away from 0."""
     first = next(iter(drives.values()))
     layout = first.layout
@@ -91,7 +91,7 @@ def map_of_layout(layout: Layout, offset_m: Float[np.ndarray, " 2"]) -> LogMap:
     )
 
 
-def _map_poses(drive: Drive) -> Float[np.ndarray, "f 4 4"]:
+def _map_poses(drive: DriveTruth) -> Float[np.ndarray, "f 4 4"]:
     """Poses of a camera in the frame of the street's map."""
     return np.linalg.inv(drive.world_from_map) @ drive.trajectory.world_from_camera
 

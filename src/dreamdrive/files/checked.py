@@ -1,4 +1,4 @@
-"""Nouns from values that came from disk: believed only when every field is what its annotation says."""
+"""Nouns built of values from disk, each field checked against its annotation."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -26,8 +26,9 @@ def build(noun: type[T], values: Mapping[str, object]) -> T:
         raise ValueError(f"{name} has no field {unknown[0]!r}")
     hints = get_type_hints(noun)
     with jaxtyped("context"):
-        for field, value in values.items():
-            _check(f"{name}.{field}", value, hints[field])
+        for field in hints:  # in their order, whatever that of the values is
+            if field in values:
+                _check(f"{name}.{field}", values[field], hints[field])
     try:
         return noun(**values)
     except TypeError as error:

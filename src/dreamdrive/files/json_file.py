@@ -15,6 +15,8 @@ from dreamdrive.files.paths import TEXT_BYTES, read_bytes, text_in
 
 MAX_DEPTH = 32
 """How deep objects and lists may lie in each other; what is read and written has ten levels at most."""
+JSON_RAISES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""What msgspec raises on text that is no JSON, of another type or nested too deep."""
 _LARGEST = 2**63
 # What some programs write for a number that is none.
 _NO_NUMBER = re.compile(rb"[\s:,\[]-?(?:NaN|Infinity)\b")

@@ -1,4 +1,4 @@
-"""One writer at a time: locks that the kernel lets go of however their process ends."""
+"""Locks for one writer at a time, which the kernel lets go of however their process ends."""
 
 import errno
 import fcntl
@@ -8,7 +8,7 @@ import os
 import stat
 import sys
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -54,8 +54,10 @@ def _held(path: Path, what: Path) -> int:
                 "choose another output folder"
             ) from None
         if _still_there(handle, path):
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, _note().encode(), 0)
+            # A full disk has no room for the note; who writes next says so.
+            with suppress(OSError):
+                os.ftruncate(handle, 0)
+                os.pwrite(handle, _note().encode(), 0)
             return handle
         # Its last owner removed it between our opening and locking it.
         os.close(handle)

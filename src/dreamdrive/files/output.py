@@ -6,25 +6,35 @@ removed by the next one. A folder is replaced only if it was made here and holds
 cannot be written, ``InputError`` says why, and what was there stays.
 """
 
+import errno
+import fcntl
 import hashlib
 import json
 import os
 import re
 import secrets
 import shutil
+import tempfile
+import time
 from collections.abc import Generator, Iterable
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from safetensors import SafetensorError
+
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.lock import locked
+from dreamdrive.files.undisturbed import held
 
 MARK = ".dreamdrive.json"
 """The file by which a folder that was made here is known: what it is, and the names of all its files."""
 _PRIVATE = ".dreamdrive-"
 _RETIRED = "retired"
+_TEMPORARY, _YOUNG_S = "dreamdrive-", 10.0
 _BY_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+_NO_ROOM_BYTES = 1_000_000
+"""Where so much cannot be written, SQLite's errors of many names mean that the disk is full."""
 _PLAIN = re.compile(r"[A-Za-z0-9_+=@-][A-Za-z0-9._+=@-]{0,99}")
 
 
@@ -58,6 +68,89 @@ def new_folder(path: Path, *, replace: bool, kind: str) -> Generator[Path, None,
         if place.exists():
             os.replace(place, private / _RETIRED)
         os.replace(made, place)
+
+
+@contextmanager
+def scratch_beside(path: Path) -> Generator[Path, None, None]:
+    """A folder for what is needed only until ``path`` is written; it lies beside that, and vanishes.
+
+    The system's folder for temporary files may be small, or lie in memory: the disk that holds the result has
+    room for what it is made of.
+    """
+    with _private(path, "scratch") as (_, private):
+        yield private
+
+
+@contextmanager
+def temporary_folder() -> Generator[Path, None, None]:
+    """A folder among the temporary files of the system, for what is small; it vanishes at the end.
+
+    What a killed process left there is removed by the next one, and by the next run in any folder.
+
+    Raises:
+        InputError: There is no such place, or no room in it.
+    """
+
+    def enter(stack: ExitStack) -> Path:
+        try:
+            tidy_temporary()
+            made = stack.enter_context(tempfile.TemporaryDirectory(prefix=_TEMPORARY))
+        except OSError as error:
+            raise _no_room("the system's folder", error.strerror or str(error)) from error
+        with suppress(OSError):  # where the disk has no locks, nobody removes it either
+            stack.enter_context(_in_use(Path(made)))
+        return Path(made)
+
+    with held(enter) as folder:
+        try:
+            yield folder
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            raise _no_room(tempfile.gettempdir(), str(error)) from error
+        except RuntimeError as error:  # of SQLite, through pycolmap, in words that say little
+            if _has_room(folder):
+                raise
+            raise _no_room(tempfile.gettempdir(), "the disk is full") from error
+
+
+@contextmanager
+def _in_use(folder: Path) -> Generator[None, None, None]:
+    """Hold a lock on a folder itself, which ends with this process."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.fstat(handle).st_uid != os.getuid():
+            raise PermissionError(errno.EPERM, "the folder is another user's")
+        yield
+    finally:
+        os.close(handle)
+
+
+def tidy_temporary() -> None:
+    """Remove temporary folders that killed processes left; young ones may be about to be held."""
+    for left in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+        with suppress(OSError):
+            if time.time() - left.lstat().st_mtime > _YOUNG_S:
+                with _in_use(left):
+                    remove(left)
+
+
+def _has_room(folder: Path) -> bool:
+    """Whether something small can be written there."""
+    try:
+        with (folder / "room").open("wb") as file:
+            file.write(bytes(_NO_ROOM_BYTES))
+    except OSError:
+        return False
+    return True
+
+
+def _no_room(where: str, reason: str) -> InputError:
+    return InputError(
+        f"no room for temporary files in {where}: {reason}; free some space there, or name a folder on "
+        "another disk in TMPDIR"
+    )
 
 
 def claim_folder(path: Path, kind: str) -> None:
@@ -113,10 +206,29 @@ def check_new_file(path: Path, replace: bool) -> None:
         )
 
 
+def check_place(out: Path, source: Path | None) -> None:
+    """Fail before the work where the output folder is the input, or cannot be written."""
+    if source is not None and os.path.realpath(out) == os.path.realpath(source):
+        raise InputError(f"{out} is the input itself; choose another output folder")
+    check_writable(out)
+
+
+def check_writable(out: Path) -> None:
+    """Fail before the work rather than after it."""
+    existing = out
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir():
+        raise InputError(f"cannot write to {out}: {existing} is a file, and a folder is needed there")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(f"cannot write to {out}: no permission to write in {existing}")
+
+
 def check_ending(path: Path, *endings: str) -> None:
     """Fail before the work where a name says that the file is of another kind, such as a letter."""
     if path.suffix.lower() not in endings:
-        raise InputError(f"{path}: expected a name that ends in {' or '.join(endings)}")
+        wanted = f"{' or '.join(endings)}, such as {path.stem}{endings[0]}"
+        raise InputError(f"{path}: expected a name that ends in {wanted}")
 
 
 def plain_name(name: str) -> str:
@@ -147,31 +259,49 @@ def _place(path: Path) -> Path:
 
 
 @contextmanager
-def _private(path: Path) -> Generator[tuple[Path, Path], None, None]:
-    """The place that a path means, and a folder beside it for its one writer, which goes away at the end."""
-    try:
+def _private(path: Path, purpose: str = "") -> Generator[tuple[Path, Path], None, None]:
+    """The place that a path means, and a folder beside it for its one writer, which goes away at the end.
+
+    Folders of another ``purpose`` may be there at the same time.
+    """
+
+    def enter(stack: ExitStack) -> tuple[Path, Path]:
         place = _place(path)
-        key = _PRIVATE + hashlib.sha256(os.fsencode(place.name)).hexdigest()[:12]
+        key = _PRIVATE + hashlib.sha256(os.fsencode(place.name + purpose)).hexdigest()[:12]
         private = place.parent / f"{key}-{secrets.token_hex(8)}"
-        with ExitStack() as stack:
-            stack.enter_context(made_folder(place.parent))
-            # What lies in a private folder has one writer already.
-            if not any(part.startswith(_PRIVATE) for part in place.parts):
-                stack.enter_context(locked(place.parent / f"{key}.lock", path))
-                _tidy(place, place.parent.glob(f"{key}-*"))
-            stack.callback(_tidy, place, [private])
-            private.mkdir(mode=0o700)
-            yield place, private
+        stack.enter_context(made_folder(place.parent))
+        # What lies in a private folder has one writer already.
+        if not any(part.startswith(_PRIVATE) for part in place.parts):
+            stack.enter_context(locked(place.parent / f"{key}.lock", path))
+            _tidy(place, place.parent.glob(f"{key}-*"))
+        stack.callback(_tidy, place, [private])
+        private.mkdir(mode=0o700)
+        return place, private
+
+    try:
+        with held(enter) as found:
+            yield found
     except OSError as error:
         raise _cannot_write(path, error) from error
+    except SafetensorError as error:
+        if "I/O error" not in str(error):
+            raise
+        raise _cannot_write(path, OSError(str(error).partition("I/O error: ")[2])) from error
 
 
 @contextmanager
 def made_folder(path: Path) -> Generator[None, None, None]:
-    """A folder, with those above it; at the end those of them that were made here and are empty go away."""
+    """A folder, with those above it; at the end those of them that were made here and are empty go away.
+
+    A link is followed: the folder that it leads to is made.
+    """
+    path = Path(os.path.realpath(path))
     made = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise _cannot_write(path, error) from error
         yield
     finally:
         for folder in made:
@@ -211,7 +341,7 @@ def _listed(folder: Path, kind: str) -> set[str] | None:
 
 
 def _cannot_write(path: Path, error: OSError) -> InputError:
-    reason = error.strerror or str(error)
+    reason = "it is no folder" if isinstance(error, FileExistsError) else error.strerror or str(error)
     return InputError(
         f"cannot write {path}: {reason}; nothing was changed, free some space or choose another place"
     )

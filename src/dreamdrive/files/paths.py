@@ -1,4 +1,4 @@
-"""Files that may not be what they say: opened without waiting, read up to a limit, kept to their folder.
+"""Files that may not be what they say, opened without waiting, up to a limit, kept to their folder.
 
 A file that is missing, not a regular one, too large or may not be read raises ``InputError``, which calls it
 ``where``, or by its path without it. A link is taken for what it leads to unless ``follow`` is off.

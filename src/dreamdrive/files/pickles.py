@@ -75,7 +75,7 @@ class Expected:
     what: str
 
 
-class DamagedError(Exception):
+class DamagedPickleError(Exception):
     """An instruction or a value that cannot be followed."""
 
 
@@ -84,7 +84,7 @@ def follow(data: bytes, path: Path, expected: Expected) -> object:
 
     Raises:
         InputError: It asks for what is not expected; ``path`` is what messages name.
-        DamagedError: It is no pickle of what is expected.
+        DamagedPickleError: It is no pickle of what is expected.
     """
     machine = _Machine(path, expected)
     try:
@@ -101,7 +101,7 @@ def follow(data: bytes, path: Path, expected: Expected) -> object:
     except InputError:
         raise
     except (IndexError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
-        raise DamagedError(str(error)) from None
+        raise DamagedPickleError(str(error)) from None
 
 
 class _Machine:
@@ -140,7 +140,7 @@ class _Machine:
         elif name in ("GLOBAL", "STACK_GLOBAL", "REDUCE", "NEWOBJ", "BUILD"):
             self._make(name, argument)
         elif name not in ("PROTO", "FRAME", "STOP"):
-            raise DamagedError(f"it has the instruction {name}, which is not expected")
+            raise DamagedPickleError(f"it has the instruction {name}, which is not expected")
 
     def _make(self, name: str, argument: Any) -> None:
         """Name a class, write down a call of it, or give what it made a state."""
@@ -149,7 +149,7 @@ class _Machine:
         elif name == "STACK_GLOBAL":
             parts = self._last(2)
             if not all(isinstance(part, str) for part in parts):
-                raise DamagedError("a name is no text")
+                raise DamagedPickleError("a name is no text")
             self._name(" ".join(parts))
         elif name == "BUILD":
             (state,) = self._last(1)
@@ -157,7 +157,7 @@ class _Machine:
         else:
             called, args = self._last(2)
             if not isinstance(called, Name) or not isinstance(args, tuple):
-                raise DamagedError("it calls what is no function")
+                raise DamagedPickleError("it calls what is no function")
             self.stack.append(Made(called.name, cast("tuple[Any, ...]", args)))
 
     def _name(self, full: str) -> None:
@@ -170,7 +170,7 @@ class _Machine:
 
     def _last(self, count: int) -> list[Any]:
         if len(self.stack) < count:
-            raise DamagedError("its stack is too short")
+            raise DamagedPickleError("its stack is too short")
         values = self.stack[-count:]
         del self.stack[-count:]
         return values
@@ -184,7 +184,7 @@ class _Machine:
     def _top(self, kind: type) -> Any:
         top = self.stack[-1]
         if type(top) is not kind:
-            raise DamagedError(f"it changes a {type(top).__name__} as if it were a {kind.__name__}")
+            raise DamagedPickleError(f"it changes a {type(top).__name__} as if it were a {kind.__name__}")
         return top
 
     def _set(self, values: list[Any]) -> None:
@@ -192,7 +192,7 @@ class _Machine:
         for key, value in zip(values[::2], values[1::2], strict=True):
             # Hashing nested tuples would take for ever.
             if type(key) not in (str, int):
-                raise DamagedError("it has keys that are no text")
+                raise DamagedPickleError("it has keys that are no text")
             if key in into:
                 raise InputError(f"{self._path} has two entries {str(key)[:80]!r}; expected one of each")
             into[key] = value

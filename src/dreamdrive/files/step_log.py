@@ -1,4 +1,4 @@
-"""What happened at the steps of a training, a line of JSON each, that survives being cut short."""
+"""Log of the steps of a training, a line of JSON each, that survives being cut short."""
 
 import json
 from collections.abc import Mapping

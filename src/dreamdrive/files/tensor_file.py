@@ -1,4 +1,4 @@
-"""Files of tensors, ``.safetensors`` and zip archives: what can be said before a library maps them."""
+"""Checks of files of tensors, ``.safetensors`` and zip archives, before a library maps them."""
 
 import os
 from pathlib import Path
@@ -6,12 +6,13 @@ from typing import BinaryIO
 
 from safetensors import SafetensorError
 
+from dreamdrive.compute.machine import free_bytes
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import open_file, read_bytes
-from dreamdrive.machine import free_bytes
 
-HEADER_BYTES = 16_000_000
-"""Most that the table of tensors in a file may hold; that of Vista takes half a megabyte."""
+HEADER_BYTES = 4_000_000
+"""Most that the table of tensors in a file may hold, which takes sixty times as much memory; that of Vista
+takes half a megabyte."""
 DAMAGE = (
     SafetensorError,
     OSError,
@@ -32,19 +33,26 @@ def header_problem(path: Path) -> str | None:
     """Why a file is no ``.safetensors``, by the stated length of its header; None where it may be one."""
     try:
         with open_file(path, "the file") as file:
-            size = os.fstat(file.fileno()).st_size
-            header = int.from_bytes(file.read(8), "little")
+            return _stated(file.read(8), os.fstat(file.fileno()).st_size)
     except InputError as error:
         return str(error)
-    if 2 <= header <= min(size - 8, HEADER_BYTES):
-        return None
-    return f"it states a header of {header} bytes and has {size}"
 
 
 def read_own(path: Path, where: str = "") -> bytes:
     """A file of tensors that dreamdrive wrote, no link, if memory holds it twice: as bytes and as tensors."""
     free = free_bytes()
-    return read_bytes(path, where, at_most=2**40 if free is None else free // 2, follow=False)
+    data = read_bytes(path, where, at_most=2**40 if free is None else free // 2, follow=False)
+    if problem := _stated(data[:8], len(data)):
+        raise InputError(f"{where or path} holds no tensors: {problem}")
+    return data
+
+
+def _stated(start: bytes, size: int) -> str | None:
+    """What is wrong with the length of the header, which is in the first bytes of a file."""
+    header = int.from_bytes(start, "little")
+    if 2 <= header <= min(size - 8, HEADER_BYTES):
+        return None
+    return f"it states a header of {header} bytes and has {size}"
 
 
 def briefly(error: object) -> str:

@@ -1,4 +1,4 @@
-"""From the parameters a fit learns to those splatting takes, for static and moved Gaussians together."""
+"""Activations: from the parameters a fit learns to those that splatting takes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,8 +8,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dreamdrive import _native
-from dreamdrive.compiled import Gradients, Wanted, differentiable
-from dreamdrive.device import in_core
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
+from dreamdrive.compute.device import in_core
 from dreamdrive.fit.parameters import Parameters
 from dreamdrive.scene.gaussians import Gaussians
 

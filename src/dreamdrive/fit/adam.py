@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from dreamdrive import _native
-from dreamdrive.device import in_core
+from dreamdrive.compute.device import in_core
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-15
 

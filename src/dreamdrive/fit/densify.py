@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.fit.parameters import Parameters
 
 
@@ -35,10 +35,8 @@ class DensifySettings:
         start: Share of the steps after which growing begins (3DGS: 500 of 30,000).
         stop: Share of the steps after which it ends (3DGS: 15,000 of 30,000).
         every: Steps between two changes.
-        gradient: Mean norm of the loss gradient with respect to the projected mean, in half-image units,
-            above which a Gaussian is cloned or split.
-        split_px: Largest standard deviation, in units of the Gaussian's own seed footprint, that is cloned
-            rather than split (3DGS: 0.01 of the scene's extent; ours has to hold from 3 m to 250 m).
+        gradient: Mean gradient by the projected mean, in half-image units, from which a Gaussian grows.
+        split_px: Largest deviation, over the seed's footprint, that is cloned (3DGS: 0.01 of the extent).
         shrink: A split divides the scales by this.
         prune_opacity: Below this a Gaussian is removed.
         prune_px: Above this size, in the same units as ``split_px``, a Gaussian is removed.

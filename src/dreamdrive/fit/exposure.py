@@ -1,4 +1,4 @@
-"""What a fit learns of the recording camera's colour, and the picture it makes of a splat."""
+"""The learned exposure of the recording camera, applied to rendered pictures."""
 
 import numpy as np
 import torch
@@ -6,8 +6,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from dreamdrive import _native
-from dreamdrive.compiled import Gradients, Wanted, differentiable
-from dreamdrive.device import CPU, in_core
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
+from dreamdrive.compute.device import CPU, in_core
 from dreamdrive.scene.exposure import Exposure, transform_colour
 
 

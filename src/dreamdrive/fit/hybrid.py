@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import torch
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.fit.densify import DENSIFIERS, DensifySettings
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters

@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from dreamdrive import _native
-from dreamdrive.compiled import Gradients, Wanted, at_once, differentiable
-from dreamdrive.device import in_core
+from dreamdrive.compute.compiled import Gradients, Wanted, at_once, differentiable
+from dreamdrive.compute.device import in_core
 from dreamdrive.splat import check_dtype, ssim_map_reference
 
 LossName = Literal["field", "paper"]

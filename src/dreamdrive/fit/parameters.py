@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.fit.adam import Moments, adam_step
 from dreamdrive.scene.gaussians import Gaussians
 

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 # The panorama reaches this far beyond what the frames saw, so that turned and raised views stay inside it.
 MARGIN_RAD = math.radians(40.0)

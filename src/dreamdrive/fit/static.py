@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import torch
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from dreamdrive import _native
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.activation import Activated, activate
 from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
@@ -20,7 +21,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.render import Render
 from dreamdrive.scene.sky import Sky
-from dreamdrive.splat import one_torch_thread, seen_by
+from dreamdrive.splat import seen_by
 
 # Field of ``FitOptions`` that holds the step size of each of ``Motion.groups``.
 RATES = {"network": "deformation_rate", "planes": "plane_rate", "tracks": "track_rate"}
@@ -28,32 +29,20 @@ RATES = {"network": "deformation_rate", "planes": "plane_rate", "tracks": "track
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How long and against what a fit runs.
+    """How long and against what a fit runs; what it is worth: docs/results/ablation.md.
 
     Attributes:
         steps: Optimisation steps, one frame each.
-        least_visits: Steps for each training frame at least: longer clips take more than ``steps``. A street
-            of 36 frames that was fitted in 75 steps, as a draft was, is more blurred than the frames beside
-            each frame, and seemed to drift; in 125 it stands (PandaSet 002).
-        loss: Weights of L1 and SSIM, see ``losses.WEIGHTS``. On four drawn streets with corrupted references
-            (``benchmarks/ablation.py``) the paper's lose 0.08 dB in held-out frames, 0.07 dB in novel views.
+        least_visits: Steps for each training frame at least: longer clips take more than ``steps``.
+        loss: Weights of L1 and SSIM, see ``losses.WEIGHTS``.
         sh_after: Share of the steps after which view-dependent colour is learned.
-        depth_weight: Weight of the inverse-depth term (1/m). Without it the median error of rendered depth
-            grows by a quarter. On drawn streets 0, 3, 4 and 6 half of it, decayed to a tenth over the fit,
-            loses 0.1 dB 2 m aside.
-        sky_weight: Weight of coverage in sky pixels. Without it floaters cover 2.5 times as much of the sky.
-        stray_weight: Weight of what dynamic Gaussians cover where nothing moves, if others are static.
-            Without it they take the road beside a vehicle, and its shadow, with them: standing things of
-            drawn streets 0-7 seem to move 13 mm in place of 7, of 8-15 37 mm in place of 15, and the IoU of
-            what moves is 0.834 in place of 0.847. It costs 0.1 dB in held-out frames, for shadows.
+        depth_weight: Weight of the inverse-depth term (1/m).
+        sky_weight: Weight of coverage in sky pixels: floaters cover the sky without it.
+        stray_weight: Weight of what dynamic Gaussians cover where nothing moves: they take the road along.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
-        plane_rate: Adam's step for feature planes, decayed to a tenth, after ``warm_up``: ten times the
-            network's, as in 4D-GS and S3Gaussian. On held-out frames of the built-in street 5e-2 lost 1 dB in
-            1,000 steps and won 3 dB in 300, where this left cars standing.
-        track_rate: Adam's step for actor tracks, in metres and radians, decayed to a tenth. Tracks are nearly
-            right before: on drawn streets 5e-3 loses 0.4 dB of what moves in held-out frames, 1.5e-2 another
-            2 dB.
+        plane_rate: Adam's step for feature planes, decayed likewise: ten times the network's, as in 4D-GS.
+        track_rate: Adam's step for actor tracks, in m and rad, decayed to a tenth: they are nearly right.
         exposure_rate: Adam's step for the exposure network.
     """
 
@@ -72,7 +61,7 @@ class FitOptions:
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedPart:
     """The living Gaussians of a part at a step.
 
     Attributes:
@@ -91,7 +80,7 @@ class Model:
     """Everything a fit changes.
 
     Attributes:
-        static: Gaussians free of time, or those of a street that drifts.
+        static: Gaussians free of time, or those of a per-frame street.
         dynamic: Gaussians that go through ``deformation``, or None.
         deformation: Present exactly when ``dynamic`` is.
         sky: The far background. It is an average over all frames already; learning it would cost a tenth of
@@ -105,7 +94,7 @@ class Model:
     sky: Sky
     exposure: ExposureNetwork
 
-    def moved(self, t_s: float, generator: torch.Generator) -> Moved | None:
+    def moved(self, t_s: float, generator: torch.Generator) -> MovedPart | None:
         """The living dynamic Gaussians at a time, differentiable; None where nothing is dynamic."""
         if self.dynamic is None or self.deformation is None:
             return None
@@ -114,15 +103,15 @@ class Model:
         # A copy of all rows, and another of their gradients, would be a twentieth of a step.
         living = whole if len(rows) == len(whole) else whole.select(rows)
         moved = self.deformation.training_at(living, t_s, generator)
-        return Moved(moved, rows, self.deformation.penalty(living, moved))
+        return MovedPart(moved, rows, self.deformation.penalty(living, moved))
 
-    def drifted(self, t_s: float) -> Moved | None:
-        """The living Gaussians of a street that drifts, differentiable; None of one that stands."""
+    def street_at(self, t_s: float) -> MovedPart | None:
+        """The living Gaussians of a per-frame street, differentiable; None of one that stands."""
         if self.static is None or not self.static.swinging:
             return None
         whole = self.static.gaussians().without_features()
         rows = whole.alive_at(t_s)
-        return Moved(whole.select(rows).drifted_at(t_s), rows, None)
+        return MovedPart(whole.select(rows).moved_to(t_s), rows, None)
 
     @property
     def device(self) -> torch.device:
@@ -151,6 +140,7 @@ class Trainer:
         options: FitOptions,
         generator: torch.Generator,
     ) -> None:
+        _native.keep_freed_memory()
         self.model = model
         self.densifiers = densifiers
         self.options = options
@@ -164,7 +154,7 @@ class Trainer:
         """
         model, options = self.model, self.options
         done = step / options.steps
-        moved, street = model.moved(view.time_s, self.generator), model.drifted(view.time_s)
+        moved, street = model.moved(view.time_s, self.generator), model.street_at(view.time_s)
         timed = [part.gaussians for part in (street, moved) if part is not None]
         activated = activate(
             model.static if street is None else None, Gaussians.concatenate(*timed) if timed else None
@@ -190,7 +180,12 @@ class Trainer:
         return loss.detach()
 
     def _observe(
-        self, street: Moved | None, moved: Moved | None, standing: int, offsets_px: Tensor, rendered: Render
+        self,
+        street: MovedPart | None,
+        moved: MovedPart | None,
+        standing: int,
+        offsets_px: Tensor,
+        rendered: Render,
     ) -> None:
         """Hand each part its share of the screen gradients; the first ``standing`` are the street's."""
         gradient = offsets_px.grad if offsets_px.grad is not None else torch.zeros_like(offsets_px)
@@ -218,7 +213,6 @@ def optimise(
     There is a densifier for each of ``model.parts()``; the seed decides the order of the frames and where
     split Gaussians come to lie.
     """
-    _native.keep_freed_memory()
     # Of their own, so that how many Gaussians are split leaves the order of the frames as it is: with one for
     # both, a change of one thing in the input changed everything else in the scene.
     frame_order = torch.Generator("cpu").manual_seed(seed)

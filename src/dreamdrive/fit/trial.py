@@ -1,4 +1,4 @@
-"""How well a geometry predicts frames that a fit has not seen: what frames themselves say of it."""
+"""Trial fits: how well a geometry predicts frames that a small fit has not seen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,26 +10,25 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.static import fit_static
 from dreamdrive.fit.trainer import FitOptions
 from dreamdrive.progress import silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import render
 
 
 @dataclass(frozen=True)
 class TrialOptions:
-    """A small static fit to some of the frames.
+    """A small static fit to some of the frames; what it is worth: docs/results/ablation.md.
 
     Attributes:
         withheld: Every so many of the frames that may be seen are withheld from it.
         width_px: Width of its pictures at most.
         visits: Steps for each frame that it sees.
-        stereo_db: By how much depth of stereo alone predicts withheld frames better where it takes the place
-            of depth that a network has a part in. On nine of twenty recorded drives it is better by 0.5 to
-            1.8 dB, and then by 0.3 to 2.3 in the whole fit; where it is 0.2 better, lidar contradicts it.
+        stereo_db: PSNR in dB by which stereo's depth has to predict withheld frames better than a network's.
     """
 
     withheld: int = 4
@@ -133,8 +132,8 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
         return np.stack(resized).astype(maps.dtype)
 
     moves = geometry.moving >= 0.5
-    if geometry.users is not None:
-        moves &= geometry.users > 0
+    if geometry.road_users is not None:
+        moves &= geometry.road_users > 0
     frames = np.stack([cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in clip.frames])
     small = replace(
         clip,
@@ -151,5 +150,5 @@ def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geome
     regions = near(geometry.fixed_regions.astype(np.int32))
     cameras = tuple(camera.resized(*size) for camera in geometry.cameras)
     maps["moving"] = np.zeros_like(maps["confidence"])
-    maps |= dict.fromkeys(("spread", "users", "stereo_ratio", "stereo_confidence"))
+    maps |= dict.fromkeys(("spread", "road_users", "stereo_ratio", "stereo_confidence"))
     return small, replace(geometry, cameras=cameras, fixed_regions=regions, **maps)

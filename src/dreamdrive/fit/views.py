@@ -8,11 +8,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from dreamdrive.device import CPU
+from dreamdrive.compute.device import CPU
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.windows import grown
+from dreamdrive.vision.windows import grown
 
 _RIM_PX = 3  # around what moves, of a picture that is 480 wide: its own splats reach into it
 

@@ -1,56 +1,26 @@
 """F_MVS (eq. 4): from a clip to cameras, depth, confidence, sky and evidence of motion."""
 
-from itertools import count
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+from dreamdrive.registry import offer
 
-from dreamdrive.choices import BACKENDS
-from dreamdrive.geometry.backends.files import EXPECTED, attach, bent_model, companions
-from dreamdrive.geometry.cameras import Posed, calmed, refined
-from dreamdrive.geometry.measured import Measured
-from dreamdrive.geometry.options import DepthOptions, GateOptions, GeometryOptions, MovingOptions
-from dreamdrive.geometry.protocol import GeometryBackend
-from dreamdrive.geometry.surround import reconstruct_cameras
-from dreamdrive.progress import Work
-from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.geometry import Geometry
+if TYPE_CHECKING:
+    from dreamdrive.geometry.backends.files import (
+        EXPECTED as EXPECTED,
+        attach as attach,
+        bent_model as bent_model,
+        companions as companions,
+    )
+    from dreamdrive.geometry.cameras import Posed as Posed, calmed as calmed
+    from dreamdrive.geometry.measured import Measured as Measured
+    from dreamdrive.geometry.options import (
+        DepthOptions as DepthOptions,
+        GateOptions as GateOptions,
+        GeometryOptions as GeometryOptions,
+        MovingOptions as MovingOptions,
+    )
+    from dreamdrive.geometry.protocol import GeometryBackend as GeometryBackend
+    from dreamdrive.geometry.reconstruct import backend_of as backend_of, reconstruct as reconstruct
+    from dreamdrive.geometry.table import BACKENDS as BACKENDS
 
-
-def backend_of(method: str, weights: Path | None = None) -> GeometryBackend:
-    """A way of getting geometry by its name, if it could start with these weights.
-
-    Raises:
-        InputError: The method is unknown, lacks weights or its package, or takes no weights.
-    """
-    backend = BACKENDS.choose(method)
-    backend.check_start("geometry", weights)
-    return backend
-
-
-def reconstruct(
-    clip: Clip,
-    options: GeometryOptions = GeometryOptions(),
-    *,
-    seed: int = 0,
-    work: Work = Work(),
-) -> Geometry:
-    """Reconstruct a clip by one of ``BACKENDS``; geometry given as files comes in by ``attach``.
-
-    For clips of several cameras see ``surround``. ``work`` is told of each step, where the method can count
-    them.
-
-    Raises:
-        InputError: See ``backend_of``; or the clip, its known poses or the weights cannot be used.
-    """
-    backend = backend_of(options.method, options.weights)
-
-    def how(part: Clip, work: Work = work) -> Geometry:
-        return backend.reconstruct(part, options, seed=seed, work=work)
-
-    if options.refine_poses:
-        return refined(clip, how)
-    if len(clip.rig) == 1:
-        return how(clip)
-    cameras, turn = len(np.unique(clip.camera)), count()
-    return reconstruct_cameras(clip, lambda part: how(part, work.part(next(turn), cameras)))
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -10,8 +10,8 @@ from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
     PAVED,
     Fused,
+    PosedFrames,
     Tell,
-    View,
     above_horizon,
     agreement,
     combine,
@@ -20,8 +20,7 @@ from dreamdrive.geometry.depth import (
     make_view,
     preferred,
     settled_in_time,
-    shifted_users,
-    single_threaded_opencv,
+    shifted_road_users,
     sky_mask,
     sweep_frames,
     temporal_neighbours,
@@ -36,13 +35,14 @@ from dreamdrive.geometry.moving import (
     neighbour_flows,
     standing_evidence,
     too_near,
-    whole_users,
+    whole_road_users,
 )
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.progress import Keep, at_once
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.look import Look
+from dreamdrive.scene.street.look import Look
+from dreamdrive.vision.flow import single_threaded_opencv
 
 MOVING_CONFIDENCE = 0.3  # of the depth of a moving thing, which its contact with the road gives
 PASSES, LOOK_PASSES = 7, 6
@@ -70,8 +70,9 @@ def densify(
     """The posed clip with depth, confidence, sky and moving evidence of every frame that is not held out.
 
     Held-out frames are not looked at and stay empty: depth, confidence and moving 0, no sky. Depth is taken
-    as given in ``clip.known.depth_m``, else as measured, such as by a network, else from the plane sweep,
-    which is kept, else (standing camera, or poses from the fallback) from the road plane and a backdrop at 40
+    as given in ``clip.known.depth_m`` where that is dense; else, with what is given in its pixels, as
+    measured, such as by a network, else from the plane sweep, which is kept, else (standing camera, or poses
+    from the fallback) from the road plane and a backdrop at 40
     m, little trusted. With a look, depth that was not given is fused with the street network's, which takes
     the place of the backdrop. What moves is found against the parallax of a moving camera or against the
     temporal median of a standing one, and with a look road users move as wholes; from fallback poses no such
@@ -80,15 +81,15 @@ def densify(
     ``LOOK_PASSES`` more, where depth was not given.
     """
     view = make_view(clip, posed.cameras, posed.fixed_regions, posed.ground, options, tell)
-    given = clip.known.depth_m is not None
+    known = clip.known.depth_m
+    given = known is not None and float((known[view.used] > 0).mean()) >= options.depth.dense
+    if known is not None and given:
+        measured = known, (known > 0).astype(np.float32)
     rough = posed.standing or posed.fallback is not None
-    look, found, users, alone = clip.look, None, None, None
+    look, found, road_users, alone = clip.look, None, None, None
     with single_threaded_opencv():
         sky = _sky(clip, view)
-        if clip.known.depth_m is not None:
-            inverse = _inverse(np.where(view.used[:, None, None], clip.known.depth_m, 0))
-            confidence = (inverse > 0).astype(np.float32)
-        elif measured is not None:
+        if measured is not None:
             inverse = _inverse(np.where(view.used[:, None, None], measured[0], 0))
             confidence = np.where(inverse > 0, measured[1], 0).astype(np.float32)
         elif rough and look is not None:
@@ -97,6 +98,8 @@ def densify(
             inverse, confidence = _plane_and_backdrop(view)
         else:
             inverse, confidence = keep("swept", lambda: _swept(view, sky))
+        if known is not None and not given:
+            inverse, confidence = _anchored(view, known, inverse, confidence)
         if look is not None and not given:
             # Where no motion shows the road, its tilt is that of the horizon that the network sees.
             tilt_rad = look.camera.horizon_spread_px / look.camera.focal_px if rough else 0.0
@@ -113,22 +116,22 @@ def densify(
         moving = moving * ~sky
         if look is not None and found is not None:
             nearer = too_near(found.inverse, inverse, confidence, options.users)
-            moving, users = whole_users(view, look, flows, moving, nearer, found.inverse)
+            moving, road_users = whole_road_users(view, look, flows, moving, nearer, found.inverse)
             still = moving < FLAGGED
-            found = _settled(view, look, found, (inverse, confidence), still, still & (users > 0))
+            found = _settled(view, look, found, (inverse, confidence), still, still & (road_users > 0))
             if not rough:
                 alone = np.where(still, inverse, 0), confidence
             inverse, confidence = found.inverse, found.confidence
         elif look is not None:
-            moving, users = whole_users(view, look, flows, moving, np.zeros_like(sky), inverse)
+            moving, road_users = whole_road_users(view, look, flows, moving, np.zeros_like(sky), inverse)
         elif not given:
             inverse, confidence = _stand_movers(inverse, confidence, moving, view)
-    geometry = _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, users)
+    geometry = _geometry(posed, view, inverse, confidence, sky, moving, found and found.spread, road_users)
     return geometry if alone is None else _with_stereo_alone(geometry, *alone)
 
 
 def _settled(
-    view: View,
+    view: PosedFrames,
     look: Look,
     found: Fused,
     stereo: DepthMaps,
@@ -136,20 +139,20 @@ def _settled(
     standing: Bool[np.ndarray, "f h w"],
 ) -> Fused:
     """What was fused, after stereo and neighbouring frames had their say on what stands."""
-    found = shifted_users(view, look.instances, found, *stereo, standing)
+    found = shifted_road_users(view, look.instances, found, *stereo, standing)
     found = with_stereo(view, found, standing, *stereo)
     seen = settled_in_time(view, found.inverse, found.spread, still)
     seen = with_outlines(view, seen, still & ~np.isin(look.classes, PAVED))
     return replace(found, inverse=preferred(view, seen, *stereo, still))
 
 
-def _plane_and_backdrop(view: View) -> DepthMaps:
+def _plane_and_backdrop(view: PosedFrames) -> DepthMaps:
     inverse = np.maximum(view.plane_inverse, np.float32(1 / _BACKDROP_M))
     confidence = np.where(view.plane_inverse >= inverse, _PLANE_CONFIDENCE, _BACKDROP_CONFIDENCE)
     return inverse, confidence.astype(np.float32)
 
 
-def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:
+def _sky(clip: Clip, view: PosedFrames) -> Bool[np.ndarray, "f h w"]:
     sky = np.zeros(view.usable.shape, bool)
     for frame in view.frames:
         if clip.known.sky is not None:
@@ -162,11 +165,22 @@ def _sky(clip: Clip, view: View) -> Bool[np.ndarray, "f h w"]:
     return sky
 
 
+def _anchored(
+    view: PosedFrames,
+    known_m: Float[np.ndarray, "f h w"],
+    inverse: Float[np.ndarray, "f h w"],
+    confidence: Float[np.ndarray, "f h w"],
+) -> DepthMaps:
+    """Depth that was found, with that of single known pixels in its place, which no other may doubt."""
+    there = (known_m > 0) & view.used[:, None, None]
+    return np.where(there, _inverse(known_m), inverse), np.where(there, np.float32(1), confidence)
+
+
 def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
     return np.where(depth_m > 0, 1 / np.maximum(depth_m, 1e-3), 0).astype(np.float32)
 
 
-def _swept(view: View, sky: Bool[np.ndarray, "f h w"]) -> DepthMaps:
+def _swept(view: PosedFrames, sky: Bool[np.ndarray, "f h w"]) -> DepthMaps:
     found = sweep_frames(view, sky)
     inverse = np.zeros(view.grey.shape, np.float32)
     confidence = np.zeros(view.grey.shape, np.float32)
@@ -191,7 +205,7 @@ def _stand_movers(
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
-    view: View,
+    view: PosedFrames,
 ) -> DepthMaps:
     """Moving pixels get the depth at which their column of the object meets the road."""
     inverse, confidence = inverse.copy(), confidence.copy()
@@ -242,13 +256,13 @@ def _with_stereo_alone(
 
 def _geometry(
     posed: Posed,
-    view: View,
+    view: PosedFrames,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
     moving: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"] | None,
-    users: UInt16[np.ndarray, "f h w"] | None,
+    road_users: UInt16[np.ndarray, "f h w"] | None,
 ) -> Geometry:
     """What both halves found, as the next stages take it."""
     shown = view.usable & ~sky & (inverse > _FAR_INVERSE)
@@ -269,7 +283,7 @@ def _geometry(
         sky=sky,
         moving=moving,
         spread=None if spread is None else np.where(shown, spread, 0).astype(np.float32),
-        users=users,
+        road_users=road_users,
         fixed_regions=posed.fixed_regions[None],
         region_names=posed.region_names,
         ground=posed.ground,

@@ -1,4 +1,4 @@
-"""What a network that measures is shown; and from its cameras and depth to metres, road, sky, what moves."""
+"""The way from measured cameras and depth to metres, road, sky and what moves."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +12,7 @@ from dreamdrive.geometry.dense import densify
 from dreamdrive.geometry.evidence import Evidence, observe
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.geometry.options import GeometryOptions
-from dreamdrive.geometry.road import MIN_RATIOS, Metric, Street, depth_points, in_metres
-from dreamdrive.geometry.road import scale as scales
+from dreamdrive.geometry.road import MIN_RATIOS, Metric, PosedClip, depth_points, in_metres, scale as scales
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Geometry, Ground, Scale
 
@@ -121,7 +120,7 @@ def _metric(
     known = Known(poses, True, (measured.depth * np.float32(factor)).astype(np.float32))
     points = depth_points(replace(clip, rig=(measured.camera,), known=known))
     poses, points = rebase(poses, points)
-    street = Street.of(clip, evidence, measured.camera, poses, points)
+    street = PosedClip.of(clip, evidence, measured.camera, poses, points)
     if clip.known.ground is not None and clip.known.world_from_camera is not None and clip.known.metric:
         return _over(clip.known.ground.seen_from(clip.known.world_from_camera[0]), street, measured, seed)
     if measured.unit is not None:
@@ -145,14 +144,14 @@ def _focal_spread(measured: Measured) -> float:
     return scales.focal_spread_of(measured.focal_observed)
 
 
-def _in_place(street: Street) -> Street:
+def _in_place(street: PosedClip) -> PosedClip:
     """As if the camera only turned: steps that are noise would say that up is anywhere."""
     poses = street.world_from_camera.copy()
     poses[:, :3, 3] = 0
     return replace(street, world_from_camera=poses)
 
 
-def _over(ground: Ground, street: Street, measured: Measured, seed: int) -> Metric:
+def _over(ground: Ground, street: PosedClip, measured: Measured, seed: int) -> Metric:
     """Over a known road: the height of the camera above it tells metres where the unit does not."""
     if measured.unit is not None:
         return Metric(1.0, ground, Scale(measured.unit, measured.unit_spread), ())

@@ -1,4 +1,4 @@
-"""What every way of getting geometry has in common."""
+"""The protocol of geometry backends."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable

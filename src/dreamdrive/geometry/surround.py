@@ -1,4 +1,4 @@
-"""Clips of several cameras, on one car or on several drives: each by itself, in the world of the first."""
+"""Geometry of several cameras, on one car or on several drives: each by itself, in the world of the first."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -131,15 +131,24 @@ def _merged(clip: Clip, lead: int, parts: dict[int, Geometry], poses: Float[np.n
 def _maps_of(parts: dict[int, Geometry]) -> dict[str, dict[int, Any]]:
     """Maps of each camera by their names; road users of two cameras have no number in common."""
     found: dict[str, dict[int, Any]] = {}
-    kinds = "depth_m", "confidence", "sky", "moving", "spread", "users", "stereo_ratio", "stereo_confidence"
+    kinds = (
+        "depth_m",
+        "confidence",
+        "sky",
+        "moving",
+        "spread",
+        "road_users",
+        "stereo_ratio",
+        "stereo_confidence",
+    )
     for name in kinds:
         maps = {camera: getattr(part, name) for camera, part in parts.items()}
         if all(each is not None for each in maps.values()):
             found[name] = maps
     first = 0
-    for camera, users in found.get("users", {}).items():
-        found["users"][camera] = np.where(users > 0, users + np.uint16(first), 0).astype(np.uint16)
-        first += int(users.max(initial=0))
+    for camera, numbers in found.get("road_users", {}).items():
+        found["road_users"][camera] = np.where(numbers > 0, numbers + np.uint16(first), 0).astype(np.uint16)
+        first += int(numbers.max(initial=0))
     return found
 
 

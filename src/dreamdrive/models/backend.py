@@ -1,4 +1,4 @@
-"""What a stage's exchangeable ways have in common: a name, and what each takes to start."""
+"""Entries of tables of exchangeable methods: a name, and what each takes to start."""
 
 from dataclasses import dataclass
 from importlib.util import find_spec

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from dreamdrive import _native
-from dreamdrive.compiled import Gradients, Wanted, differentiable
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
 
 
 def network_residual(

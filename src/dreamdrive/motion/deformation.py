@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from dreamdrive.device import in_core
+from dreamdrive.compute.device import in_core
 from dreamdrive.motion.compiled_deformation import network_residual, posed
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
 from dreamdrive.motion.tracks import Tracks, key_weights, multiply_quaternions, rotate
@@ -289,6 +289,19 @@ class DeformationField(Motion):
         copy.track_translation[actor] = torch.from_numpy(keyed.positions_m - pivot_m).to(self.centre_m)
         copy.track_yaw_rad[actor] = torch.from_numpy(keyed.yaw_rad).to(self.centre_m)
         return copy
+
+    @torch.no_grad()
+    def copied(self, actor: int) -> "tuple[DeformationField, int]":
+        """See ``Motion``."""
+        if not 0 <= actor < self.config.actors:
+            raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
+        copy = deepcopy(self)
+        copy.config = replace(self.config, actors=self.config.actors + 1)
+        copy.track_pivot_m = torch.cat([self.track_pivot_m, self.track_pivot_m[actor, None]])
+        for name in ("track_translation", "track_yaw_rad"):
+            rows = getattr(self, name)
+            setattr(copy, name, nn.Parameter(torch.cat([rows, rows[actor, None]])))
+        return copy, self.config.actors
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""

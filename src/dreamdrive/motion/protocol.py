@@ -1,4 +1,4 @@
-"""What scenes and fits ask of a representation of motion."""
+"""The protocol of representations of motion."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -107,6 +107,14 @@ class Motion(nn.Module, ABC):
 
     def steered(self, actor: int, track: Track) -> "Motion":
         """A copy in which an actor follows another track.
+
+        Raises:
+            ValueError: It knows no tracks, or none of this actor.
+        """
+        raise ValueError(f"motion: {self.kind} knows no tracks of actors")
+
+    def copied(self, actor: int) -> "tuple[Motion, int]":
+        """A copy with one actor more that moves as this one does, and its index.
 
         Raises:
             ValueError: It knows no tracks, or none of this actor.

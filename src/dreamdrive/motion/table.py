@@ -8,11 +8,11 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
-from dreamdrive.choices import RepresentationName
+from dreamdrive.motion.baselines.hexplane import HexPlaneField
+from dreamdrive.motion.baselines.vibration import Vibration
 from dreamdrive.motion.deformation import DeformationField
-from dreamdrive.motion.hexplane import HexPlaneField
 from dreamdrive.motion.protocol import Motion, MotionConfig, Start
-from dreamdrive.motion.vibration import Vibration
+from dreamdrive.names import RepresentationName
 from dreamdrive.scene.gaussians import Gaussians
 
 MOTIONS: Mapping[str, type[Motion]] = MappingProxyType(

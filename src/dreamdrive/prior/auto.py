@@ -1,13 +1,20 @@
-"""Which prior an input is given to where none is named, and why."""
+"""Choice of the prior where none is named, and the reason."""
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from dreamdrive.data.images import SUFFIXES
+from dreamdrive.data import dataset_of
+from dreamdrive.data.pictures.images import SUFFIXES
 from dreamdrive.errors import InputError
+from dreamdrive.prior.table import choose_prior
+from dreamdrive.scene.control import Control
 
-_WITH, _ELSE = {"photo": "vista", "layout": "magicdrive"}, {"photo": "photo", "layout": "street-world"}
+NAMED = "it was named"
+"""Why a prior was chosen that a user named."""
+DRAWS_LAYOUTS = "street-world"
+"""The prior that draws a layout without any network, and knows the truth of it."""
+_WITH, _ELSE = {"photo": "vista", "layout": "magicdrive"}, {"photo": "photo", "layout": DRAWS_LAYOUTS}
 _TITLES = {"vista": "Vista", "magicdrive": "MagicDrive"}
 
 
@@ -25,6 +32,27 @@ def variable_of(prior: str) -> str:
     return f"DREAMDRIVE_{prior.upper()}"
 
 
+def choice_of(control: Control, named: str | None = None, with_weights: bool = False) -> Choice:
+    """The prior of that name, or the one for the input, see ``auto_prior``."""
+    if named is not None:
+        return Choice(named, NAMED)
+    if control.dataset:
+        return Choice("replay", "--dataset says how the recording lies on disk")
+    return auto_prior(control.path, with_weights)
+
+
+def taken_by(control: Control, named: str | None = None) -> tuple[str, frozenset[str]]:
+    """The prior that an input goes to, and the fields of ``Control`` that it takes of such an input.
+
+    Raises:
+        InputError: There is no prior of that name, or the input is not of the data set that is named.
+    """
+    prior = choose_prior(choice_of(control, named).name)
+    if control.path is None or not prior.recorded:
+        return prior.name, prior.takes
+    return prior.name, dataset_of(control.dataset, control.path).takes | {"dataset"}
+
+
 def auto_prior(path: Path | None, with_weights: bool = False) -> Choice:
     """The prior for an input where none is named.
 
@@ -40,7 +68,7 @@ def auto_prior(path: Path | None, with_weights: bool = False) -> Choice:
     """
     kind = _kind_of(path)
     if kind is None:
-        return Choice("replay", "a recording is taken as it is")
+        return Choice("replay", "a recording needs no video model")
     if kind == "photo" and with_weights:
         raise InputError(
             f"{path} is a photo: name the video model of --weights with --prior NAME, such as --prior vista"
@@ -49,8 +77,7 @@ def auto_prior(path: Path | None, with_weights: bool = False) -> Choice:
     weights = None if with_weights else os.environ.get(variable_of(model))
     if weights:
         return Choice(model, f"{variable_of(model)} tells where its weights are", weights)
-    why = f"for a {kind}, as no weights of {_TITLES[model]} are configured ({variable_of(model)})"
-    return Choice(_ELSE[kind], why)
+    return Choice(_ELSE[kind], f"no weights of {_TITLES[model]} are configured ({variable_of(model)})")
 
 
 def _kind_of(path: Path | None) -> str | None:

@@ -10,15 +10,15 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from dreamdrive.errors import InputError
+from dreamdrive.errors import PIP, InputError
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
 from dreamdrive.prior.path import from_first, wanted_path
-from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.protocol import Input, Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Control, VideoModelInput, fields_of
 from dreamdrive.scene.trajectory import Trajectory
 
 CLASS = "Cosmos3OmniPipeline"
@@ -39,12 +39,13 @@ _A_LATENT = 4
 """Frames that the model holds in one latent, after the first."""
 
 
-def cosmos(control: Control, progress: Progress = silent) -> Clip:
+def cosmos(opened: Input, progress: Progress = silent) -> Clip:
     """A clip along the wanted path; Z_ref is ``features["appearance"]``.
 
     The poses of ``requested`` are what was asked for, with the first frame at the identity. They were not
     measured in the frames and are not ``known``: how well the model keeps to them, the geometry has to find.
     """
+    control = opened.control
     wanted = wanted_path(control)
     if wanted is None:
         raise InputError(
@@ -120,7 +121,7 @@ def _load(control: Control) -> Any:
         raise InputError(f"--weights {control.weights} holds a {name}; --prior cosmos takes a {CLASS}")
     kind = getattr(diffusers, CLASS, None)
     if kind is None:
-        raise InputError(f"diffusers {diffusers.__version__} has no {CLASS}: pip install --upgrade diffusers")
+        raise InputError(f"diffusers {diffusers.__version__} has no {CLASS}: {PIP} --upgrade diffusers")
     pipeline = diffusers_pipeline.load(
         kind, control.weights, safety_checker=None, enable_safety_checker=False
     )
@@ -150,21 +151,7 @@ def _condition(photo: UInt8[np.ndarray, "h w 3"], rows: Float[np.ndarray, "n 9"]
 COSMOS = Prior(
     name="cosmos",
     make=cosmos,
-    takes=frozenset(
-        {
-            "path",
-            "trajectory",
-            "trajectories",
-            "prompt",
-            "steps",
-            "frames",
-            "size",
-            "intrinsics",
-            "hfov_deg",
-            "view",
-            "hold_out",
-        }
-    ),
+    takes=fields_of(VideoModelInput) - {"fps", "action", "actions"} | {"view"},
     gives="61 frames at 10 Hz, the path asked for (not measured); intrinsics, where they are given",
     about="Cosmos 3 of NVIDIA: a photo and the path to drive become a video",
     licence="diffusers Apache-2.0; weights OpenMDW-1.1, as NVIDIA states it",

@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from dreamdrive.data.select import Selection
-from dreamdrive.errors import InputError
+from dreamdrive.data.frames.select import Selection
+from dreamdrive.errors import PIP, InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.prior import diffusers_pipeline
 from dreamdrive.prior.diffusers_pipeline import PROMPT, make_clip, photo_of, wanted_frames
-from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.protocol import Input, Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Control, Driving, VideoModelInput, fields_of
 
 NEEDED = ("image", "num_frames", "num_inference_steps", "generator", "output_type", "callback_on_step_end")
 """Arguments by which a pipeline is known to make a video from a photo, as diffusers names them."""
@@ -33,7 +33,7 @@ _SMALLEST_STEP_PX = 16
 
 
 @dataclass(frozen=True)
-class Kind:
+class _PipelineKind:
     """A class of pipelines, and its arguments with their defaults."""
 
     make: Any
@@ -41,10 +41,11 @@ class Kind:
     name: str
 
 
-def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
+def diffusers_i2v(opened: Input, progress: Progress = silent) -> Clip:
     """A clip that goes on from a photo; Z_ref is ``features["appearance"]``."""
     from PIL import Image
 
+    control = opened.control
     assert control.weights is not None  # by ``Prior.check``
     kind = find_kind(control.weights)
     rate_hz = _rate_hz(kind, control)
@@ -78,7 +79,7 @@ def diffusers_i2v(control: Control, progress: Progress = silent) -> Clip:
     return make_clip(control, wanted, photo, np.asarray(made.frames[0]), rate_hz, provenance)
 
 
-def find_kind(folder: Path) -> Kind:
+def find_kind(folder: Path) -> _PipelineKind:
     """The class of the pipeline in a folder, if it makes videos from photos."""
     import diffusers
     from diffusers.pipelines.pipeline_utils import DiffusionPipeline
@@ -107,11 +108,11 @@ def find_kind(folder: Path) -> Kind:
         raise InputError(f"--weights {folder} holds a {name}, which also needs {' and '.join(more)}")
     # These pipelines clean their prompt with ftfy, and fail where it is not there.
     if hasattr(sys.modules[made.__module__], "is_ftfy_available") and find_spec("ftfy") is None:
-        raise InputError(f"{name} needs the package ftfy: pip install ftfy")
-    return Kind(made, {each.name: each.default for each in parameters.values()}, name)
+        raise InputError(f"{name} needs the package ftfy: {PIP} ftfy")
+    return _PipelineKind(made, {each.name: each.default for each in parameters.values()}, name)
 
 
-def _arguments(kind: Kind, control: Control, rate_hz: float) -> dict[str, Any]:
+def _arguments(kind: _PipelineKind, control: Control, rate_hz: float) -> dict[str, Any]:
     """Prompt and rate, as far as the pipeline takes them."""
     given: dict[str, Any] = {}
     if "prompt" in kind.defaults:
@@ -127,7 +128,7 @@ def _arguments(kind: Kind, control: Control, rate_hz: float) -> dict[str, Any]:
     return given
 
 
-def _rate_hz(kind: Kind, control: Control) -> float:
+def _rate_hz(kind: _PipelineKind, control: Control) -> float:
     usual = next((kind.defaults[name] for name in _RATE_NAMES if name in kind.defaults), None)
     told = usual if control.fps is None else control.fps
     if told is None:
@@ -140,7 +141,7 @@ def _rate_hz(kind: Kind, control: Control) -> float:
     return float(told)
 
 
-def _size(kind: Kind, control: Control) -> tuple[int, int]:
+def _size(kind: _PipelineKind, control: Control) -> tuple[int, int]:
     """Width and height of the video, as wanted or as is usual for the pipeline."""
     if control.size is not None:
         if any(side % _SMALLEST_STEP_PX for side in control.size):
@@ -155,7 +156,7 @@ def _size(kind: Kind, control: Control) -> tuple[int, int]:
     return usual if "height" in kind.defaults else _USUAL_SIZE  # pyright: ignore[reportReturnType]
 
 
-def _own_frames(kind: Kind, control: Control) -> int:
+def _own_frames(kind: _PipelineKind, control: Control) -> int:
     """How many frames a model makes whose pipeline leaves that to its network, as SVD's does."""
     assert control.weights is not None  # by ``Prior.check``
     config = control.weights / "unet" / "config.json"
@@ -170,9 +171,7 @@ def _own_frames(kind: Kind, control: Control) -> int:
 DIFFUSERS = Prior(
     name="diffusers",
     make=diffusers_i2v,
-    takes=frozenset(
-        {"path", "prompt", "steps", "frames", "fps", "size", "intrinsics", "hfov_deg", "hold_out"}
-    ),
+    takes=fields_of(VideoModelInput) - fields_of(Driving),
     gives="the frames; intrinsics, where they are given",
     about="any pipeline of diffusers from photo to video: Wan, LTX, HunyuanVideo, CogVideoX, SVD",
     licence="diffusers Apache-2.0; weights as their model card states",

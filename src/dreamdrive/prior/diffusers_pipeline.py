@@ -1,4 +1,4 @@
-"""What all pipelines of diffusers have in common: how they are loaded, and how their video becomes a clip."""
+"""Loading of diffusers' pipelines, and clips of the videos that they make."""
 
 from pathlib import Path
 from typing import Any
@@ -7,9 +7,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.data.frames.select import Selection, held_out_mask
 from dreamdrive.data.photo import Photo, read_photo
-from dreamdrive.data.select import Selection, held_out_mask
-from dreamdrive.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.prior.appearance import appearance

@@ -1,4 +1,4 @@
-"""Where a video model shall drive: a wanted path as the actions of Vista, and the path that an action means.
+"""Paths as actions of Vista, and the path that an action means.
 
 Paths are those of the camera (x right, y down, z ahead) and count from their first pose and time. The car is
 a bicycle (Rajamani, Vehicle Dynamics and Control, 2012, 2.2): its wheels do not slip, so that the camera,
@@ -18,9 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from dreamdrive.data import read_trajectory
 from dreamdrive.errors import InputError
-from dreamdrive.scene.action import AT_S, Four, Steering, Waypoints, check_action
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import AT_S, Control, Four, Steering, Waypoints, check_action
 from dreamdrive.scene.trajectory import Trajectory
 
 WHEEL_BASE_M = 2.588

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from dreamdrive.data import read_trajectories
-from dreamdrive.data.select import Selection
+from dreamdrive.data.frames.select import Selection
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control

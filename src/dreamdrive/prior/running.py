@@ -1,4 +1,4 @@
-"""What priors have in common while their networks run."""
+"""Work that priors have in common while their networks run."""
 
 import itertools
 from collections.abc import Callable, Generator
@@ -9,10 +9,10 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
-from dreamdrive.errors import InputError
+from dreamdrive.errors import InputError, installing
 from dreamdrive.progress import Progress
 
-PACKAGE, INSTALL = "diffusers", 'pip install "dreamdrive[video-prior]"'
+PACKAGE, INSTALL = "diffusers", installing("video-prior")
 """What priors with a network need, and how to get it."""
 
 

@@ -1,36 +1,32 @@
-"""What a map-conditioned prior is given: a layout, or a scene of a data set with its cameras.
+"""Input of a map-conditioned prior: a layout, or a scene of a data set with its cameras.
 
 Of a scene its boxes, map, path and calibration count; its pictures are never opened.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from dreamdrive.data import log_of
+from dreamdrive.data.frames.select import Selection
 from dreamdrive.data.layout_file import read_layout
-from dreamdrive.data.log_layout import layout_of_log
-from dreamdrive.data.logs import choose_cameras
-from dreamdrive.data.select import Selection
+from dreamdrive.datasets.log_layout import layout_of_log
+from dreamdrive.datasets.logs import choose_cameras
 from dreamdrive.errors import InputError
-from dreamdrive.scene.control import Control
-from dreamdrive.scene.layout import Layout, track_function
-from dreamdrive.scene.log import Log, LogCamera, OfLog
+from dreamdrive.prior.protocol import Input
+from dreamdrive.scene.control import Control, DataSetDrive, flag_of
+from dreamdrive.scene.level import upright
+from dreamdrive.scene.street.layout import Layout, track_function
+from dreamdrive.scene.street.log import Log, LogCamera, OfLog
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.world import upright
 
-OF_SCENES = ("dataset", "scene", "cameras")
-"""Fields of ``Control`` that choose a scene of a data set and its cameras."""
-TAKES = frozenset({"path", *OF_SCENES})
-"""Fields of ``Control`` that name a street."""
 _EARLIER_S = 1e-6
 """Times of a frame and of the last label that are equal differ by rounding."""
 
 
 @dataclass(frozen=True)
-class Street:
+class StreetSource:
     """What is to be seen, and of a scene of a data set from where.
 
     Attributes:
@@ -50,38 +46,40 @@ class Street:
         return None if self.log is None else int(float(self.log.times_s[-1]) * rate_hz + _EARLIER_S) + 1
 
 
-def read_street(control: Control, path: Path, without: str | None = None) -> Street:
+def read_street(opened: Input, path: Path, without: str | None = None) -> StreetSource:
     """The street of a layout file, or of a scene of a data set.
 
     Args:
-        control: Its fields ``dataset``, ``scene`` and ``cameras`` choose of a data set.
+        opened: The input; its control's ``cameras`` choose of a data set.
         path: The layout, or a folder of a data set.
         without: The cameras where none are asked for, as ``--cameras``; the one that looks ahead unless told.
     """
-    control = replace(control, path=path)
-    log = log_of(control)
+    control, log = opened.control, opened.log
     if log is not None:
         cameras = choose_cameras(log, without if control.cameras is None else control.cameras)
-        return Street(layout_of_log(log), f"the scene {log.name} of {log.root.name}", log, tuple(cameras))
+        return StreetSource(
+            layout_of_log(log), f"the scene {log.name} of {log.root.name}", log, tuple(cameras)
+        )
     check_no_scene(control)
     if path.is_dir():
         raise InputError(
             f"{path} is a folder that holds no scenes with maps and boxes; expected a layout as JSON, see "
             "docs/layout.md, or a folder of a data set: dreamdrive data list tells which there are"
         )
-    return Street(read_layout(path), f"the layout {path.name}")
+    return StreetSource(read_layout(path), f"the layout {path.name}")
 
 
 def check_no_scene(control: Control) -> None:
     """Refuse fields that choose of a data set where there is none."""
-    if given := [f"--{name}" for name in OF_SCENES if getattr(control, name) is not None]:
+    chosen = [each.name for each in fields(DataSetDrive)]
+    if given := [flag_of(name) for name in chosen if getattr(control, name) is not None]:
         got = "there is no input" if control.path is None else f"{control.path} is none with scenes"
         raise InputError(
             f"{' and '.join(given)} choose of a data set, and {got}; leave them out, or give a folder of one"
         )
 
 
-def wanted_frames(control: Control, usual: int, rate_hz: float, street: Street | None = None) -> range:
+def wanted_frames(control: Control, usual: int, rate_hz: float, street: StreetSource | None = None) -> range:
     """The frames to make: ``usual`` many unless ``control.frames`` says where to stop.
 
     A scene of a data set ends with its last label, and negative numbers count from there.
@@ -104,20 +102,7 @@ def wanted_frames(control: Control, usual: int, rate_hz: float, street: Street |
     return selection.resolve(count, f"{street.name}, at {rate_hz:g} Hz,")
 
 
-def told_of_street(log: Log) -> list[object]:
-    """All of a scene that a map-conditioned prior may use, for a digest: no pictures and no points."""
-    lead = log.cameras[0]  # whose path is the car's
-    return [
-        [log.name, log.about, log.location, log.times_s, log.world_from_ego, log.notes],
-        [[each.name, each.pinhole, each.ego_from_camera] for each in log.cameras],
-        [lead.times_s, lead.world_from_camera],
-        log.boxes,
-        [[each.time_s, each.world_from_points] for each in log.sweeps],
-        [dict(log.map.areas), dict(log.map.lines)],
-    ]
-
-
-def map_from_cameras(street: Street, times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t n 4 4"]:
+def map_from_cameras(street: StreetSource, times_s: Float[np.ndarray, " t"]) -> Float[np.ndarray, "t n 4 4"]:
     """Poses of a scene's cameras in its layout: the car stands level on the road, as the layout has it.
 
     The first camera of the scene follows the layout's path; how it is tilted on the car, and where the others
@@ -133,7 +118,7 @@ def map_from_cameras(street: Street, times_s: Float[np.ndarray, " t"]) -> Float[
     return places[:, None] @ mounted
 
 
-def place_in_log(street: Street, time_s: float) -> OfLog:
+def place_in_log(street: StreetSource, time_s: float) -> OfLog:
     """Where a clip lies in its scene's log, whose first frame is of ``time_s`` and of the first camera.
 
     In the plane it is exact: a layout is the log's plane, moved. It has no heights, so that its level road

@@ -1,12 +1,35 @@
-"""How a run is kept apart from others, and what it says."""
+"""Runs: kept apart from others, resumable, reported."""
 
-from dreamdrive.run import check, codec
-from dreamdrive.run.lock import only_run
-from dreamdrive.run.options_file import read_options
-from dreamdrive.run.outcome import Outcome, lines_of, outcome_of, read_outcome
-from dreamdrive.run.production import Production, start
-from dreamdrive.run.report import PACKAGES, package_versions
-from dreamdrive.run.request import Request, request_of
-from dreamdrive.run.sampling import clip_features, sample
-from dreamdrive.run.stages import STAGES, Run, Stages, call, digest, file_digest, program_digest, stage_seed
-from dreamdrive.run.workspace import REPORT, check_ours, check_place, open_workspace
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.run import codec as codec
+    from dreamdrive.run.lock import only_run as only_run
+    from dreamdrive.run.options_file import read_options as read_options
+    from dreamdrive.run.production import Production as Production, start as start
+    from dreamdrive.run.program import program_digest as program_digest, program_of as program_of
+    from dreamdrive.run.report.document import PACKAGES as PACKAGES, package_versions as package_versions
+    from dreamdrive.run.report.held_out import (
+        Likeness as Likeness,
+        likeness as likeness,
+        score_baselines as score_baselines,
+        score_scene as score_scene,
+    )
+    from dreamdrive.run.report.outcome import (
+        Outcome as Outcome,
+        lines_of as lines_of,
+        outcome_of as outcome_of,
+        read_outcome as read_outcome,
+    )
+    from dreamdrive.run.request import Request as Request, request_of as request_of
+    from dreamdrive.run.sampling import clip_features as clip_features, sample as sample
+    from dreamdrive.run.stages import STAGES as STAGES, Stages as Stages
+    from dreamdrive.run.workspace import (
+        REPORT as REPORT,
+        check_ours as check_ours,
+        open_workspace as open_workspace,
+    )
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

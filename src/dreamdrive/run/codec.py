@@ -25,10 +25,10 @@ from dreamdrive.scene.clip import Clip, Known, Recorded
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
-from dreamdrive.scene.log import OfLog
-from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.log import OfLog
+from dreamdrive.scene.street.look import CameraEstimate, Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
 from dreamdrive.scene.trajectory import Trajectory
 
 NOUNS: dict[str, type] = {
@@ -161,5 +161,8 @@ def _decode(value: Any, arrays: dict[str, Shaped[np.ndarray, "..."]]) -> Any:
         return StreetClass[content]
     if kind == _NOUN:
         parts = {name: _decode(item, arrays) for name, item in value["fields"].items()}
-        return build(NOUNS[content], parts)
+        made = build(NOUNS[content], parts)
+        if isinstance(made, Gaussians) and (problem := made.problem()):
+            raise DamagedError(problem)
+        return made
     raise DamagedError(f"unknown entry {kind!r}")

@@ -16,17 +16,21 @@ from dreamdrive.options import Options
 
 T = TypeVar("T")
 _ELSEWHERE = {
+    "quality": "--quality",
     "seed": "--seed",
     "geometry.weights": "--weights or --geometry-weights",
     "knowledge": "--knowledge",
+    "method": "--method",
 }
+_NONE = "none"
+"""What stands for no value, which TOML has no word for."""
 
 
 def read_options(path: Path, base: Options) -> Options:
     """The options of ``base`` with those changed that a file names.
 
-    The file holds tables such as ``[fit]`` with ``steps = 600``; every field of ``Options`` can be set but
-    the seed and the weights, which have flags.
+    The file holds tables such as ``[fit]`` with ``steps = 600``, and ``"none"`` where an option has no value;
+    every field of ``Options`` can be set but quality, method and weights, which have flags.
     """
     text = read_text(path)
     try:
@@ -55,7 +59,8 @@ def _changed(options: T, values: dict[str, Any], before: str, where: str, known:
             changes[key] = _changed(now, value, f"{name}.", where, known)
         elif name in known:
             try:
-                changes[key] = msgspec.convert(value, hints[key])
+                # Only where a hint allows no value is it taken as one.
+                changes[key] = msgspec.convert(None if value == _NONE else value, hints[key])
             except msgspec.ValidationError as error:
                 raise InputError(f"{where}: {name}: {error}") from None
             if isinstance(value, float | int) and not 0 <= value < math.inf:

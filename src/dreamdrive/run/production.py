@@ -3,20 +3,22 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from jaxtyping import UInt8
 
+from dreamdrive.build import Built
+from dreamdrive.compute.machine import available_cores, free_bytes
 from dreamdrive.data import read_clip
 from dreamdrive.files.paths import inside
-from dreamdrive.machine import available_cores, free_bytes
-from dreamdrive.progress import Progress, StageProgress, Work
-from dreamdrive.run.cost import announcement, check_memory, plan
-from dreamdrive.run.held_out import score_baselines, score_scene
-from dreamdrive.run.in_motion import found_again
-from dreamdrive.run.outcome import Outcome, outcome_of
-from dreamdrive.run.report import describe
+from dreamdrive.prior import NAMED, Choice, choose_prior
+from dreamdrive.progress import Progress, StageProgress
+from dreamdrive.run.report.cost import announcement, check_memory
+from dreamdrive.run.report.document import describe, facts_about
+from dreamdrive.run.report.held_out import score_baselines, score_scene
+from dreamdrive.run.report.in_motion import found_again
+from dreamdrive.run.report.outcome import Outcome, outcome_of
+from dreamdrive.run.report.shift import shift_of
 from dreamdrive.run.request import Request
 from dreamdrive.run.stages import Stages
 from dreamdrive.run.workspace import REPORT, Workspace
@@ -34,8 +36,6 @@ from dreamdrive.show import (
 )
 from dreamdrive.stored import save_scene
 
-T = TypeVar("T")
-
 Say = Callable[[str], None]
 """Called with a sentence for somebody who waits."""
 
@@ -49,31 +49,33 @@ class Production(Stages):
 
     workspace: Workspace
     request: Request
-    say: Say
 
-    def _compute(self, name: str, key: str, compute: Callable[[Work], T]) -> T:
-        value = super()._compute(name, key, compute)
-        if isinstance(value, Geometry):
-            picture = inside(self.folder, FIRST_PICTURE)
-            write_png(picture, draw_geometry(self.results["prior"], value))
-            self.say(f"A first picture is there, of the path, distances and what moves: {picture}")
-        return value
+    def show_first(self, clip: Clip, geometry: Geometry) -> None:
+        """Write and tell of a picture of what was found before anything is fitted."""
+        picture = inside(self.folder, FIRST_PICTURE)
+        write_png(picture, draw_geometry(clip, geometry))
+        self.say(f"A first picture is there, of the path, distances and what moves: {picture}")
 
-    def publish(self, scene: Scene) -> Outcome:
+    def publish(self, built: Built) -> Outcome:
         """Put scene, videos, held-out frames and report into the output folder, all at once."""
         request, staging = self.request, self.workspace.fresh_staging()
-        clip: Clip = self.results["prior"]
-        geometry: Geometry = self.results["geometry"]
+        clip, geometry = built.clip, built.geometry
         path = request.control.path
-        scene = replace(scene, provenance=_about(path, clip, geometry, request.prior))
+        scene = replace(built.scene, provenance=_about(path, clip, geometry, request.prior))
+        held_out, baselines = score_scene(clip, geometry, scene), score_baselines(clip, geometry)
+        again, options = found_again(clip, scene), request.document["options"]
+        facts = facts_about(clip, geometry, scene, options, held_out, baselines, again)
+        shift = shift_of(scene, facts)
 
         def show(progress: Progress) -> None:
             save_scene(scene, staging / "scene")
-            write_videos(staging / "video", scene, self._recorded(clip, scene), self._scored(), progress)
+            recorded = self._recorded(clip, scene)
+            videos = staging / "video"
+            write_videos(videos, scene, recorded, self._scored(built), progress, shift_m=shift.right_m)
             write_held_out(staging / "held_out", scene, clip.source_index.tolist())
-            write_png(staging / "report.png", draw_geometry(clip, geometry))
+            write_png(staging / "report.png", draw_geometry(clip, geometry, scene))
             if (drives := draw_drives(scene)) is not None:
-                write_png(staging / "video" / "drives.png", drives)
+                write_png(videos / "drives.png", drives)
 
         self.measure("videos", show)
         report = describe(
@@ -87,34 +89,37 @@ class Production(Stages):
             },
             self.records,
             request.options.for_clip(clip).steps,
-            score_scene(clip, geometry, scene),
-            score_baselines(clip, geometry),
-            found_again(clip, scene),
+            held_out,
+            baselines,
+            again,
+            shift,
+            self.whole_s,
         )
         self.workspace.publish(report)
         return outcome_of(report, REPORT, already_finished=False)
 
-    def _scored(self) -> Scored | None:
+    def _scored(self, built: Built) -> Scored | None:
         """What the panel of the dynamic scores shows, where the representation has them."""
-        if "score" not in self.results:
+        if built.scores is None:
             return None
-        threshold = self.request.options.group.threshold
-        return Scored(self.results["static"].gaussians, self.results["score"], threshold)
+        return Scored(built.static.gaussians, built.scores, self.request.options.group.threshold)
 
     def _recorded(self, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:
         """The frames in the source's distortion, at the clip's size."""
-        control = self.request.control
-        if lens_of(scene) is None or control.path is None:
+        control, taken = self.request.control, clip.recorded
+        if lens_of(scene) is None or control.path is None or taken is None:
             return clip.frames[scene.front]
-        return read_clip(control.path, frames=control.frames, fps=control.fps, size=clip.size).frames
+        read = read_clip(control.path, frames=control.frames, fps=control.fps, size=clip.size)
+        kept = read.frames[np.isin(read.source_index, clip.source_index)]
+        return kept[:, ::-1, ::-1] if taken.turned else kept
 
 
 def start(
     workspace: Workspace, request: Request, recompute_from: str | None, progress: StageProgress, say: Say
 ) -> Production:
     """Say which prior it is, and what the run will cost where that is known before, and begin."""
-    say(f"The prior is {request.prior}: {request.choice.why}.")
-    planned = plan(request.control, request.prior)
+    say(_whose_frames(request.choice))
+    planned = request.input.plan
     if planned is not None:
         check_memory(planned, free_bytes())
         if request.options.device == "cpu":  # where the times were measured
@@ -129,6 +134,14 @@ def start(
         request=request,
         say=say,
     )
+
+
+def _whose_frames(choice: Choice) -> str:
+    """Where the frames come from, and why from there, in a sentence."""
+    if choice.name == "replay":
+        return "The frames are those of the recording."
+    about = f"The frames come from the prior {choice.name}: {choose_prior(choice.name).about}."
+    return about if choice.why == NAMED else f"{about} It was chosen as {choice.why}."
 
 
 def _about(path: Path | None, clip: Clip, geometry: Geometry, prior: str) -> Provenance:

@@ -1,5 +1,6 @@
 """Priors on their own: frames and features on disk, with where they come from, for ``replay`` to take up."""
 
+import os
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -7,18 +8,18 @@ from typing import Any
 from dreamdrive import __version__
 from dreamdrive.data import read_clip
 from dreamdrive.data.feature_file import INDEX, MAX_CHANNELS, FeatureFile, write_features
-from dreamdrive.data.recording import KIND, write_recording
+from dreamdrive.data.recording import write_recording
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
+from dreamdrive.files.digest import file_digest
+from dreamdrive.files.given import check_there
+from dreamdrive.files.kinds import RECORDING_KIND
 from dreamdrive.files.output import check_free
 from dreamdrive.models import find_weights
-from dreamdrive.prior import Choice, auto_prior, choose_prior
+from dreamdrive.prior import Input, choice_of, choose_prior
 from dreamdrive.progress import Progress, silent
-from dreamdrive.run.request import digest_of_log
-from dreamdrive.run.stages import file_digest
-from dreamdrive.scene.action import Action
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import FILES, Control
+from dreamdrive.scene.control import FILES, Action, Control
 
 _SEEN_PX = 1024
 
@@ -37,35 +38,36 @@ def sample(
     Without a name the input decides on the prior, see ``prior.auto_prior``; weights as of
     ``hub.find_weights``. ``force`` replaces an older folder of this kind.
     """
-    choice = Choice(prior, "named") if prior else auto_prior(control.path, weights is not None)
+    choice = choice_of(control, prior, weights is not None)
     name, weights = choice.name, choice.weights if weights is None else weights
     control = control if weights is None else replace(control, weights=find_weights(weights))
-    chosen = choose_prior(name)
-    chosen.check(control)
+    choose_prior(name).check(control)
     for file in FILES:
         path: object = getattr(control, file)
-        if isinstance(path, Path) and not path.exists():
-            raise InputError(f"{path} does not exist; expected the {file if file != 'path' else 'input'}")
-    if control.path is not None and out.resolve() == control.path.resolve():
+        if isinstance(path, Path):
+            check_there(path, f"the {file if file != 'path' else 'input'}")
+    if control.path is not None and os.path.realpath(out) == os.path.realpath(control.path):
         raise InputError(f"{out} is the input itself; choose another output folder")
-    check_free(out, force, KIND)
-    clip = chosen(control, progress)
+    check_free(out, force, RECORDING_KIND)
+    opened = choose_prior(name).open(control)
+    clip = opened.clip(progress)
     if clip.step[-1] < 1:
         raise InputError(f"--frames {control.frames}: a single frame is no recording; choose two or more")
-    write_recording(clip, out, _about(name, control), replace=force)
+    write_recording(clip, out, _about(opened), replace=force)
     return clip
 
 
-def _about(prior: str, control: Control) -> dict[str, Any]:
+def _about(opened: Input) -> dict[str, Any]:
     """What it takes to make the same again: files by name and content, all else by value."""
+    control = opened.control
     given = {name: path for name in FILES if isinstance(path := getattr(control, name), Path)}
-    drive = digest_of_log(control, prior)
+    known = {"path": opened.digest}
     return {
         "dreamdrive": __version__,
-        "prior": prior,
+        "prior": opened.prior.name,
         "seed": control.seed,
         "options": {name: value for name, value in control.settings.items() if value is not None},
-        "files": {name: _named(path, drive if name == "path" else None) for name, path in given.items()},
+        "files": {name: _named(path, known.get(name)) for name, path in given.items()},
     }
 
 

@@ -1,29 +1,24 @@
 """Stages whose results are kept: the same input and options are never computed twice."""
 
-import hashlib
-import json
 import logging
 import resource
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from functools import cache
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast, get_args, runtime_checkable
+from typing import Any, TypeVar, cast, get_args
 
-import numpy as np
-import torch
-
-from dreamdrive import _native
-from dreamdrive.choices import Stage
 from dreamdrive.errors import InputError
+from dreamdrive.files.digest import digest
 from dreamdrive.files.json_file import of_type
 from dreamdrive.files.output import remove
-from dreamdrive.files.paths import inside, open_file
-from dreamdrive.progress import Progress, StageProgress, Work
+from dreamdrive.files.paths import inside
+from dreamdrive.names import Stage
+from dreamdrive.progress import Progress, StageProgress, Work, trusted
 from dreamdrive.run import codec
+from dreamdrive.run.program import program_of
 from dreamdrive.stored import load_scene, save_scene
 
 STAGES: tuple[str, ...] = get_args(Stage)
@@ -47,51 +42,15 @@ _SCENE = "fit"
 """The stage whose result is a scene, which ``codec`` does not know."""
 
 
-def trusted(value: object) -> None:
-    """No check."""
-
-
-@runtime_checkable
-class Run(Protocol):
-    """What gives the result of a stage: ``call`` computes it, ``Stages`` keeps it on disk."""
-
-    def __call__(
-        self,
-        name: str,
-        options: object,
-        compute: Callable[[Work], T],
-        *,
-        check: Callable[[T], None] = trusted,
-        given: T | None = None,
-    ) -> T:
-        """The result of one of ``STAGES``, unless it is given.
-
-        It depends on the options and the results before it, nothing else; ``check`` raises ``ValueError``
-        where a stored result does not belong to these.
-        """
-        ...
-
-
-def call(
-    name: str,
-    options: object,
-    compute: Callable[[Work], T],
-    *,
-    check: Callable[[T], None] = trusted,
-    given: T | None = None,
-) -> T:
-    """A ``Run`` that keeps nothing."""
-    return compute(Work()) if given is None else given
-
-
 @dataclass
 class Stages:
     """Reads what an earlier run of the same stages left, and leaves what it computes, a folder for each.
 
-    The key of a result holds its options, the keys of all stages before it, and a digest of the program: a
-    result is found again only by the program that made it. Those of ``recompute_from`` and later stages are
-    not read. ``claim`` is called before something is written. Records and results are those of each stage
-    that ran.
+    The key of a result holds its options, the keys of all stages before it, and the program that the stage
+    is, see ``program_of``: a result is found again only by the program that made it. Those of
+    ``recompute_from`` and later stages are not read. ``claim`` is called before something is written, ``say``
+    with a sentence for somebody who waits, ``then`` of a stage with a result that was just computed. Records
+    are those of each stage that ran.
     """
 
     folder: Path
@@ -99,8 +58,11 @@ class Stages:
     progress: StageProgress
     claim: Callable[[], None]
     records: dict[str, StageRecord] = field(default_factory=dict)
-    results: dict[str, Any] = field(default_factory=dict)
+    then: dict[str, Callable[[Any], None]] = field(default_factory=dict)
+    say: Callable[[str], None] = lambda sentence: None
+    _began_s: float = field(default_factory=time.perf_counter, init=False)
     _last: str = field(default="", init=False)
+    _told: bool = field(default=False, init=False)
 
     def __call__(
         self,
@@ -112,15 +74,22 @@ class Stages:
         given: T | None = None,
     ) -> T:
         """See ``Run``; a computed result is stored and read back, so that what follows sees no difference."""
-        self._last = digest([name, program_digest(), options if given is None else given, self._last])
-        value = self._kept(name, compute, check) if given is None else given
-        self.results[name] = value
-        return value
+        self._last = digest([name, program_of(name), options if given is None else given, self._last])
+        return self._kept(name, compute, check) if given is None else given
+
+    @property
+    def whole_s(self) -> float:
+        """What all of it took until now: this run, and the stages that an earlier one left."""
+        kept = sum(record.seconds for record in self.records.values() if record.cached)
+        return time.perf_counter() - self._began_s + kept
 
     def _kept(self, name: str, compute: Callable[[Work], T], check: Callable[[T], None]) -> T:
         folder = inside(self.folder, name)
         fresh = self.recompute_from is not None and STAGES.index(name) >= STAGES.index(self.recompute_from)
         found = None if fresh else _header(folder)
+        if found is not None and found.program != program_of(name) and not self._told:
+            self._told = True
+            self.say(f"The program has changed since: {name} and what rests on it are computed again.")
         if found is not None and found.key == self._last:
             try:
                 value = cast(T, _load(folder))
@@ -168,9 +137,12 @@ class Stages:
         record = self.records[name]
         self.claim()
         folder = inside(self.folder, name)
-        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb)))
+        _store(folder, value, asdict(_Header(key, record.seconds, record.peak_rss_mb, program_of(name))))
         remove(parts)
-        return cast(T, _load(folder))
+        stored = cast(T, _load(folder))
+        if name in self.then:
+            self.then[name](stored)
+        return stored
 
 
 @dataclass(frozen=True)
@@ -180,6 +152,7 @@ class _Header:
     key: str
     seconds: float
     peak_rss_mb: float
+    program: str = ""
 
 
 def _header(folder: Path) -> _Header | None:
@@ -202,67 +175,6 @@ def _store(folder: Path, value: Any, header: dict[str, Any]) -> None:
 
 def _load(folder: Path) -> object:
     return load_scene(inside(folder, "value")) if folder.name == _SCENE else codec.read(folder)
-
-
-def digest(value: object) -> str:
-    """SHA-256 of JSON values, arrays, paths, which count by their content, and dataclasses of them."""
-    text = json.dumps(value, sort_keys=True, default=_plain)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _plain(value: object) -> object:
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: getattr(value, field.name) for field in fields(value)}
-    if isinstance(value, Path):
-        return file_digest(value, deep=True)
-    if isinstance(value, torch.Tensor):
-        value = value.detach().cpu().numpy()
-    if isinstance(value, np.ndarray):
-        whole = np.ascontiguousarray(value)
-        return [str(whole.dtype), list(whole.shape), hashlib.sha256(whole.data).hexdigest()]
-    if isinstance(value, torch.nn.Module):
-        return dict(value.state_dict())
-    raise TypeError(f"a stage's options hold a {type(value).__name__}")
-
-
-@cache
-def program_digest() -> str:
-    """SHA-256 of the package's sources and of its compiled core: another program keeps other results."""
-    package = Path(__file__).resolve().parents[1]
-    files = [*package.rglob("*.py"), Path(_native.__file__)]
-    return digest([[file.name, hashlib.sha256(file.read_bytes()).hexdigest()] for file in sorted(files)])
-
-
-def file_digest(path: Path, *, deep: bool = False) -> str:
-    """SHA-256 of a file's content, or of names and contents of the files in a folder.
-
-    Hidden files in it do not count, the folders in it if ``deep``. Links are followed.
-    """
-    if not path.is_dir():
-        with open_file(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    files = sorted(file for file in _files(path, deep) if not file.name.startswith("."))
-    return digest([[f.relative_to(path).as_posix(), file_digest(f)] for f in files])
-
-
-def _files(folder: Path, deep: bool, within: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Files of a folder, those behind links too; ``within`` are the folders that lead there.
-
-    ``Path.rglob`` does not enter folders that are links, which is how weights of several places are joined.
-    """
-    real = folder.resolve()
-    if real in within:
-        return
-    for entry in folder.iterdir():
-        if entry.is_file():
-            yield entry
-        elif deep and entry.is_dir():
-            yield from _files(entry, deep, within | {real})
-
-
-def stage_seed(seed: int, name: str) -> int:
-    """A stage's own seed: results do not depend on which other stages ran before it."""
-    return int(digest([seed, name])[:8], 16) % 2**31
 
 
 def peak_rss_mb() -> float:

@@ -4,17 +4,16 @@ What lies in the folder may be damaged or hostile: names in its files count only
 """
 
 import json
-import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from dreamdrive.errors import InputError
+from dreamdrive.files.digest import digest
 from dreamdrive.files.json_file import read_json
-from dreamdrive.files.output import new_file, remove
+from dreamdrive.files.output import check_writable, new_file, remove
 from dreamdrive.files.paths import inside, is_inside
-from dreamdrive.run.stages import digest
 
 OURS = ("held_out", "report.json", "report.png", "scene", "stages", "video")
 """What ``generate`` puts into an output folder."""
@@ -133,24 +132,6 @@ def check_ours(out: Path) -> None:
     """Fail where a folder is not one that ``generate`` wrote."""
     if _identity(out / REPORT) is None and _identity(out / "stages" / "request.json") is None:
         raise InputError(f"{out} is no folder that dreamdrive generate wrote; nothing was removed")
-
-
-def check_place(out: Path, source: Path | None) -> None:
-    """Fail before the work where the output folder is the input, or cannot be written."""
-    if source is not None and out.resolve() == source.resolve():
-        raise InputError(f"{out} is the input itself; choose another output folder")
-    check_writable(out)
-
-
-def check_writable(out: Path) -> None:
-    """Fail before the work rather than after it."""
-    existing = out
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir():
-        raise InputError(f"cannot write to {out}: {existing} is a file, and a folder is needed there")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise InputError(f"cannot write to {out}: no permission to write in {existing}")
 
 
 def _check_kinds(out: Path) -> None:

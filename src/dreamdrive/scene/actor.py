@@ -1,10 +1,11 @@
-"""A thing that moves."""
+"""Actors: things that move."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+_LEAST_WAY_M = 1.0  # that tells where a thing points
 _RATE_S = 0.5  # over which the rate at the ends of a track is taken
 
 
@@ -72,7 +73,7 @@ UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
-class Box:
+class ActorBox:
     """How large an actor is, length, width and height, and where it points at yaw 0, in the world."""
 
     size_m: Float[np.ndarray, "3"]
@@ -111,9 +112,21 @@ class Actor:
     kind: str
     count: int
     track: Track
-    box: Box | None = None
+    box: ActorBox | None = None
     spread_m: Float[np.ndarray, " t"] | None = None
     completed: bool = False
+
+    def ahead(self, up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"] | None:
+        """Where it points in the middle of its track, of length 1: its box tells, else the way it goes.
+
+        None where neither does.
+        """
+        if self.box is not None:
+            return self.box.pointing(float(self.track.yaw_rad[len(self.track.yaw_rad) // 2]), up)
+        way = self.track.positions_m[-1] - self.track.positions_m[0]
+        level = way - (way @ up) * up
+        length_m = float(np.linalg.norm(level))
+        return level / length_m if length_m > _LEAST_WAY_M else None
 
     def __post_init__(self) -> None:
         if self.spread_m is not None and len(self.spread_m) != len(self.track.times_s):

@@ -1,4 +1,4 @@
-"""What a prior hands over: frames, times, features and whatever is known of the cameras."""
+"""Clips: frames, times, features and whatever is known of the cameras."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.geometry import Geometry, Ground
-from dreamdrive.scene.log import OfLog
-from dreamdrive.scene.look import Look
+from dreamdrive.scene.geometry import Geometry, Ground, Scale
+from dreamdrive.scene.street.log import OfLog
+from dreamdrive.scene.street.look import Look
 from dreamdrive.scene.trajectory import Trajectory
 
 OF_GEOMETRY = 2
@@ -36,6 +36,8 @@ class Known:
         unseen: What stands and no frame shows, in the world of the poses, as the prior made it up: it is no
             part of any fit.
         shared_first: Whether the cameras of the rig are one, on several drives that begin at one frame.
+        scale: What metres of poses and depth rest on, where a prior made these; None where they were given.
+        focal_guessed: Whether frames were drawn with a focal length that is itself a guess.
     """
 
     world_from_camera: Float[np.ndarray, "f 4 4"] | None = None
@@ -49,6 +51,13 @@ class Known:
     hfov: bool = False
     unseen: Gaussians | None = None
     shared_first: bool = False
+    scale: Scale | None = None
+    focal_guessed: bool = False
+
+    @property
+    def drawn(self) -> bool:
+        """Whether frames were drawn from that depth: what they show stands, and the rest is made up."""
+        return self.generated and self.depth_m is not None
 
     @property
     def focal(self) -> bool:
@@ -66,7 +75,8 @@ class Recorded:
         size: Of its pictures.
         scaled: To which these were scaled.
         offset: Columns and rows that were then cut away at the left and the top.
-        lens: What was taken out of the frames, as ``data.Lens.from_json`` reads it.
+        lens: What was taken out of the frames, as ``data.SourceLens.from_json`` reads it.
+        turned: Whether the frames, and with them offset and lens, are those of pictures turned by half.
     """
 
     path: str
@@ -75,6 +85,7 @@ class Recorded:
     scaled: tuple[int, int]
     offset: tuple[int, int]
     lens: dict[str, Any] | None = None
+    turned: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,13 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from dreamdrive.scene.camera import FARTHEST_M
+
 SH_C0 = 0.28209479177387814
+_LENGTHS = 1e-6, 1e6
+"""Of quaternions; those of fits stay between 0.1 and 100."""
+_MOST_LOG_SCALE, _BRIGHTEST, _LATEST_S = 40.0, 1e6, 1e10
+"""Far beyond all that fits make, and so small that nothing computed of it overflows."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +31,8 @@ class Gaussians:
         lifespan: Time of full visibility and standard deviation in seconds (N, 2), or None: always visible.
             Opacity is multiplied by exp(-(t - centre)^2 / (2 deviation^2)).
         actor: Index of the actor each belongs to (N,), or None.
-        velocity: Velocity at the centre of the life span in m/s (N, 3), of a ``Vibration`` or of what drifts;
-            or None.
+        velocity: Velocity at the centre of the life span in m/s (N, 3), of a ``Vibration`` or of a per-frame
+            street; or None.
     """
 
     means: Float[Tensor, "n 3"]
@@ -46,6 +52,26 @@ class Gaussians:
 
     def __len__(self) -> int:
         return len(self.means)
+
+    def problem(self) -> str | None:
+        """Why these can be of no scene: numbers that cannot be drawn; None where all can."""
+        if not len(self):
+            return None
+        if not _within(self.means, -FARTHEST_M, FARTHEST_M):
+            return f"Gaussians lie more than {FARTHEST_M:g} m away"
+        if not _within(self.quaternions.norm(dim=1), *_LENGTHS):
+            return "Gaussians have quaternions of length 0, or of no length that fits have"
+        if not _within(self.log_scales, -math.inf, _MOST_LOG_SCALE):
+            return f"Gaussians are larger than exp({_MOST_LOG_SCALE:g}) m"
+        if not _within(self.sh, -_BRIGHTEST, _BRIGHTEST):
+            return f"Gaussians have coefficients of colour beyond {_BRIGHTEST:g}"
+        if self.lifespan is not None:
+            centre_s, deviation_s = self.lifespan.unbind(-1)
+            if not _within(centre_s, -_LATEST_S, _LATEST_S) or not _within(deviation_s, 0.0, _LATEST_S):
+                return "Gaussians have life spans below 0, or at no time that recordings have"
+        if self.velocity is not None and not _within(self.velocity, -FARTHEST_M, FARTHEST_M):
+            return f"Gaussians are faster than {FARTHEST_M:g} m/s"
+        return None
 
     @property
     def sh_degree(self) -> int:
@@ -94,12 +120,14 @@ class Gaussians:
         logit = logit - exponent - torch.log1p(logit.exp() * -torch.expm1(-exponent))
         return replace(self, logit_opacities=logit, lifespan=None)
 
-    def drifted_at(self, t_s: float) -> "Gaussians":
+    def moved_to(self, t_s: float) -> "Gaussians":
         """The same carried on by the velocities, if any, and faded; the result has neither."""
         if self.velocity is None:
             return self.faded_at(t_s)
         if self.lifespan is None:
-            raise ValueError("velocity: Gaussians that drift need life spans, to tell when they are in place")
+            raise ValueError(
+                "velocity: Gaussians with velocities need life spans, to tell when they are in place"
+            )
         away_s = t_s - self.lifespan[:, :1]
         return replace(self, means=self.means + away_s * self.velocity, velocity=None).faded_at(t_s)
 
@@ -108,3 +136,9 @@ class Gaussians:
         """Several sets as one; an optional field survives only if every part has it."""
         shared = set.intersection(*(set(p.tensors()) for p in parts))
         return Gaussians(**{name: torch.cat([getattr(p, name) for p in parts]) for name in shared})
+
+
+def _within(values: Tensor, low: float, high: float) -> bool:
+    """Whether all values are between two, which NaN never is."""
+    least, most = torch.aminmax(values)
+    return low <= float(least) and float(most) <= high

@@ -1,4 +1,4 @@
-"""What multi-view stereo hands over: cameras, depth and what is known about their trustworthiness."""
+"""The geometry of a clip: cameras, depth and how far these can be trusted."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -8,9 +8,12 @@ from jaxtyping import Bool, Float, Int, UInt16
 
 from dreamdrive.scene.camera import Camera
 
-Basis = Literal["given", "height", "usual height", "asked speed", "usual speed", "usual depth"]
-"""What the metre rests on: what was given in metres; the height of the camera above the road, given or
-assumed; a speed, asked for or assumed; an assumed distance."""
+Basis = Literal[
+    "given", "asked path", "height", "usual height", "seen sizes", "asked speed", "usual speed", "usual depth"
+]
+"""What the metre rests on: what was given in metres; a path that generated frames were asked to follow; the
+height of the camera above the road, given, assumed, or told by sizes that a picture shows; a speed, asked for
+or assumed; an assumed distance."""
 
 Fallback = Literal["few", "blank", "standing", "refused"]
 """Why the full reconstruction did not run: too few frames, nothing to follow in them, a camera that stands,
@@ -92,11 +95,12 @@ class Geometry:
         moving: Evidence that a pixel belongs to something that moves (F, H, W) in [0, 1].
         spread: Relative half width of the interval that holds the depth with 68 % (F, H, W), 0 where there is
             none; None where nothing tells it.
-        users: The road user that a pixel belongs to (F, H, W), one number over all frames in which it was
-            followed, from 1; 0 where there is none. None where nobody looked for them.
+        road_users: The road user that a pixel belongs to (F, H, W), one number over all frames in which it
+            was followed, from 1; 0 where there is none. None where nobody looked for them.
         stereo_ratio: Depth by stereo alone over ``depth_m`` (F, H, W), 1 where stereo says nothing; None
             where no network has a part in ``depth_m``, or stereo none.
         stereo_confidence: Trust in that depth (F, H, W), as ``confidence``; None where there is none.
+        stands: Whether withheld frames are predicted by a street that stands; None where they were not asked.
         fixed_regions: 0 for the street; otherwise 1 + the index into ``region_names`` of what is fixed to the
             camera (bonnet, mirror, bar, overlay) and stays empty in the scene; one map for each camera of the
             clip's rig (K, H, W).
@@ -129,9 +133,10 @@ class Geometry:
     placed: int | None = None
     metres_per_unit: float | None = 1.0
     spread: Float[np.ndarray, "f h w"] | None = None
-    users: UInt16[np.ndarray, "f h w"] | None = None
+    road_users: UInt16[np.ndarray, "f h w"] | None = None
     stereo_ratio: Float[np.ndarray, "f h w"] | None = None
     stereo_confidence: Float[np.ndarray, "f h w"] | None = None
+    stands: bool | None = None
 
     @property
     def at_one_place(self) -> bool:

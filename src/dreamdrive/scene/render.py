@@ -1,4 +1,4 @@
-"""What splatting returns."""
+"""Renders: colours, depth and opacity as splatting returns them."""
 
 from dataclasses import dataclass
 

@@ -8,12 +8,13 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.errors import InputError
 from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
-from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.log import OfLog
+from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.sky import Sky
+from dreamdrive.scene.street.log import OfLog
 from dreamdrive.scene.trajectory import Trajectory
 
 
@@ -37,6 +38,10 @@ class SceneMotion(Protocol):
 
     def steered(self, actor: int, track: Track) -> "SceneMotion":
         """A copy in which an actor follows another track; ``ValueError`` where it knows no such actor."""
+        ...
+
+    def copied(self, actor: int) -> "tuple[SceneMotion, int]":
+        """A copy with one actor more that moves as this one, and its index; ``ValueError`` likewise."""
         ...
 
     def state_dict(self) -> dict[str, Tensor]:
@@ -76,8 +81,8 @@ class Scene:
     World = the camera of the first frame (x right, y down, z forward), in metres.
 
     Attributes:
-        static: What never moves; or, of a street that drifts, surfaces of single frames with life spans and
-            velocities, see ``decompose.drifting``.
+        static: What never moves; or, of a per-frame street, surfaces of single frames with life spans and
+            velocities, see ``decompose.per_frame``.
         dynamic: What moves, in its canonical place; may be empty.
         deformation: Where the dynamic Gaussians are over time; None leaves them in place.
         actors: The dynamic groups.
@@ -112,9 +117,14 @@ class Scene:
             )
 
     @property
-    def drifts(self) -> bool:
+    def moves_per_frame(self) -> bool:
         """Whether the street moves as the picture does, as no path of the camera explains the frames."""
         return self.static.velocity is not None
+
+    @property
+    def up(self) -> Float[np.ndarray, "3"]:
+        """Unit vector away from the road; that of a level first camera where nothing tells."""
+        return np.array(self.provenance.up or (0.0, -1.0, 0.0))
 
     @property
     def trajectory(self) -> Trajectory:
@@ -129,6 +139,10 @@ class Scene:
             return np.arange(len(self.cameras))
         return np.flatnonzero(self.camera == self.camera[0])
 
+    def of_rig(self, view: int) -> int:
+        """Which camera of the rig a view is of; 0 where there is one camera only."""
+        return 0 if self.camera is None else int(self.camera[view])
+
     def actor(self, id: int) -> Actor:
         """The actor of an id; ``ValueError`` names those there are."""
         for actor in self.actors:
@@ -142,12 +156,84 @@ class Scene:
         Raises:
             ValueError: There is no such actor.
         """
-        gone = self.actor(id)
-        members = torch.zeros(len(self.dynamic), dtype=torch.bool)
-        if self.dynamic.actor is not None:
-            members = self.dynamic.actor == gone.id
-        dynamic = self.dynamic.select(torch.nonzero(~members).squeeze(1))
+        dynamic = self.dynamic.select(torch.nonzero(~self._members(self.actor(id))).squeeze(1))
         return replace(self, dynamic=dynamic, actors=tuple(a for a in self.actors if a.id != id))
+
+    def moved(self, id: int, ahead_m: float = 0.0, left_m: float = 0.0) -> "Scene":
+        """The scene with an actor's whole track elsewhere: so far ahead and to the left of it as it points.
+
+        Raises:
+            ValueError: See ``with_track``; or nothing tells where it points.
+        """
+        actor, up = self.actor(id), self.up
+        ahead = actor.ahead(up)
+        if ahead is None:
+            raise ValueError(f"nothing tells where {actor.name} points: it has no box and hardly moves")
+        shift = ahead_m * ahead + left_m * np.cross(up, ahead)
+        return self._retimed(actor, replace(actor.track, positions_m=actor.track.positions_m + shift))
+
+    def turned(self, id: int, degrees: float) -> "Scene":
+        """The scene with an actor turned to the left on its track; ``ValueError``: see ``with_track``."""
+        actor = self.actor(id)
+        return self._retimed(actor, replace(actor.track, yaw_rad=actor.track.yaw_rad + np.deg2rad(degrees)))
+
+    def delayed(self, id: int, seconds: float) -> "Scene":
+        """The scene with an actor that comes later, or earlier; ``ValueError``: see ``with_track``."""
+        actor = self.actor(id)
+        return self._retimed(actor, replace(actor.track, times_s=actor.track.times_s + seconds), seconds)
+
+    def with_speed(self, id: int, factor: float) -> "Scene":
+        """The scene with an actor so many times as fast from its first time on.
+
+        Raises:
+            ValueError: See ``with_track``; or the factor is not above 0.
+        """
+        if not 0 < factor < float("inf"):
+            raise ValueError(f"speed {factor:g}: expected a factor above 0")
+        actor = self.actor(id)
+        first_s = actor.track.first_s
+        times_s = first_s + (actor.track.times_s - first_s) / factor
+        return self._retimed(actor, replace(actor.track, times_s=times_s), slower=1 / factor)
+
+    def copied(self, id: int, ahead_m: float = 0.0, left_m: float = 0.0) -> "Scene":
+        """The scene with a second one of an actor, the last of its actors, elsewhere as ``moved`` has it.
+
+        Raises:
+            ValueError: See ``moved``.
+        """
+        actor = self.actor(id)
+        if self.deformation is None:
+            raise ValueError(f"nothing moves {actor.name}: the scene has no motion")
+        motion, new = self.deformation.copied(id)
+        twin = self.dynamic.select(torch.nonzero(self._members(actor)).squeeze(1))
+        twin = replace(twin, actor=torch.full((len(twin),), new, dtype=torch.int64))
+        named = replace(actor, id=new, name=f"actor {new}")
+        both = replace(
+            self,
+            deformation=motion,
+            dynamic=Gaussians.concatenate(self.dynamic, twin),
+            actors=(*self.actors, named),
+        )
+        return both.moved(new, ahead_m, left_m)
+
+    def recoloured(self, id: int, rgb: tuple[float, float, float]) -> "Scene":
+        """The scene with an actor in one colour, RGB in [0, 1]; what was dark stays darker than the rest.
+
+        Raises:
+            ValueError: There is no such actor, or the colour is none.
+        """
+        if not all(0 <= value <= 1 for value in rgb):
+            raise ValueError(f"colour {rgb}: expected three numbers from 0 to 1")
+        members = self._members(self.actor(id))
+        sh = self.dynamic.sh.clone()
+        own = sh[members]
+        grey = own.mean(dim=2)
+        light = (grey[:, 0] * SH_C0 + 0.5).clamp(min=0)
+        scale = sh.new_tensor(rgb) / (light.median().clamp(min=1e-3) if len(own) else 1.0)
+        painted = grey[..., None] * scale
+        painted[:, 0] = ((light[:, None] * scale).clamp(max=1) - 0.5) / SH_C0
+        sh[members] = painted
+        return replace(self, dynamic=replace(self.dynamic, sh=sh))
 
     def with_standing(self, more: Gaussians) -> "Scene":
         """The scene with more of what never moves; the fewer coefficients of colour are filled with zeros."""
@@ -174,18 +260,49 @@ class Scene:
             actors=tuple(steered if each.id == id else each for each in self.actors),
         )
 
+    def _members(self, actor: Actor) -> Bool[Tensor, " n"]:
+        """Which of the dynamic Gaussians are of an actor."""
+        if self.dynamic.actor is None:
+            return torch.zeros(len(self.dynamic), dtype=torch.bool)
+        return self.dynamic.actor == actor.id
+
+    def _retimed(self, actor: Actor, track: Track, later_s: float = 0.0, slower: float = 1.0) -> "Scene":
+        """An actor on a track of as many points; its surface lives later and longer, from its first time."""
+        steered = self.with_track(actor.id, track)
+        kept = tuple(replace(a, spread_m=actor.spread_m) if a.id == actor.id else a for a in steered.actors)
+        if self.dynamic.lifespan is None or (later_s, slower) == (0.0, 1.0):
+            return replace(steered, actors=kept)
+        lifespan, members = self.dynamic.lifespan.clone(), self._members(actor)
+        first_s = actor.track.first_s
+        centre_s, deviation_s = lifespan[members].unbind(-1)
+        lifespan[members] = torch.stack(
+            [first_s + (centre_s - first_s) * slower + later_s, deviation_s * slower], dim=1
+        )
+        return replace(steered, actors=kept, dynamic=replace(self.dynamic, lifespan=lifespan))
+
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:
-        """The static Gaussians without features; the time matters only to a street that drifts."""
-        return self.static.without_features().drifted_at(t_s)
+        """The static Gaussians without features; the time matters only to a per-frame street."""
+        return self.static.without_features().moved_to(t_s)
 
     @torch.no_grad()
     def dynamic_at(self, t_s: float) -> Gaussians:
         """The dynamic Gaussians that live at ``t_s``, where they are then, without features."""
         living = self.dynamic.without_features().select(self.dynamic.alive_at(t_s))
+        return self.moved_at(living, t_s)
+
+    def moved_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
+        """Some of the dynamic Gaussians as they are at ``t_s``; the result has no life spans left.
+
+        Raises:
+            InputError: What moves the scene leads to numbers that cannot be drawn.
+        """
         if self.deformation is None:
-            return living.faded_at(t_s)
-        return self.deformation.apply_at(living, t_s)
+            return gaussians.faded_at(t_s)
+        moved = self.deformation.apply_at(gaussians, t_s)
+        if problem := moved.problem():
+            raise InputError(f"the scene's motion cannot be used: at {t_s:g} s {problem}; generate it again")
+        return moved
 
     def at(self, t_s: float) -> Gaussians:
         """All Gaussians at ``t_s``: the static ones, then the living dynamic ones; no gradients."""

@@ -1,4 +1,4 @@
-"""How much of a box cameras see, from depth."""
+"""Visibility of boxes in cameras, from depth."""
 
 from collections.abc import Sequence
 

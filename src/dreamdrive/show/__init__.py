@@ -1,10 +1,35 @@
 """All drawing: videos, panels, pictures of the geometry, renderings of drives."""
 
-from dreamdrive.show.drives import draw_drives
-from dreamdrive.show.geometry import draw_geometry
-from dreamdrive.show.geometry_truth import draw_geometry_errors
-from dreamdrive.show.log import draw_log
-from dreamdrive.show.look import draw_look
-from dreamdrive.show.planned import Planned, write_planned
-from dreamdrive.show.rendering import RenderOptions, check_size, places, video_rate, write_drive
-from dreamdrive.show.videos import Scored, lens_of, write_held_out, write_png, write_videos
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.show.actor_tiles import draw_actors as draw_actors
+    from dreamdrive.show.drives import draw_drives as draw_drives
+    from dreamdrive.show.geometry import draw_geometry as draw_geometry
+    from dreamdrive.show.layout import draw_layout as draw_layout
+    from dreamdrive.show.log import draw_log as draw_log
+    from dreamdrive.show.look import draw_look as draw_look
+    from dreamdrive.show.panels import (
+        Image as Image,
+        depth_colours as depth_colours,
+        grid as grid,
+        labelled as labelled,
+    )
+    from dreamdrive.show.rendering import (
+        RenderOptions as RenderOptions,
+        places as places,
+        video_rate as video_rate,
+        write_drive as write_drive,
+    )
+    from dreamdrive.show.videos import (
+        Scored as Scored,
+        drive_frames as drive_frames,
+        lens_of as lens_of,
+        write_held_out as write_held_out,
+        write_png as write_png,
+        write_videos as write_videos,
+    )
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,4 +1,4 @@
-"""A drive of a data set in one picture: what its cameras saw, the boxes in it, and the map from above."""
+"""A picture of a log: what its cameras saw, the boxes in it, and the map from above."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from dreamdrive.data.images import read_image
-from dreamdrive.data.lidar_file import read_points
+from dreamdrive.data.pictures.images import read_image
+from dreamdrive.datasets.lidar_file import read_points
 from dreamdrive.scene.camera import NEAR_M, Camera
-from dreamdrive.scene.log import BoxTrack, Log, LogCamera
+from dreamdrive.scene.street.log import BoxTrack, Log, LogCamera
 from dreamdrive.show.panels import Image, depth_colours, grid
 
 _WIDTH_PX = 640

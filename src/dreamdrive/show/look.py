@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from jaxtyping import Shaped, UInt8
 
-from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import CameraEstimate, Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
 from dreamdrive.show.panels import Image, depth_colours, grid
 
 COLOURS: dict[StreetClass, tuple[int, int, int]] = {

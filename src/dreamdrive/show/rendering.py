@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
-from dreamdrive.choices import Format, Show
 from dreamdrive.data.formats.cameras import indexed_pinhole
-from dreamdrive.data.picture_file import write_picture
-from dreamdrive.data.size import MIN_SIDE_PX, check_largest
-from dreamdrive.data.video_writer import write_video
-from dreamdrive.drive import RATES_HZ, Drive, frame_rate
+from dreamdrive.data.pictures.picture_file import write_picture
+from dreamdrive.data.pictures.video_writer import write_video
+from dreamdrive.drive import Drive, frame_rate
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import new_folder
 from dreamdrive.files.paths import inside
-from dreamdrive.machine import free_bytes
+from dreamdrive.names import Format, Show
 from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.control import RATES_HZ
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
@@ -31,8 +30,6 @@ NOTE = "render.json"
 """What lies beside pictures and arrays: calibration, poses and times."""
 PER_METRE = 256
 """What a depth of one metre is in a 16-bit PNG, as in KITTI: up to 256 m in steps of 4 mm."""
-_BYTES_PER_PX = 200
-"""Memory that rendering and encoding take a pixel: 190 for a video of 3840x2160, less for the others."""
 _FILES = (".mp4", ".png", ".npz")
 
 
@@ -47,27 +44,6 @@ class RenderOptions:
     format: Format = "mp4"
     size: tuple[int, int] | None = None
     fps: float | None = None
-
-
-def check_size(options: RenderOptions) -> None:
-    """Refuse sizes that cannot be rendered or kept, before anything is loaded."""
-    if options.size is None:
-        return
-    width, height = options.size
-    check_largest(options.size, f"--size {width}x{height}")
-    if min(options.size) < MIN_SIDE_PX:
-        raise InputError(f"--size {width}x{height}: expected sides of at least {MIN_SIDE_PX} pixels")
-    if options.format == "mp4" and (width % 2 or height % 2):
-        raise InputError(
-            f"--size {width}x{height}: a video has even sides; choose "
-            f"{width - width % 2}x{height - height % 2}, or --format png"
-        )
-    needed, free = width * height * _BYTES_PER_PX, free_bytes()
-    if free is not None and needed > free:
-        raise InputError(
-            f"--size {width}x{height} takes about {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB of memory "
-            "are free; choose a smaller size"
-        )
 
 
 def write_drive(

@@ -1,4 +1,4 @@
-"""What ``generate`` shows of a scene: videos, held-out frames, a picture of the geometry."""
+"""Videos and pictures that ``generate`` makes of a scene."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,10 +10,11 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from dreamdrive.data import Lens
-from dreamdrive.data.picture_file import write_picture
-from dreamdrive.data.video_writer import write_video
-from dreamdrive.drive import frame_rate, manoeuvre, smooth, up_of
+from dreamdrive.compute.threads import ahead
+from dreamdrive.data import SourceLens
+from dreamdrive.data.pictures.picture_file import write_picture
+from dreamdrive.data.pictures.video_writer import write_video
+from dreamdrive.drive import frame_rate, manoeuvre, smooth
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import new_file
 from dreamdrive.progress import Progress
@@ -22,10 +23,8 @@ from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
+from dreamdrive.show.ids import with_ids
 from dreamdrive.splat import render, render_scene
-
-SHIFT_M = 2.0
-"""How far to the right the shifted drive goes."""
 
 
 @dataclass(frozen=True)
@@ -46,24 +45,29 @@ def write_videos(
     recorded: UInt8[np.ndarray, "f h w 3"],
     scored: Scored | None,
     progress: Progress,
+    *,
+    shift_m: float | None,
 ) -> None:
     """Write ``drive.mp4``, ``shift.mp4``, ``recorded_beside_rendered.mp4`` and ``panels.mp4``.
 
-    All show the rig's first camera, with its frames as recorded, in the source's distortion; of several,
-    ``surround.mp4`` shows what each of them sees. Without scores their panel is black.
+    The second is ``shift_m`` to the right of the first; without that there is none. All show the rig's first
+    camera, with its frames as recorded, in the source's distortion; of several, ``surround.mp4`` shows what
+    each of them sees. Without scores their panel is black.
     """
     rate = frame_rate(scene.trajectory)
     drive = smooth(scene.trajectory)
     smooth_hz = frame_rate(drive)
-    shifted = manoeuvre("shift", drive, up_of(scene), SHIFT_M)
     lens = lens_of(scene)
     drives: list[tuple[str, Iterator[UInt8[np.ndarray, "h w 3"]], float]] = [
         ("drive", drive_frames(scene, drive, lens), smooth_hz),
-        ("shift", drive_frames(scene, shifted), smooth_hz),
         ("recorded_beside_rendered", _beside(scene, recorded, lens), rate),
         ("panels", _panels(scene, scored), rate),
     ]
-    total = len(drive) + len(shifted) + 2 * len(scene.front)
+    total = len(drive) + 2 * len(scene.front)
+    if shift_m is not None:
+        shifted = manoeuvre("shift", drive, scene.up, shift_m)
+        drives.insert(1, ("shift", drive_frames(scene, shifted), smooth_hz))
+        total += len(shifted)
     if scene.camera is not None:
         drives.append(("surround", _surround(scene, scene.camera), rate))
         total += len(scene.front)
@@ -87,7 +91,7 @@ def write_held_out(folder: Path, scene: Scene, source_index: list[int]) -> None:
     """
     lens = lens_of(scene)
     for i in np.flatnonzero(scene.held_out).tolist():
-        camera = 0 if scene.camera is None else int(scene.camera[i])
+        camera = scene.of_rig(i)
         image = as_recorded(scene, scene.cameras[i], float(scene.times_s[i]), lens, camera)
         write_png(folder / f"{source_index[i]:04d}{f'_camera{camera}' if camera else ''}.png", image)
 
@@ -99,15 +103,19 @@ def write_png(path: Path, image: UInt8[np.ndarray, "h w 3"]) -> None:
 
 
 def drive_frames(
-    scene: Scene, drive: Trajectory, lens: Lens | None = None
+    scene: Scene, drive: Trajectory, lens: SourceLens | None = None
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The frames of a drive, with the camera of the recording, one at a time."""
-    for pose, t_s in zip(drive.world_from_camera, drive.times_s.tolist(), strict=True):
-        yield as_recorded(scene, scene.cameras[0].at(pose), t_s, lens)
+
+    def seen(k: int) -> UInt8[np.ndarray, "h w 3"]:
+        camera = scene.cameras[0].at(drive.world_from_camera[k])
+        return as_recorded(scene, camera, float(drive.times_s[k]), lens)
+
+    return ahead(seen, range(len(drive)))
 
 
 def as_recorded(
-    scene: Scene, camera: Camera, t_s: float, lens: Lens | None, of_rig: int = 0
+    scene: Scene, camera: Camera, t_s: float, lens: SourceLens | None, of_rig: int = 0
 ) -> UInt8[np.ndarray, "h w 3"]:
     """A view as a camera of the rig would have shown it, with the distortion of its lens if it has one."""
     if lens is None:
@@ -116,17 +124,17 @@ def as_recorded(
     return panels.to_bytes(lens.apply(render_scene(scene, wide, t_s, of_rig=of_rig).colour.numpy(), wide))
 
 
-def lens_of(scene: Scene) -> Lens | None:
+def lens_of(scene: Scene) -> SourceLens | None:
     """The lens of the recording, where its distortion is known."""
     values = scene.provenance.lens
     try:
-        return None if values is None else Lens.from_json(values)
+        return None if values is None else SourceLens.from_json(values)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"the scene's lens cannot be used ({error}); generate it again") from error
 
 
 def _beside(
-    scene: Scene, recorded: UInt8[np.ndarray, "f h w 3"], lens: Lens | None
+    scene: Scene, recorded: UInt8[np.ndarray, "f h w 3"], lens: SourceLens | None
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     for frame, rendered in zip(recorded, drive_frames(scene, scene.trajectory, lens), strict=True):
         yield panels.grid({"recorded": frame, "rendered": rendered})
@@ -152,19 +160,22 @@ def _surround(scene: Scene, camera: Int[np.ndarray, " f"]) -> Iterator[UInt8[np.
 
 def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     front = scene.front.tolist()
-    near = {frame: front[max(k - 1, 0) : k + 2] for k, frame in enumerate(front)}
-    for frame in front:
-        camera, t_s = scene.cameras[frame], float(scene.times_s[frame])
+
+    def of(k: int) -> UInt8[np.ndarray, "h w 3"]:
+        camera, t_s = scene.cameras[front[k]], float(scene.times_s[front[k]])
+        near = front[max(k - 1, 0) : k + 2]
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
-        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near[frame])
+        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near)
         images = {
             "static": panels.to_bytes(still.numpy()),
-            "dynamic": panels.to_bytes(moving.numpy()),
+            "dynamic": with_ids(panels.to_bytes(moving.numpy()), scene, camera, t_s),
             "score": panels.score_colours(score.numpy()),
             "depth": panels.depth_colours(whole.depth_m.numpy()),
         }
-        yield panels.grid(images)
+        return panels.grid(images)
+
+    return ahead(of, range(len(front)))
 
 
 @torch.no_grad()

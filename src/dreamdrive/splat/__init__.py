@@ -1,10 +1,34 @@
 """F_splat: Gaussians to images and back."""
 
-from dreamdrive.splat.arguments import check_dtype
-from dreamdrive.splat.cuda import why_unusable
-from dreamdrive.splat.rasterize import BACKENDS, rasterize
-from dreamdrive.splat.scene_view import SceneView, moment_of, render_scene
-from dreamdrive.splat.settings import native_info, set_threads, threads
-from dreamdrive.splat.ssim import C1, C2, SIGMA_PX, WINDOW, ssim, ssim_map, ssim_map_reference
-from dreamdrive.splat.torch_threads import one_torch_thread
-from dreamdrive.splat.view import render, seen_by
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.scene.camera import NEAR_M as NEAR_M
+    from dreamdrive.splat.arguments import check_dtype as check_dtype
+    from dreamdrive.splat.cuda import load_gsplat as load_gsplat, why_unusable as why_unusable
+    from dreamdrive.splat.rasterize import BACKENDS as BACKENDS, rasterize as rasterize
+    from dreamdrive.splat.scene_view import (
+        SceneView as SceneView,
+        moment_of as moment_of,
+        render_scene as render_scene,
+    )
+    from dreamdrive.splat.settings import (
+        native_info as native_info,
+        set_threads as set_threads,
+        stage_seconds as stage_seconds,
+        threads as threads,
+    )
+    from dreamdrive.splat.ssim import (
+        C1 as C1,
+        C2 as C2,
+        SIGMA_PX as SIGMA_PX,
+        WINDOW as WINDOW,
+        ssim as ssim,
+        ssim_map as ssim_map,
+        ssim_map_reference as ssim_map_reference,
+    )
+    from dreamdrive.splat.view import render as render, seen_by as seen_by
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

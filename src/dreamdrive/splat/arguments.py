@@ -1,4 +1,4 @@
-"""What a splatting backend is given, and the checks every backend shares."""
+"""Arguments of a splatting backend, and the checks every backend shares."""
 
 from dataclasses import dataclass, fields
 from typing import Literal

@@ -13,8 +13,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from dreamdrive.device import why_no_cuda
-from dreamdrive.errors import InputError
+from dreamdrive.compute.device import why_no_cuda
+from dreamdrive.errors import InputError, installing
 from dreamdrive.scene.camera import NEAR_M
 from dreamdrive.scene.render import Render
 from dreamdrive.splat.arguments import SplatArguments, check_device, check_dtype
@@ -33,7 +33,7 @@ def why_unusable() -> str | None:
     if (trouble := why_no_cuda()) is not None:
         return trouble
     if importlib.util.find_spec("gsplat") is None:
-        return "gsplat is not installed: pip install 'dreamdrive[gpu]'"
+        return f"gsplat is not installed: {installing('gpu')}"
     if importlib.util.find_spec("gsplat.csrc") is None and not _has_compiler():
         return (
             "gsplat is installed without compiled kernels and there is no nvcc to compile them: "

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat.torch_threads import one_torch_thread
 from dreamdrive.splat.view import render
 
 Part = Literal["all", "static", "dynamic"]

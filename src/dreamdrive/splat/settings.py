@@ -19,3 +19,8 @@ def native_info() -> dict[str, str | int]:
     The environment variable ``DREAMDRIVE_ISA`` overrides the instruction set; it is read once.
     """
     return {"isa": _native.isa(), "threads": _native.threads()}
+
+
+def stage_seconds() -> dict[str, float]:
+    """Seconds of each stage of the last render by the compiled core, and of the last gradients."""
+    return _native.stage_seconds()

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dreamdrive import _native
-from dreamdrive.compiled import Gradients, Wanted, differentiable
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
 
 WINDOW = 11
 SIGMA_PX = 1.5

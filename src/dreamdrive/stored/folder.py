@@ -11,7 +11,6 @@ import msgspec
 import numpy as np
 import safetensors.torch
 import torch
-from jaxtyping import Float
 from msgspec import Meta
 from torch import Tensor
 
@@ -23,12 +22,13 @@ from dreamdrive.files.output import new_folder
 from dreamdrive.files.paths import TEXT_BYTES, inside, read_bytes
 from dreamdrive.files.tensor_file import DAMAGE, briefly, read_own
 from dreamdrive.motion import rebuilt
-from dreamdrive.scene.actor import Actor, Box, Track
-from dreamdrive.scene.camera import FARTHEST_M, Camera, check_rigid
+from dreamdrive.scene.actor import Actor, ActorBox, Track
+from dreamdrive.scene.camera import FARTHEST_M, Camera
 from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Provenance, Scene, SceneMotion
 from dreamdrive.scene.sky import Sky
+from dreamdrive.stored.believable import check_scene
 
 FORMAT = "dreamdrive scene"
 VERSION = 3
@@ -41,8 +41,6 @@ _INDEX = "scene.json"
 _BLOCK = "main"
 _FIRST_MOTION = "network"
 """The only kind of motion in format version 1, which does not name it."""
-MAX_PIXELS = 64_000_000
-"""Most pixels of a view."""
 
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
@@ -93,7 +91,7 @@ class _StoredActor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         spread_m = None if self.spread_m is None else np.array(self.spread_m, dtype=np.float64)
         box = None
         if self.size_m is not None and self.ahead is not None:
-            box = Box(np.array(self.size_m), np.array(self.ahead))
+            box = ActorBox(np.array(self.size_m), np.array(self.ahead))
         return Actor(self.id, self.name, self.kind, self.count, track, box, spread_m, self.completed)
 
     @classmethod
@@ -127,15 +125,7 @@ class _StoredIndex(msgspec.Struct, frozen=True):
     sky: _StoredSky | None = None
 
 
-def _increasing(values: list[float], name: str) -> Float[np.ndarray, " t"]:
-    """Times as an array; ``ValueError`` where they do not increase."""
-    times_s = np.array(values, dtype=np.float64)
-    if (np.diff(times_s) <= 0).any():
-        raise ValueError(f"{name} do not increase")
-    return times_s
-
-
-def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
+def save_scene(scene: Scene, path: Path | str, *, replace: bool = False) -> None:
     """Write a scene folder; it appears whole or not at all, and equal scenes give equal bytes.
 
     Args:
@@ -160,19 +150,20 @@ def save_scene(scene: Scene, path: Path, *, replace: bool = False) -> None:
     index = json.loads(json.dumps(index, allow_nan=False))
     index["sha256"] = _checksum(index)
     text = json.dumps(index, indent=1, sort_keys=True, allow_nan=False)
-    with new_folder(path, replace=replace, kind="scene") as folder:
+    with new_folder(Path(path), replace=replace, kind="scene") as folder:
         for name, data in parts.items():
             (folder / name).write_bytes(data)
         (folder / _INDEX).write_text(text + "\n", encoding="utf-8")
 
 
-def load_scene(path: Path) -> Scene:
+def load_scene(path: Path | str) -> Scene:
     """Read a scene folder; nothing in it is believed before it is checked.
 
     Raises:
         InputError: No scene, a newer format, a file that is missing or differs from what was written, values
             that no scene has, or more than the memory that is free.
     """
+    path = Path(path)
     index = _read_index(path)
     stored = of_type(index, _StoredIndex, str(path / _INDEX))
     parts = {name: _read_part(path, name, digest) for name, digest in stored.parts.items()}
@@ -182,7 +173,7 @@ def load_scene(path: Path) -> Scene:
 
     try:
         scene = _rebuild(stored, part)
-        _check(scene)
+        check_scene(scene)
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} is not a complete scene ({error}); generate it again") from error
     return scene
@@ -227,9 +218,9 @@ def _values(scene: Scene) -> dict[str, Any]:
 def _version(scene: Scene) -> int:
     """The first format version that can hold a scene.
 
-    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a street that drifts.
+    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a per-frame street.
     """
-    if scene.drifts:
+    if scene.moves_per_frame:
         return VERSION
     return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else 2
 
@@ -313,31 +304,3 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
 def _exposure(part: dict[str, Tensor]) -> Exposure:
     arrays = {name: tensor.numpy() for name, tensor in part.items() if name != "transforms"}
     return build(Exposure, {**arrays, "transforms": part["transforms"]})
-
-
-def _check(scene: Scene) -> None:
-    """Whether the parts belong together, and nothing is larger or farther away than a scene reaches."""
-    count = len(scene.cameras)
-    for camera in (0,) if scene.camera is None else np.unique(scene.camera).tolist():
-        own = slice(None) if scene.camera is None else scene.camera == camera
-        _increasing(scene.times_s[own].tolist(), "times of the views")
-    if max(camera.width_px * camera.height_px for camera in scene.cameras) > MAX_PIXELS:
-        raise ValueError(f"a view has more than {MAX_PIXELS:.0e} pixels")
-    for part in (scene.static, scene.dynamic):
-        if not len(part):
-            continue
-        if not 0 <= int(part.source_frame.min()) <= int(part.source_frame.max()) < count:
-            raise ValueError(f"Gaussians come from frames beyond the {count} of the scene")
-        if float(part.means.abs().max()) > FARTHEST_M:
-            raise ValueError(f"Gaussians lie more than {FARTHEST_M:g} m away")
-    if scene.drifts and scene.static.lifespan is None:
-        raise ValueError("Gaussians that drift have no life spans")
-    if scene.deformation is not None and len(scene.dynamic):
-        scene.deformation.check(scene.dynamic)
-    source, up = scene.provenance.source_index, scene.provenance.up
-    if source is not None and len(source) != count:
-        raise ValueError(f"source_index names {len(source)} frames of {count}")
-    if up is not None and abs(float(np.linalg.norm(up)) - 1) > 1e-3:
-        raise ValueError(f"up is {up}, not a unit vector")
-    if scene.provenance.log is not None:
-        check_rigid(np.array(scene.provenance.log.log_from_world), "log_from_world")

@@ -6,17 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from tests.scene.scenes import make_scene
-from tests.streets import small_street, street_clip, true_geometry
 
-from ablation import errors as errors_module
-from ablation import features, groups
-from ablation import main as ablation
-from ablation.tables import FIGURES
 from dreamdrive.decompose import GroupOptions
 from dreamdrive.fit import FitOptions, SeedOptions, fit_static, initialise
 from dreamdrive.scene.clip import OF_GEOMETRY
-from street import methods
+from dreamdrive_bench.ablation import errors as errors_module, features, groups, main as ablation
+from dreamdrive_bench.ablation.tables import FIGURES
+from dreamdrive_bench.street import methods
+from tests.scene.scenes import make_scene
+from tests.streets import small_street, street_clip, true_geometry
 
 
 def test_each_variant_changes_something_of_its_own_and_hybrid_nothing() -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from common.markdown import columns, laid_out, number, replace_section, span, table
+from dreamdrive_bench.common.markdown import columns, laid_out, number, replace_section, span, table
 
 
 def test_each_column_is_filled_by_its_function() -> None:

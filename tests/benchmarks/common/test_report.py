@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.report import as_json, publish, rounded
+from dreamdrive_bench.common.report import as_json, publish, rounded
 
 
 def test_numbers_keep_six_digits() -> None:

@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from common.true_look import true_look
-from dreamdrive.scene.street_class import ROAD_USERS, StreetClass
-from dreamdrive.world import make_street
+from dreamdrive.scene.street.street_class import ROAD_USERS, StreetClass
+from dreamdrive_bench.common.true_look import true_look
+from streetworld import DrawnDrive, make_street
 
 
-def test_outlines_classes_and_depth_are_those_of_the_street() -> None:
-    made = make_street(3, 2, size=(96, 56), edition=2)
+def test_outlines_classes_and_depth_are_those_of_the_street(made: DrawnDrive) -> None:
     look = true_look(made)
     assert look.camera.focal_px == made.cameras[0].fx_px
     assert true_look(made, 70.0).camera.focal_px == 70.0

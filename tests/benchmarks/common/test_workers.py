@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from common import workers
-from common.places import ROOT
+from dreamdrive_bench.common import workers
+from dreamdrive_bench.common.places import ROOT
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ import os, sys
 sys.path.insert(0, {benchmarks!r})
 from pathlib import Path
 from dataclasses import dataclass
-from common.workers import work_off
+from dreamdrive_bench.common.workers import work_off
 
 @dataclass(frozen=True)
 class Write:

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import torch
 
-from control import compare as comparing
-from control.compare import compare, edge_of
-from control.made import Made
-from control.shift import lowest, shift
-from dreamdrive.evaluate.truth import Truth
+from dreamdrive.evaluate.truth.drawn import Truth
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import Similarity
 from dreamdrive.splat import render
+from dreamdrive_bench.control import compare as comparing
+from dreamdrive_bench.control.compare import compare, edge_of
+from dreamdrive_bench.control.made import Made
+from dreamdrive_bench.control.shift import lowest, shift
 
 SIZE, FRAMES = (96, 64), 3
 CAMERAS = tuple(

@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 
-from control.layout_edits import move_box, widen_road
 from dreamdrive.data.layout_file import problems
-from dreamdrive.scene.layout import is_moving
-from dreamdrive.world import Drive, StreetOptions, draw_street, drive
+from dreamdrive.scene.street.layout import is_moving
+from dreamdrive.scene.street.truth import DriveTruth
+from dreamdrive_bench.control.layout_edits import move_box, widen_road
+from streetworld import StreetOptions, draw_street, drive
 
 
 @pytest.fixture(scope="module")
-def street() -> Drive:
+def street() -> DriveTruth:
     return drive(draw_street(3, StreetOptions(seconds=0.6)), 6, size=(64, 40))
 
 
 @pytest.mark.parametrize("moving", [True, False])
-def test_one_box_goes_two_metres(street: Drive, moving: bool) -> None:
+def test_one_box_goes_two_metres(street: DriveTruth, moving: bool) -> None:
     before = street.world.layout
     edit = move_box(street, moving, 2.0)
     assert problems(edit.layout) == []
@@ -30,7 +31,7 @@ def test_one_box_goes_two_metres(street: Drive, moving: bool) -> None:
     assert (edit.layout.areas, edit.layout.lines, edit.layout.ego) == (before.areas, before.lines, before.ego)
 
 
-def test_one_edge_of_the_road_goes_out(street: Drive) -> None:
+def test_one_edge_of_the_road_goes_out(street: DriveTruth) -> None:
     before = street.world.layout
     wide = widen_road(before, 0.5)
     assert problems(wide) == []

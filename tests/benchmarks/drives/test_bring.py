@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from drives import bring
+from dreamdrive_bench.drives import bring
 
 FRAMES, WIDTH, HEIGHT = 6, 64, 48
 

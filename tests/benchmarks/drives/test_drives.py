@@ -5,12 +5,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.decompose.test_drifting import wall
 
 from dreamdrive import Given, build_scene, options
-from drives import main, truth
-from drives.drive import Drive, drives
-from drives.measure import Recorder, sheet_of
+from dreamdrive_bench.common.recorder import Recorder
+from dreamdrive_bench.drives import main, truth
+from dreamdrive_bench.drives.drive import Drive, drives
+from dreamdrive_bench.drives.measure import sheet_of
+from tests.decompose.test_per_frame import wall
 
 
 def test_the_list_names_each_drive_once() -> None:
@@ -66,7 +67,7 @@ def test_the_table_has_a_line_a_run_and_the_means() -> None:
 def test_a_sheet_shows_held_out_frames_and_those_before() -> None:
     clip, geometry = wall()
     tiny = options.QUALITIES["draft"]
-    scene = build_scene(clip, tiny, given=Given(geometry=geometry))
+    scene = build_scene(clip, tiny, given=Given(geometry=geometry)).scene
     shares = np.zeros(geometry.depth_m.shape, np.float32)
     height, width = clip.frames.shape[1:3]
     assert sheet_of(clip, geometry, scene, shares).shape == (2 * height, 5 * width, 3)

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-import clips
-from geometry import backends, cases, jobs
-from geometry.report import markdown, report_of
+from dreamdrive_bench import clips
+from dreamdrive_bench.geometry import backends, cases, jobs
+from dreamdrive_bench.geometry.report import markdown, report_of
 
 
 @dataclass(frozen=True)

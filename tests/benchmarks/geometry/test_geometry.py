@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.drawn import drawn_clip, write_cameras
 from dreamdrive.geometry.backends.dust3r.align.alignment import align, predicted_bytes
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs
-from geometry import alignment, backends, cases, jobs, main, memory_run, report, worlds
-from geometry.simulated_pairs import Noise, Truth, pair_maps
+from dreamdrive_bench.common.drawn import drawn_clip, write_cameras
+from dreamdrive_bench.geometry import alignment, backends, cases, jobs, main, memory_run, report, worlds
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps
 
 
 @pytest.fixture

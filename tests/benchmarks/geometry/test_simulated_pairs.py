@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import street, window
 
-from geometry.simulated_pairs import Noise, Truth, pair_maps, smooth_noise
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps, smooth_noise
+from tests.geometry.backends.dust3r.align.pairs import street, window
 
 NONE = Noise(depth=0, scale=0, focal=0, outliers=0)
 

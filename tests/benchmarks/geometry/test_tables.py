@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from geometry import alignment_tables as tables
-from geometry import report
+from dreamdrive_bench.geometry import alignment_tables as tables, report
 
 
 def row(method: str = "ours", **other: Any) -> dict[str, Any]:

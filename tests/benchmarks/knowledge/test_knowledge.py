@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dreamdrive.knowledge.training.drawn import CLASS_OF
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.look import CameraEstimate
-from dreamdrive.scene.street_class import StreetClass
-from dreamdrive.world import Semantic
-from knowledge import lidar, shots
-from knowledge.cameras import errors_deg
+from dreamdrive.scene.street.look import CameraEstimate
+from dreamdrive.scene.street.street_class import StreetClass
+from dreamdrive.scene.street.truth import Semantic
+from dreamdrive_bench.knowledge import lidar, shots
+from dreamdrive_bench.knowledge.cameras import errors_deg
+from dreamdrive_bench.recorded.lidar import PEOPLE, VEHICLES
+from dreamdrive_train.street_network.data.drawn import CLASS_OF
 
 PINHOLE = Camera(100, 100, 50, 30, 100, 60)
 VEHICLE, PERSON, ROAD = 13, 30, 7
@@ -21,7 +22,7 @@ VEHICLE, PERSON, ROAD = 13, 30, 7
 
 @pytest.fixture(autouse=True)
 def labels(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = {shots.VEHICLES: {VEHICLE}, shots.PEOPLE: {PERSON}}
+    found = {VEHICLES: {VEHICLE}, PEOPLE: {PERSON}}
     monkeypatch.setattr(lidar, "labels", found.__getitem__)
 
 

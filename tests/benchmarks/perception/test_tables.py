@@ -2,8 +2,8 @@
 
 import pytest
 
-from perception.protocol import PROTOCOL, read_protocol
-from perception.tables import counts_of, difference, iou, published, tables
+from dreamdrive_bench.perception.protocol import PROTOCOL, read_protocol
+from dreamdrive_bench.perception.tables import counts_of, difference, iou, published, tables
 
 
 def row(arm: str, seed: int, hits: int) -> dict[str, object]:

@@ -5,12 +5,10 @@ from dataclasses import replace
 
 import pytest
 import torch
-from tests.logs import log
-from tests.perception.streets import ON_STREET_TRUNK as TINY
 
 from dreamdrive.errors import InputError
-from dreamdrive.knowledge import SHIPPED
-from dreamdrive.perception import (
+from dreamdrive.street_network import SHIPPED
+from dreamdrive.tasks.perception import (
     BevSet,
     CvtTraining,
     Regime,
@@ -19,8 +17,10 @@ from dreamdrive.perception import (
     train_on,
     write_bev_set,
 )
-from dreamdrive.perception.readings import first_network
-from perception.together import Student, held
+from dreamdrive.tasks.perception.readings import first_network
+from dreamdrive_bench.perception.together import Student, held
+from tests.logs import log
+from tests.tasks.perception.streets import ON_STREET_TRUNK as TINY
 
 
 def regime(frozen_layers: int) -> Regime:
@@ -73,7 +73,7 @@ def test_a_stopped_student_goes_on_as_if_it_had_not_been(bev_set, tmp_path):
 
 
 def test_a_network_that_broke_is_not_kept(bev_set, monkeypatch):
-    monkeypatch.setattr("perception.together._SAID_EACH", 1)
+    monkeypatch.setattr("dreamdrive_bench.perception.together._SAID_EACH", 1)
     asked = replace(regime(2), trunk=SHIPPED)
     student = Student(held([bev_set], asked, torch.device("cpu")), asked)
     student.losses[3] = torch.nan

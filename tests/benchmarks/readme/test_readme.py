@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-import clips
-from common.worlds import DEVELOPMENT, TEST
-from readme import main as readme
-from readme import tables
+from dreamdrive_bench import clips
+from dreamdrive_bench.common.worlds import DEVELOPMENT, TEST
+from dreamdrive_bench.readme import main as readme, tables
 
 PAGE = """Before.
 <!-- {name}: begin -->

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from dreamdrive.splat import rasterize
-from splat import peer
-from splat import programs as splat_programs
-from splat.passes import view_of
-from splat.streets import stand_in
+from dreamdrive_bench.splat import peer, programs as splat_programs
+from dreamdrive_bench.splat.passes import view_of
+from dreamdrive_bench.splat.streets import stand_in
 
 WIDTH, HEIGHT, COUNT = 96, 60, 1500
 

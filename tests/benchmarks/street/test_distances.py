@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dreamdrive.evaluate.frechet import frechet_distance
-from street import distances
+from dreamdrive.evaluate.clips.frechet import frechet_distance
+from dreamdrive_bench.street import distances
 
 VIEWS = ("shift_1", "shift_2", "shift_3", "raise_1", "yaw_10")
 NETWORK = "frechet_efficientnet_lite0"

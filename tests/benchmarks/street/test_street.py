@@ -9,17 +9,21 @@ from types import ModuleType
 import cv2
 import numpy as np
 import pytest
-from tests.scene.scenes import make_scene
 
-from common import keep
-from common.report import as_json
 from dreamdrive.options import Options
-from street import consistency, methods, renderer
-from street import fit as fits
-from street import jobs as jobs_of
-from street import main as street
-from street import picture as pictures
-from street.case import VIEWS
+from dreamdrive_bench.common import keep
+from dreamdrive_bench.common.report import as_json
+from dreamdrive_bench.street import (
+    consistency,
+    fit as fits,
+    jobs as jobs_of,
+    main as street,
+    methods,
+    picture as pictures,
+    renderer,
+)
+from dreamdrive_bench.street.case import VIEWS
+from tests.scene.scenes import make_scene
 
 
 def options(*arguments: str) -> argparse.Namespace:

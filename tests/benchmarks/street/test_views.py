@@ -9,9 +9,8 @@ import pytest
 import torch
 
 from dreamdrive.scene.camera import Camera
-from dreamdrive.world import WorldBox
-from street import measure
-from street import views as views_module
+from dreamdrive.scene.street.truth import WorldBox
+from dreamdrive_bench.street import measure, views as views_module
 
 FRAMES = 24
 

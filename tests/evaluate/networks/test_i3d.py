@@ -2,11 +2,11 @@
 
 import pytest
 import torch
-from tests.evaluate.networks.seeded import seeded_state
-from tests.golden.reading import cases, close, tensors, values
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks.i3d import I3d, i3d_features, load_i3d, prepare
+from tests.evaluate.networks.seeded import seeded_state
+from tests.golden.reading import cases, close, tensors, values
 
 LIMIT = 1e-4
 """Of the largest value: float32 through 60 layers with weights of no use, where 1e-6 was seen."""

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 import torch
-from tests.evaluate.networks.seeded import seeded_state
-from tests.golden.reading import close, tensors, values
 from torch import Tensor
 
 from dreamdrive.evaluate.networks.inception import inception_features, load_inception
 from dreamdrive.evaluate.networks.resize import Resize, resize
+from tests.evaluate.networks.seeded import seeded_state
+from tests.golden.reading import close, tensors, values
 
 LIMIT = 1e-4
 """Of the largest value: float32 through 90 layers with weights of no use, where 1e-6 was seen."""

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.evaluate.networks.seeded import seeded_state
-from tests.golden.reading import cases, tensors, values
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate.networks.lpips import CHANNELS, TRUNKS, load_lpips
+from tests.evaluate.networks.seeded import seeded_state
+from tests.golden.reading import cases, tensors, values
 
 
 def files(settings: dict[str, Any], kind: str, folder: Path) -> tuple[Path, Path]:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from tests.geometry import toy
 
 from dreamdrive.geometry import calmed
 from dreamdrive.geometry.dense import densify
 from dreamdrive.scene.geometry import Geometry
+from tests.geometry import toy
 
 
 def off(geometry: Geometry, truth: Geometry) -> tuple[float, float]:

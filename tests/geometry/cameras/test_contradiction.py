@@ -2,13 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.toy_drive import make_clip, straight, turning
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.contradiction import check, explain
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Ground
+from tests.geometry.toy_drive import make_clip, straight, turning
 
 PATH = turning(8, 0.4, 2.0)
 

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.decompose.test_drifting import DEPTH_M, FOCAL_PX, HEIGHT, WIDTH, wall
 
 from dreamdrive.geometry.cameras import with_creep
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from tests.decompose.test_per_frame import DEPTH_M, FOCAL_PX, HEIGHT, WIDTH, wall
 
 
 def creeping(step_m: float, turn_rad: float = 0.0) -> tuple[Clip, Geometry]:

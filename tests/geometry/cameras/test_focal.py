@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from tests.geometry.toy_drive import FOCAL_PX, make_clip, path_error, straight, turning
 
 from dreamdrive.geometry.cameras.posing import pose_clip
+from tests.geometry.toy_drive import FOCAL_PX, make_clip, path_error, straight, turning
 
 
 def test_a_turning_clip_shows_its_focal_length() -> None:

@@ -5,20 +5,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.cameras.gate import judge
-from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.cameras.sfm import SparseModel
 from dreamdrive.geometry.options import GateOptions
 
 FRAMES = 12
 MOVING = np.ones(FRAMES - 1, bool)
 
 
-def drive(reprojection_px: float, sideways_m: float = 0.0) -> Model:
+def drive(reprojection_px: float, sideways_m: float = 0.0) -> SparseModel:
     """A drive straight ahead, 0.5 m a frame; one frame in the middle lies to the side."""
     poses = np.tile(np.eye(4), (FRAMES, 1, 1))
     poses[:, 2, 3] = 0.5 * np.arange(FRAMES)
     poses[FRAMES // 2, 0, 3] = sideways_m
     seen = np.ones((FRAMES, 700), bool)
-    return Model(poses, np.zeros((700, 3)), seen, np.zeros(5), 0.0, reprojection_px, None)
+    return SparseModel(poses, np.zeros((700, 3)), seen, np.zeros(5), 0.0, reprojection_px, None)
 
 
 def test_an_exact_drive_is_accepted() -> None:
@@ -45,7 +45,7 @@ def test_a_wobbling_path_is_judged_over_stretches(sideways_m: float, jumps: bool
     assert any("jumps" in reason for reason in wobbling.reasons) == jumps
 
 
-def sparse(points: int, in_each: int, in_one: int | None = None) -> Model:
+def sparse(points: int, in_each: int, in_one: int | None = None) -> SparseModel:
     """The drive with fewer points, of which each frame sees some."""
     seen = np.zeros((FRAMES, points), bool)
     seen[:, :in_each] = True

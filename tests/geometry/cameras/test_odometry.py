@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
 from dreamdrive.geometry.cameras.odometry import DEFAULT_SPEED_M_S, Odometry, drive, levelled, steadied
 from dreamdrive.geometry.evidence import observe
 from dreamdrive.scene.geometry import Ground
+from tests.geometry.toy_drive import HEIGHT_M, make_clip, path_error, straight, turning
 
 LEVEL = Ground(np.array([0.0, -1.0, 0.0]), HEIGHT_M)
 

@@ -2,10 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
-from tests.geometry.toy_drive import HEIGHT, HEIGHT_M, WIDTH, make_clip, straight, turning
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions
@@ -13,7 +11,9 @@ from dreamdrive.geometry.cameras.paths import fill, rebase
 from dreamdrive.geometry.cameras.posing import Posed, pose_clip
 from dreamdrive.geometry.road.known_depth import in_metres
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.look import CameraEstimate, Look
+from dreamdrive.scene.geometry import Scale
+from dreamdrive.scene.street.look import CameraEstimate, Look
+from tests.geometry.toy_drive import HEIGHT, HEIGHT_M, WIDTH, make_clip, straight, turning
 
 
 def stack(posed: Posed) -> np.ndarray:
@@ -50,7 +50,7 @@ def test_a_standing_clip_gets_one_place_and_a_reason() -> None:
 
 
 def test_known_poses_are_used_untouched(clip: Clip) -> None:
-    path = turning(8, 0.4, 2.0)
+    path = turning(5, 0.4, 2.0)
     moved = np.eye(4)
     moved[:3, :3], moved[:3, 3] = Rotation.from_euler("xyz", [0.3, -0.5, 1.1]).as_matrix(), [5, -2, 30]
     rendered = make_clip(path)
@@ -64,8 +64,18 @@ def test_known_poses_are_used_untouched(clip: Clip) -> None:
     assert posed.ground.offset_m == pytest.approx(HEIGHT_M, rel=0.03)
 
 
+def test_metres_and_a_focal_length_that_a_prior_guessed_are_no_given_ones(clip: Clip) -> None:
+    path = turning(5, 0.4, 2.0)
+    guess = Scale("camera height of 1.2 m", 0.2, basis="seen sizes")
+    known = Known(path, intrinsics=True, generated=True, scale=guess, focal_guessed=True)
+    posed = pose_clip(replace(make_clip(path), known=known))
+    assert posed.scale == replace(guess, others=posed.scale.others)
+    assert posed.scale.others
+    assert not posed.focal.observed
+
+
 def test_known_poses_in_an_unknown_unit_are_scaled_by_the_road(clip: Clip) -> None:
-    path = turning(8, 0.4, 2.0)
+    path = turning(5, 0.4, 2.0)
     small = path.copy()
     small[:, :3, 3] /= 7.3
     rendered = make_clip(path)
@@ -149,7 +159,7 @@ def test_a_camera_height_must_be_positive(height: float) -> None:
         GeometryOptions(camera_height_m=height)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**31), st.integers(2, 6))
 def test_rebasing_keeps_relative_poses(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

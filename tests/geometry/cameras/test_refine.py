@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.toy_drive import HEIGHT_M, make_clip, turning
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras.refine import refined
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
+from tests.geometry.toy_drive import HEIGHT_M, make_clip, turning
 
 PATH = turning(8, 0.4, 2.0)
 UNIT = 0.8  # of what the frames alone show

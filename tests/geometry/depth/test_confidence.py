@@ -1,7 +1,6 @@
 """Confidence from agreement between frames."""
 
 import numpy as np
-from tests.geometry import toy
 
 from dreamdrive.geometry.depth.confidence import (
     GROUND_PRIOR_CONFIDENCE,
@@ -9,6 +8,7 @@ from dreamdrive.geometry.depth.confidence import (
     combine,
     temporal_neighbours,
 )
+from tests.geometry import toy
 
 
 def test_neighbours_skip_what_may_not_be_used():

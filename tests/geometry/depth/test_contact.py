@@ -1,8 +1,7 @@
 """Depth of what stands on the road, from where it touches it."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dreamdrive.geometry.depth.contact import on_the_road
 from dreamdrive.geometry.options import FusionOptions

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from tests.geometry import toy
 
 from dreamdrive.geometry.depth import make_view
-from dreamdrive.geometry.depth.fusion import Fused, Plane, Seen, fuse, with_stereo
+from dreamdrive.geometry.depth.fusion import Fused, NetworkDepth, RoadDepth, fuse, with_stereo
 from dreamdrive.geometry.options import FusionOptions
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.geometry import toy
 
 HEIGHT, WIDTH, HORIZON = 60, 96, 20
 
@@ -30,12 +30,12 @@ class Street:
         self.network = np.where(self.classes > 0, 0.4 / self.inverse * bend, 0).astype(np.float32)
         self.confidence = np.zeros((HEIGHT, WIDTH), np.float32)
 
-    def fused(self, swept: np.ndarray | None = None, plane: Plane | None = None) -> Fused:
+    def fused(self, swept: np.ndarray | None = None, plane: RoadDepth | None = None) -> Fused:
         spread = np.full((HEIGHT, WIDTH), 0.2, np.float32)
-        seen = Seen(self.network, spread, self.classes, self.instances)
+        seen = NetworkDepth(self.network, spread, self.classes, self.instances)
         usable = np.ones((HEIGHT, WIDTH), bool)
         swept = self.inverse if swept is None else swept
-        return fuse(seen, swept, self.confidence, plane or Plane(self.plane), usable, FusionOptions())
+        return fuse(seen, swept, self.confidence, plane or RoadDepth(self.plane), usable, FusionOptions())
 
     def off(self, found: Fused, where: np.ndarray) -> float:
         """Largest relative error of depth."""
@@ -111,7 +111,7 @@ def test_a_road_of_unsure_tilt_is_believed_nearby_only() -> None:
     street.network = np.where(street.classes > 0, 0.4 / street.inverse, 0).astype(np.float32)
     rows = np.arange(HEIGHT)[:, None] + 0.5 - HORIZON - 3
     tilted = np.repeat(np.maximum(rows, 0) / 150, WIDTH, axis=1).astype(np.float32)
-    believed, doubted = street.fused(plane=Plane(tilted)), street.fused(plane=Plane(tilted, 0.04))
+    believed, doubted = street.fused(plane=RoadDepth(tilted)), street.fused(plane=RoadDepth(tilted, 0.04))
     road = street.classes == StreetClass.ROAD
     assert street.off(doubted, road) < 0.6 * street.off(believed, road)
     near = road & (np.arange(HEIGHT) == HEIGHT - 1)[:, None]

@@ -1,9 +1,9 @@
 """Depth maps of neighbours settle what stands still."""
 
 import numpy as np
-from tests.geometry import toy
 
 from dreamdrive.geometry.depth import make_view, settled_in_time
+from tests.geometry import toy
 
 
 class Maps:

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.geometry import toy
+from hypothesis import given, strategies as st
 
 from dreamdrive.geometry.depth import make_view, with_outlines
 from dreamdrive.geometry.depth.outlines import redrawn, weighted_median
+from tests.geometry import toy
 
 HEIGHT, WIDTH = 48, 80
 NEAR, FAR = 1 / 5, 1 / 30

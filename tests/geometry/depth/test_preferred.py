@@ -1,9 +1,9 @@
 """Stereo is taken against what was fused where neighbours say so, and nowhere else."""
 
 import numpy as np
-from tests.geometry.depth.test_in_time import Maps
 
-from dreamdrive.geometry.depth import Fused, preferred, shifted_users
+from dreamdrive.geometry.depth import Fused, preferred, shifted_road_users
+from tests.geometry.depth.test_in_time import Maps
 
 FACTOR, FAR_OFF = np.float32(1.15), np.float32(1.3)
 
@@ -46,9 +46,9 @@ def test_a_standing_road_user_moves_as_a_whole_to_where_neighbours_match_it() ->
     some = np.where(user & (np.add.outer(np.arange(user.shape[1]), columns) % 5 == 0), sure(maps), 0)
     fused = Fused(np.where(user, maps.inverse * FACTOR, maps.inverse), sure(maps), maps.spread)
     instances = user.astype(np.uint16)
-    found = shifted_users(maps.view, instances, fused, maps.inverse, some, user).inverse
+    found = shifted_road_users(maps.view, instances, fused, maps.inverse, some, user).inverse
     np.testing.assert_allclose(found, maps.inverse, rtol=1e-5)
     # Where neighbours match it better as it is, it stays.
     right = Fused(maps.inverse, sure(maps), maps.spread)
-    stays = shifted_users(maps.view, instances, right, maps.inverse * FACTOR, some, user).inverse
+    stays = shifted_road_users(maps.view, instances, right, maps.inverse * FACTOR, some, user).inverse
     assert np.array_equal(stays, maps.inverse)

@@ -1,11 +1,11 @@
 """The sky mask on pictures whose sky is known."""
 
 import numpy as np
-from tests.geometry import toy
 
 from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
+from tests.geometry import toy
 
 EVERYWHERE = np.ones((60, 80), bool)
 

@@ -3,14 +3,14 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.geometry import toy
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.geometry.depth import smoothing, sweep
 from dreamdrive.geometry.depth.one_frame import sweep_frames
-from dreamdrive.geometry.depth.view import make_view, single_threaded_opencv
+from dreamdrive.geometry.depth.view import make_view
 from dreamdrive.scene.camera import Camera
+from dreamdrive.vision.flow import single_threaded_opencv
+from tests.geometry import toy
 
 
 def turned(angle: float, shift: tuple[float, float, float]) -> np.ndarray:
@@ -20,7 +20,7 @@ def turned(angle: float, shift: tuple[float, float, float]) -> np.ndarray:
     return pose
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     angle=st.floats(-0.2, 0.2),
     shift=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
@@ -69,7 +69,7 @@ def test_sources_are_used_frames_on_both_sides_at_the_wanted_baselines():
 
 
 def test_smoothing_carries_depth_into_a_blank_and_refines_between_labels():
-    work = smoothing.Workspace(9, 16, 20)
+    work = smoothing.CostBuffers(9, 16, 20)
     labels = np.arange(16)[None, :, None]
     work.cost[:] = 0.02 * (labels - 7.3) ** 2
     work.cost[3:6, :, 8:12] = 0.5
@@ -79,7 +79,7 @@ def test_smoothing_carries_depth_into_a_blank_and_refines_between_labels():
 
 def test_smoothed_labels_are_those_of_path_costs_added_up():
     rng = np.random.default_rng(3)
-    work, grey = smoothing.Workspace(7, 20, 21), rng.uniform(0, 40, (7, 21)).astype(np.float32)
+    work, grey = smoothing.CostBuffers(7, 20, 21), rng.uniform(0, 40, (7, 21)).astype(np.float32)
     work.cost[:] = rng.uniform(0, 1, work.cost.shape)
 
     def paths(cost, levels):

@@ -5,11 +5,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.evidence import features, find_features, observe, shows_little
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
+from tests.scene.street.test_look import small_look
 
 WIDTH, HEIGHT, FRAMES = 480, 240, 3
 

@@ -1,9 +1,9 @@
 import cv2
 import numpy as np
 import pytest
-from tests.geometry.toy_drive import HEIGHT, HOOD_ROWS, WIDTH, make_clip, straight
 
 from dreamdrive.geometry.evidence import masks, observe
+from tests.geometry.toy_drive import HEIGHT, HOOD_ROWS, WIDTH, make_clip, straight
 
 STEPS = [0.5] * 9
 

@@ -3,8 +3,7 @@
 from itertools import product
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.geometry.moving.outline import minimum_cut
 
@@ -19,7 +18,7 @@ def value(labels: np.ndarray, gain: np.ndarray, right: np.ndarray, below: np.nda
     return (labels * gain).sum(axis=(1, 2)) - across - down
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**31))
 def test_no_labelling_is_better_and_none_as_good_is_smaller(seed):
     rng = np.random.default_rng(seed)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.extra.numpy import arrays
-from tests.geometry import toy
 
 from dreamdrive.geometry.dense import densify, upright_depth
 from dreamdrive.geometry.moving.evidence import FLAGGED, decide, fill
+from tests.geometry import toy
 
 
 def flagged_shares(street: toy.Toy) -> tuple[float, float, float]:
@@ -48,7 +48,7 @@ def test_given_depth_shows_any_motion_relative_to_it():
     np.testing.assert_allclose(dense.depth_m[street.box], street.depth_m[street.box], rtol=1e-5)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(bool, (12, 15)))
 def test_filling_only_adds(region):
     filled = fill(region)

@@ -4,19 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry import toy
 
 from dreamdrive.geometry import GeometryOptions, MovingOptions
 from dreamdrive.geometry.dense import densify
-from dreamdrive.geometry.depth.view import View, make_view
+from dreamdrive.geometry.depth.view import PosedFrames, make_view
 from dreamdrive.geometry.moving.evidence import FLAGGED
 from dreamdrive.geometry.moving.oncoming import oncoming
+from tests.geometry import toy
 
 STEP_M = 0.8
 MIDDLE = slice(2, 5)
 
 
-def seen(street: toy.Toy) -> View:
+def seen(street: toy.Toy) -> PosedFrames:
     posed = street.posed
     return make_view(street.clip, posed.cameras, posed.fixed_regions, posed.ground)
 

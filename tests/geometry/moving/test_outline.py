@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry import toy
 
-from dreamdrive.geometry.depth.view import View, make_view, single_threaded_opencv
+from dreamdrive.geometry.depth.view import PosedFrames, make_view
 from dreamdrive.geometry.moving.flow import PairFlow, neighbour_flows
 from dreamdrive.geometry.moving.outline import outline
+from dreamdrive.vision.flow import single_threaded_opencv
+from tests.geometry import toy
 
 FRAME = 3
 HORIZON = toy.HEIGHT // 2
@@ -26,14 +27,14 @@ def street() -> toy.Toy:
 
 
 @pytest.fixture(scope="module")
-def seen(street: toy.Toy) -> tuple[View, list[PairFlow]]:
+def seen(street: toy.Toy) -> tuple[PosedFrames, list[PairFlow]]:
     posed = street.posed
     view = make_view(street.clip, posed.cameras, posed.fixed_regions, posed.ground)
     with single_threaded_opencv():
         return view, neighbour_flows(view)[FRAME]
 
 
-def static_inverse(view: View) -> np.ndarray:
+def static_inverse(view: PosedFrames) -> np.ndarray:
     """Of the street without the van."""
     depth = toy.render(view.cameras[FRAME], [], FRAME)[1]
     return np.where(depth > 0, 1 / np.maximum(depth, 0.1), 0).astype(np.float32)

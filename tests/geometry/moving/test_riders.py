@@ -3,24 +3,24 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.scene.test_look import small_look
 
 from dreamdrive.geometry.moving.riders import with_riders
-from dreamdrive.scene.look import Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.scene.street.test_look import small_look
 
 SHAPE = (1, 40, 60)
 WHEEL = (20, 20, 28, 32)
 """First column and row, last column and row + 1."""
 
 
-def seen(*users: tuple[StreetClass, tuple[int, int, int, int]]) -> Look:
+def seen(*road_users: tuple[StreetClass, tuple[int, int, int, int]]) -> Look:
     """A frame with boxes as road users, numbered from 1 as they come; later ones lie on earlier ones."""
     instances = np.zeros(SHAPE, np.uint16)
-    for number, (_, (left, top, right, bottom)) in enumerate(users, start=1):
+    for number, (_, (left, top, right, bottom)) in enumerate(road_users, start=1):
         instances[0, top:bottom, left:right] = number
     found = tuple(
-        RoadUser(kind, 0.8, box, int((instances == n).sum())) for n, (kind, box) in enumerate(users, 1)
+        RoadUser(kind, 0.8, box, int((instances == n).sum())) for n, (kind, box) in enumerate(road_users, 1)
     )
     zeros = np.zeros(SHAPE, np.float32)
     small = small_look(1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+
 from tests.prior.magicdrive.tiny import Written, write_folder
 
 

@@ -6,7 +6,6 @@ from typing import get_args
 import numpy as np
 import pytest
 import torch
-from tests.golden.reading import arrays, close
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.cameras import (
@@ -31,7 +30,8 @@ from dreamdrive.prior.magicdrive.condition import (
     prompt_of,
     see,
 )
-from dreamdrive.scene.layout import (
+from dreamdrive.scene.level import upright
+from dreamdrive.scene.street.layout import (
     Area,
     AreaKind,
     Box,
@@ -43,9 +43,9 @@ from dreamdrive.scene.layout import (
     TrackPoint,
     track_function,
 )
-from dreamdrive.world import draw_street
-from dreamdrive.world.drive import ego_poses
-from dreamdrive.world.mesh import upright
+from streetworld import draw_street
+from streetworld.drive import ego_poses
+from tests.golden.reading import arrays, close
 
 EAST = Ego([TrackPoint(0.0, 0.0, 0.0, 0.0), TrackPoint(1.0, 10.0, 0.0, 0.0)])
 NOW = np.zeros(1)

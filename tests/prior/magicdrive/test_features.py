@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.prior.magicdrive.tiny import SIZE, Written
 
+from dreamdrive.build import build_scene
 from dreamdrive.data.layout_file import write_layout
 from dreamdrive.options import QUALITIES
-from dreamdrive.pipeline import build_scene
 from dreamdrive.prior import choose_prior
 from dreamdrive.prior.early_features import BLOCK, SIGMA, onto_frames, watch
 from dreamdrive.prior.magicdrive.condition import OfLayout, see
@@ -23,7 +22,8 @@ from dreamdrive.progress import Work
 from dreamdrive.scene.clip import OF_GEOMETRY, Clip
 from dreamdrive.scene.control import Control
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.world import draw_street
+from streetworld import draw_street
+from tests.prior.magicdrive.tiny import SIZE, Written
 
 NAME = f"magicdrive:{BLOCK}"
 

@@ -8,17 +8,17 @@ import pytest
 import torch
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from safetensors.torch import load_file, save_file
-from tests.prior.magicdrive.tiny import WORDS, Written, write_folder
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive import folder as weights
-from dreamdrive.prior.magicdrive.folder import Parts, read_parts
+from dreamdrive.prior.magicdrive.folder import MagicDriveNetworks, read_parts
 from dreamdrive.prior.magicdrive.networks import plain_settings
+from tests.prior.magicdrive.tiny import WORDS, Written, write_folder
 
 CPU = torch.device("cpu")
 
 
-def read(folder: Written, temporal: bool = False) -> Parts:
+def read(folder: Written, temporal: bool = False) -> MagicDriveNetworks:
     return read_parts(folder.path, temporal=temporal)
 
 

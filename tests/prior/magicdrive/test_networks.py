@@ -10,9 +10,6 @@ from diffusers.models.attention import BasicTransformerBlock
 from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
 from diffusers.schedulers.scheduling_unipc_multistep import UniPCMultistepScheduler
 from safetensors.torch import load_file
-from tests.golden import reading
-from tests.golden.reading import Table, cases, close, tensors, values
-from tests.prior.magicdrive.tiny import SIZE, Written, official_configs
 from torch import Tensor
 
 from dreamdrive.prior.magicdrive.blocks import TemporalBlock, sparse_causal
@@ -21,6 +18,9 @@ from dreamdrive.prior.magicdrive.config import Temporal, parse_settings, read_se
 from dreamdrive.prior.magicdrive.folder import needed_bytes
 from dreamdrive.prior.magicdrive.networks import BevControlNet, MapEncoder, denoised, fourier, multiview_unet
 from dreamdrive.prior.magicdrive.sample import sample, unipc
+from tests.golden import reading
+from tests.golden.reading import Table, cases, close, tensors, values
+from tests.prior.magicdrive.tiny import SIZE, Written, official_configs
 
 FEATURES = 1e-5
 """Limit of features and tokens, of the largest value: sines of metres times 8, rounded to 1e-6."""

@@ -6,21 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.logs import TIMES_S, camera, ego, log, pose, track
-from tests.prior.magicdrive.tiny import SIZE, Written, write_folder
 
-from dreamdrive.data.lidar_file import read_points
-from dreamdrive.data.log_layout import layout_of_log
-from dreamdrive.data.nuscenes import read_nuscenes, write_nuscenes
+from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.datasets.log_layout import layout_of_log
+from dreamdrive.datasets.nuscenes import read_nuscenes
 from dreamdrive.errors import InputError
+from dreamdrive.export.nuscenes.writer import write_nuscenes
 from dreamdrive.prior import choose_prior
 from dreamdrive.prior.magicdrive.cameras import NUSCENES
-from dreamdrive.prior.magicdrive.condition import CHANNELS, CLASSES, Surroundings, see
+from dreamdrive.prior.magicdrive.condition import CHANNELS, CLASSES, StreetCondition, see
 from dreamdrive.prior.magicdrive.of_scene import class_of, clockwise, mounted_lidar, of_street
-from dreamdrive.prior.street import Street
+from dreamdrive.prior.street import StreetSource
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.control import Control
-from dreamdrive.scene.log import LidarSweep, Log, LogMap
+from dreamdrive.scene.street.log import LidarSweep, Log, LogMap
+from tests.logs import TIMES_S, camera, ego, log, pose, track
+from tests.prior.magicdrive.tiny import SIZE, Written, write_folder
 
 YAWS = {
     "CAM_FRONT": 0.0,
@@ -44,8 +45,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Log:
     return replace(made, cameras=cameras, boxes=boxes)
 
 
-def seen_of(scene: Log) -> Surroundings:
-    return of_street(Street(layout_of_log(scene), "the scene", scene, scene.cameras))
+def seen_of(scene: Log) -> StreetCondition:
+    return of_street(StreetSource(layout_of_log(scene), "the scene", scene, scene.cameras))
 
 
 def lidar_from_world(scene: Log, time_s: float) -> np.ndarray:
@@ -144,7 +145,7 @@ def test_without_a_lidar_that_of_nuscenes_stands_for_it_and_that_is_said(scene: 
     for sweeps in ((), in_the_world):
         other = replace(scene, sweeps=sweeps)
         assert mounted_lidar(other) is None
-        seen = of_street(Street(layout_of_log(other), "the scene", other, other.cameras))
+        seen = of_street(StreetSource(layout_of_log(other), "the scene", other, other.cameras))
         front = seen.ring.lidar_from_camera[0]
         np.testing.assert_allclose(front[:3, 3], [0, 0.76, -0.33], atol=1e-9)
         assert any("tells no place of a lidar on the car" in note for note in seen.notes)
@@ -161,12 +162,12 @@ def test_the_car_is_where_the_front_camera_was(scene: Log) -> None:
 
 
 def test_other_rigs_and_scenes_without_a_map_are_refused(scene: Log) -> None:
-    street = Street(layout_of_log(scene), "the scene", scene, scene.cameras[:5])
+    street = StreetSource(layout_of_log(scene), "the scene", scene, scene.cameras[:5])
     with pytest.raises(InputError, match=r"a ring of 6 cameras, and the scene gives 5: CAM_FRONT, .*choose"):
         of_street(street)
     bare = replace(scene, map=LogMap())
     with pytest.raises(InputError, match="the scene has no map with a drivable_area"):
-        of_street(Street(street.layout, "the scene", bare, scene.cameras))
+        of_street(StreetSource(street.layout, "the scene", bare, scene.cameras))
 
 
 @pytest.fixture(scope="module")

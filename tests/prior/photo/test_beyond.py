@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.prior.photo.streets import CAR_M, FOCAL_PX, HEIGHT, HEIGHT_M, WIDTH, street
 
 from dreamdrive.prior.photo.beyond import widened
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.prior.photo.streets import CAR_M, FOCAL_PX, HEIGHT, HEIGHT_M, WIDTH, street
 
 MARGIN = 24
 
@@ -31,12 +31,12 @@ def test_a_lane_line_goes_on_straight_below_the_photo() -> None:
 def test_who_is_cut_off_goes_on_and_who_is_not_does_not() -> None:
     photo = street()
     cut = np.s_[27:39, WIDTH - 10 :]
-    users, classes, depth = photo.users.copy(), photo.classes.copy(), photo.depth_m.copy()
-    users[cut], classes[cut], depth[cut] = 2, StreetClass.VEHICLE, CAR_M
-    wide = widened(replace(photo, users=users, classes=classes, depth_m=depth), MARGIN)
+    road_users, classes, depth = photo.road_users.copy(), photo.classes.copy(), photo.depth_m.copy()
+    road_users[cut], classes[cut], depth[cut] = 2, StreetClass.VEHICLE, CAR_M
+    wide = widened(replace(photo, road_users=road_users, classes=classes, depth_m=depth), MARGIN)
     beyond = np.s_[28:38, MARGIN + WIDTH : MARGIN + WIDTH + 9]
-    assert (wide.users[beyond] == 2).all()
+    assert (wide.road_users[beyond] == 2).all()
     assert (wide.classes[beyond] == StreetClass.VEHICLE).all()
     np.testing.assert_allclose(wide.depth_m[beyond], CAR_M)
-    assert (wide.users[:, : MARGIN + 1] == 0).all()
-    assert (wide.users == 1).sum() == (users == 1).sum()
+    assert (wide.road_users[:, : MARGIN + 1] == 0).all()
+    assert (wide.road_users == 1).sum() == (road_users == 1).sum()

@@ -9,8 +9,8 @@ from jaxtyping import UInt8
 from dreamdrive.prior.photo.height import USUAL_M, height_of
 from dreamdrive.prior.photo.lanes import lane_widths
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import CameraEstimate, Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
 
 CAMERA = Camera(400.0, 400.0, 240.0, 135.0, 480, 270)
 SEEN = CameraEstimate(480, 270, 400.0, 0.0, 0.0, 1.0, 0.0, 0.01, 0.0)
@@ -20,14 +20,14 @@ def seen(
     height_m: float, *sizes: tuple[StreetClass, float, float], classes: UInt8[np.ndarray, "h w"] | None = None
 ) -> Look:
     """A look at users of some kinds, distances and heights by a level camera."""
-    users: list[RoadUser] = []
+    road_users: list[RoadUser] = []
     instances = np.zeros((1, 270, 480), np.uint16)
     for kind, distance_m, tall_m in sizes:
         below = 135 + 400 * height_m / distance_m
         too_tall = 1.05 if kind == StreetClass.VEHICLE else 1.0  # as the network sees vehicles
         top = below - 400 * too_tall * tall_m / distance_m
-        users.append(RoadUser(kind, 0.9, (200, round(top), 260, round(below)), 900))
-        instances[0, round(top) : round(below), 200:260] = len(users)
+        road_users.append(RoadUser(kind, 0.9, (200, round(top), 260, round(below)), 900))
+        instances[0, round(top) : round(below), 200:260] = len(road_users)
     blank = np.zeros((1, 270, 480))
     return Look(
         blank.astype(np.float32),
@@ -35,7 +35,7 @@ def seen(
         (blank if classes is None else classes[None]).astype(np.uint8),
         blank.astype(np.float16),
         instances,
-        (tuple(users),),
+        (tuple(road_users),),
         (SEEN,),
         SEEN,
     )
@@ -44,7 +44,7 @@ def seen(
 def test_without_road_users_it_is_the_usual_one() -> None:
     found = height_of(seen(1.5), CAMERA)
     assert found.metres == pytest.approx(USUAL_M, rel=0.01)
-    assert found.users == 0
+    assert found.road_users == 0
     assert 0.2 < found.spread < 0.3
 
 
@@ -53,7 +53,7 @@ def test_cars_and_people_tell_it(height_m: float) -> None:
     car, person = (StreetClass.VEHICLE, 14.0, 1.48), (StreetClass.PERSON, 9.0, 1.7)
     found = height_of(seen(height_m, car, person, (StreetClass.VEHICLE, 20.0, 1.5)), CAMERA)
     assert found.metres == pytest.approx(height_m, rel=0.08)
-    assert found.users == 3
+    assert found.road_users == 3
     assert found.spread < 0.16
 
 
@@ -65,7 +65,7 @@ def test_a_lorry_among_cars_is_taken_for_one() -> None:
 
 def test_who_is_cut_off_tells_nothing() -> None:
     near = (StreetClass.VEHICLE, 3.0, 1.48)  # its foot is below the picture
-    assert height_of(seen(1.5, near), CAMERA).users == 0
+    assert height_of(seen(1.5, near), CAMERA).road_users == 0
 
 
 def test_a_single_row_that_sticks_out_of_a_car_is_not_its_top() -> None:
@@ -80,7 +80,7 @@ def test_a_single_row_that_sticks_out_of_a_car_is_not_its_top() -> None:
 @pytest.mark.parametrize("height_m", [1.2, 1.9])
 def test_lanes_tell_it(height_m: float) -> None:
     found = height_of(seen(height_m, classes=lines(height_m, (-1.675, 1.675, 5.025))), CAMERA)
-    assert (found.users, found.lanes) == (0, 2)
+    assert (found.road_users, found.lanes) == (0, 2)
     assert found.metres == pytest.approx(height_m, rel=0.08)
     assert found.spread < 0.17
 

@@ -1,10 +1,10 @@
 """A photo as layers: drawn where it was taken it is the photo, from aside it shows what was hidden."""
 
 import numpy as np
-from tests.prior.photo.streets import CAR, CAR_M, GROUND, WALL_M, street
 
 from dreamdrive.prior.photo import layers_of
 from dreamdrive.prior.photo.sight import sight_of
+from tests.prior.photo.streets import CAR, CAR_M, GROUND, WALL_M, street
 
 
 def moved(right_m: float = 0.0, ahead_m: float = 0.0) -> np.ndarray:

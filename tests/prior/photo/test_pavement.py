@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.prior.photo.streets import CAR, GROUND, HEIGHT, HEIGHT_M, WIDTH, street
 
 from dreamdrive.prior.photo import layers_of
 from dreamdrive.prior.photo.pavement import AHEAD, AROUND, along_road
 from dreamdrive.prior.photo.sight import sight_of
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.prior.photo.streets import CAR, GROUND, HEIGHT, HEIGHT_M, WIDTH, street
 
 WANTED = np.s_[34:39, CAR[1]]
 
@@ -49,7 +49,7 @@ def test_what_finds_no_bare_ground_is_left() -> None:
 def test_a_car_that_drives_on_uncovers_the_line() -> None:
     photo = street()
     rgb, line = lined()
-    shown = np.where((photo.users > 0)[..., None], photo.rgb, rgb).astype(np.uint8)
+    shown = np.where((photo.road_users > 0)[..., None], photo.rgb, rgb).astype(np.uint8)
     layers = layers_of(replace(photo, rgb=shown), leaving=[1])
     sight = sight_of(layers.at(1.0, np.array([[0.0, 0.0, 15.0]])), photo.camera, GROUND)
     rows = np.s_[35:38, CAR[1]]

@@ -1,15 +1,14 @@
 """Depth of a look becomes that of a level road with what stands on it."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.prior.photo.streets import CAR, CAR_M, FOCAL_PX, HEIGHT, HEIGHT_M, WIDTH, street
+from hypothesis import given, strategies as st
 
 from dreamdrive.prior.photo.fill import continued, inpainted
 from dreamdrive.prior.photo.street import street_of
 from dreamdrive.prior.photo.upright import upright
-from dreamdrive.scene.look import CameraEstimate, Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import CameraEstimate, Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.prior.photo.streets import CAR, CAR_M, FOCAL_PX, HEIGHT, HEIGHT_M, WIDTH, street
 
 
 def look_of(factor: float) -> Look:
@@ -25,7 +24,7 @@ def look_of(factor: float) -> Look:
         0.1 * ones[None],
         photo.classes[None],
         ones[None],
-        photo.users[None],
+        photo.road_users[None],
         ((user,),),
         (camera,),
         camera,

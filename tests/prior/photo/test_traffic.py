@@ -4,27 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.prior.photo.streets import CAR, CAR_M, GROUND, street
 
-from dreamdrive.prior.photo import Street, layers_of
+from dreamdrive.prior.photo import PhotoStreet, layers_of
 from dreamdrive.prior.photo.sight import sight_of
 from dreamdrive.prior.photo.traffic import WALK_M_S, flowing, going_ahead, velocities_of
 from dreamdrive.prior.photo.way import free_m
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.street_class import StreetClass
+from tests.prior.photo.streets import CAR, CAR_M, GROUND, street
 
 
-def with_user(columns: slice, kind: StreetClass, lamps: bool = False) -> Street:
+def with_user(columns: slice, kind: StreetClass, lamps: bool = False) -> PhotoStreet:
     """The street without its car, and a user of the same size and distance elsewhere."""
     made = street()
-    classes, users, depth, rgb = (x.copy() for x in (made.classes, made.users, made.depth_m, made.rgb))
+    classes, road_users, depth, rgb = (
+        x.copy() for x in (made.classes, made.road_users, made.depth_m, made.rgb)
+    )
     plane = GROUND.depth_m(made.camera)
     classes[CAR] = np.where(plane[CAR] < 30, StreetClass.ROAD, StreetClass.STRUCTURE)
-    users[CAR], depth[CAR] = 0, np.minimum(plane[CAR], 30)
+    road_users[CAR], depth[CAR] = 0, np.minimum(plane[CAR], 30)
     at = (CAR[0], columns)
-    users[at], classes[at], depth[at], rgb[at] = 1, kind, CAR_M, (20, 20, 120)
+    road_users[at], classes[at], depth[at], rgb[at] = 1, kind, CAR_M, (20, 20, 120)
     if lamps:
         rgb[30:33, columns.start + 1 : columns.start + 4] = (200, 30, 30)
-    return replace(made, classes=classes, users=users, depth_m=depth, rgb=rgb)
+    return replace(made, classes=classes, road_users=road_users, depth_m=depth, rgb=rgb)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_a_user_is_seen_where_it_has_driven_and_the_road_where_it_was() -> None:
     sight = sight_of(later, made.camera, GROUND)
     # At 20 m the car is half as large: its foot is 6 px below the horizon of row 27.
     car = sight.moving
-    assert 0.2 < car.sum() / (made.users > 0).sum() < 0.4
+    assert 0.2 < car.sum() / (made.road_users > 0).sum() < 0.4
     assert np.median(sight.depth_m[car & (sight.depth_m > 0)]) == pytest.approx(2 * CAR_M, rel=0.05)
     foot = (CAR[0].stop - 2, 48)
     assert not car[foot]
@@ -86,5 +88,5 @@ def test_nothing_moves_at_the_time_of_the_photo_but_is_known_to() -> None:
     made = street()
     layers = layers_of(made)
     sight = sight_of(layers.at(0.0, np.array([[0.0, 0.0, 10.0]])), made.camera, GROUND)
-    assert (sight.moving == (made.users > 0)).mean() > 0.98
+    assert (sight.moving == (made.road_users > 0)).mean() > 0.98
     np.testing.assert_array_equal(sight.rgb, sight_of(layers, made.camera, GROUND).rgb)

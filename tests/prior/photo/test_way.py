@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.prior.photo.streets import CAR, CAR_M, HEIGHT, HEIGHT_M, WIDTH, street
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.photo.way import free_m, level_axes, path_for
-from dreamdrive.scene.action import Command, Goal
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Command, Control, Goal
 from dreamdrive.scene.geometry import Ground
+from tests.prior.photo.streets import CAR, CAR_M, HEIGHT, HEIGHT_M, WIDTH, street
 
 TIMES_S = np.arange(25) / 10
 
@@ -21,7 +20,7 @@ def test_the_way_ends_before_the_car_ahead() -> None:
     path = path_for(Control(), photo, TIMES_S)
     assert 0 < path.positions_m[-1, 2] <= CAR_M - 4 + 1e-6
     np.testing.assert_allclose(path.positions_m[:, :2], 0, atol=1e-9)
-    clear = replace(photo, depth_m=np.where(photo.users > 0, 30, photo.depth_m).astype(np.float32))
+    clear = replace(photo, depth_m=np.where(photo.road_users > 0, 30, photo.depth_m).astype(np.float32))
     assert path_for(Control(), clear, TIMES_S).positions_m[-1, 2] == pytest.approx(2.4 * 6)
 
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from tests.prior.vista.tiny import save_folder, save_official
 
 from dreamdrive.prior.vista.kinds import SVD, VISTA
+from tests.prior.vista.tiny import save_folder, save_official
 
 
 @pytest.fixture(scope="session")

@@ -3,13 +3,13 @@
 from typing import Any
 
 import torch
-from tests.golden import reading
 from torch import Tensor, nn
 
 from dreamdrive.prior.vista.configs import config_of
 from dreamdrive.prior.vista.keys import UNET, Part, recipes_of
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.networks import VideoUNet, make_empty
+from tests.golden import reading
 
 _STATE = "vista/tiny_unet_state_fp16.safetensors"
 

@@ -5,11 +5,11 @@ from math import pi
 import pytest
 import torch
 from diffusers.models.embeddings import Timesteps
-from tests.golden.reading import cases, close, tensors
 
 from dreamdrive.prior.vista.condition import NUMBERS, clip_pixels, embed_action, numbers_of
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, MOTION_BUCKET, VISTA
-from dreamdrive.scene.action import Command, Goal, Steering, Waypoints
+from dreamdrive.scene.control import Command, Goal, Steering, Waypoints
+from tests.golden.reading import cases, close, tensors
 
 KINDS = {name: [name] for name in NUMBERS} | {"steer": ["speed", "angle"], "free": [], "all": list(NUMBERS)}
 LIMIT = 1e-5

@@ -9,7 +9,6 @@ import pytest
 import torch
 from diffusers import AutoencoderKLTemporalDecoder
 from safetensors.torch import load_file, save_file
-from tests.prior.vista.tiny import official, save_official, states
 from torch import Tensor
 from transformers import CLIPVisionModelWithProjection
 
@@ -18,6 +17,7 @@ from dreamdrive.prior.vista.convert import convert, write_tensors
 from dreamdrive.prior.vista.keys import PARTS
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.stored import FILES, NOTE, open_weights
+from tests.prior.vista.tiny import official, save_official, states
 
 
 def test_the_folder_holds_the_model(tmp_path: Path, vista_file: Path) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.prior.vista.tiny import official
 from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.convert import convert
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.stored import SECOND, encoder_difference, notes_of, open_weights
+from tests.prior.vista.tiny import official
 
 
 @pytest.fixture

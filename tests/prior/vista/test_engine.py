@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from dreamdrive.prior.vista.engine import Engine, Seen
+from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.stored import open_weights
 
@@ -14,12 +14,12 @@ from dreamdrive.prior.vista.stored import open_weights
 def test_a_network_leaves_when_the_next_one_comes(vista_dir: Path) -> None:
     """At once, not when Python next looks for cycles: a GPU has no room for two."""
     engine = Engine(open_weights(vista_dir, VISTA), torch.device("cpu"))
-    seen = Seen(torch.zeros(16), torch.zeros(4, 8, 8), torch.zeros(2432))
+    seen = RoundConditions(torch.zeros(16), torch.zeros(4, 8, 8), torch.zeros(2432))
     gc.collect()
     gc.disable()
     try:
         with torch.inference_mode():
-            engine.look(seen, torch.zeros(6, 4, 8, 8), 0.0, torch.tensor([1.0, 0, 0, 0, 0, 0]))
+            engine.predict(seen, torch.zeros(6, 4, 8, 8), 0.0, torch.tensor([1.0, 0, 0, 0, 0, 0]))
         held = [weakref.ref(engine.network("unet"))]
         engine.network("vae")
         assert held[0]() is None

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.prior.vista.tiny import FRAMES
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.vista.engine import Engine, Seen
+from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.features import FeatureOptions, spans_of, video_features
-from dreamdrive.scene.action import Command, Goal
+from dreamdrive.scene.control import Command, Goal
+from tests.prior.vista.tiny import FRAMES
 
 
 def recording(count: int, width: int = 96, height: int = 54) -> np.ndarray:
@@ -63,21 +63,23 @@ def test_no_memory_is_asked_for_the_decoder(svd_dir: Path, monkeypatch: pytest.M
 def test_each_window_is_told_the_action_and_a_goal_is_of_the_first(
     vista_dir: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looks: list[tuple[torch.Tensor, list[float]]] = []
-    look = Engine.look
+    predictions: list[tuple[torch.Tensor, list[float]]] = []
+    predict = Engine.predict
 
-    def watched(engine: Engine, seen: Seen, x: object, time: float, mask: torch.Tensor, *more: object):
+    def watched(
+        engine: Engine, seen: RoundConditions, x: object, time: float, mask: torch.Tensor, *more: object
+    ):
         assert seen.action is not None
-        looks.append((seen.action, mask.tolist()))
-        return look(engine, seen, x, time, mask, *more)  # type: ignore[arg-type]
+        predictions.append((seen.action, mask.tolist()))
+        return predict(engine, seen, x, time, mask, *more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Engine, "look", watched)
+    monkeypatch.setattr(Engine, "predict", watched)
     for action, again in ((Command("left"), True), (Goal(0.5, 0.5), False)):
-        looks.clear()
+        predictions.clear()
         video_features(recording(FRAMES + 2), vista_dir, action=action)
-        assert [fixed for _, fixed in looks] == [[1.0] + [0.0] * (FRAMES - 1)] * 2
-        assert looks[0][0].any()
-        assert bool(looks[1][0].any()) == again
+        assert [fixed for _, fixed in predictions] == [[1.0] + [0.0] * (FRAMES - 1)] * 2
+        assert predictions[0][0].any()
+        assert bool(predictions[1][0].any()) == again
 
 
 def test_weights_that_are_not_finite_are_refused(tmp_path: Path, svd_dir: Path) -> None:

@@ -2,13 +2,13 @@
 
 import pytest
 import torch
-from tests.golden.reading import is_cut, values
-from tests.prior.vista.tiny import OFFICIAL, official, states
 
 from dreamdrive.prior.vista.configs import config_of
 from dreamdrive.prior.vista.keys import PARTS, UNET, Part, Recipes, recipes_of
-from dreamdrive.prior.vista.kinds import SVD, VISTA, Kind
+from dreamdrive.prior.vista.kinds import SVD, VISTA, ModelKind
 from dreamdrive.prior.vista.networks import make_empty
+from tests.golden.reading import is_cut, values
+from tests.prior.vista.tiny import OFFICIAL, official, states
 
 KEYS = "vista/vista_checkpoint_keys.json"
 MAPS: dict[Part, str] = {
@@ -52,7 +52,7 @@ def test_what_is_ignored_is_what_no_golden_table_has() -> None:
 
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("kind", [VISTA, SVD])
-def test_golden_official_file_is_the_network_by_name_and_shape(part: Part, kind: Kind) -> None:
+def test_golden_official_file_is_the_network_by_name_and_shape(part: Part, kind: ModelKind) -> None:
     keys = values(KEYS)
     if kind is SVD:
         keys = {k: v for k, v in keys.items() if "action_control" not in k and "cond_time_stack" not in k}
@@ -70,7 +70,7 @@ def test_the_sizes_of_the_published_model_follow_from_its_shapes(part: Part) -> 
 
 
 @pytest.mark.parametrize("kind", [VISTA, SVD])
-def test_there_and_back_is_the_same(kind: Kind) -> None:
+def test_there_and_back_is_the_same(kind: ModelKind) -> None:
     file = official(kind)
     recipes = recipes_of(file)
     assert not recipes.unknown

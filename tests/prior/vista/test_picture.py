@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from tests.prior.vista.photos import picture, save_photo
 
-from dreamdrive.data.video_writer import write_video
+from dreamdrive.data.pictures.video_writer import write_video
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.picture import check_size, frame, read_leading, to_frames, to_images
 from dreamdrive.scene.camera import Camera
+from tests.prior.vista.photos import picture, save_photo
 
 
 def test_nuscenes_is_scaled_and_not_cut() -> None:

@@ -5,15 +5,15 @@ from typing import Any
 
 import pytest
 import torch
-from tests.golden.reading import cases, close, tensors
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from dreamdrive.prior.vista.engine import Engine, Seen
+from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.memory import CHUNK
 from dreamdrive.prior.vista.rollout import SCALE, SHARED, chunks, decode_in_chunks, roll_out, rounds_for
 from dreamdrive.prior.vista.sampler import Branches, Velocity
+from tests.golden.reading import cases, close, tensors
 
 FILE = "vista/rollout_standin.safetensors"
 STEPS = 4
@@ -44,7 +44,7 @@ def stand_in(given: dict[str, Tensor], described: list[Tensor]) -> Engine:
         described.append(images)
         return images.mean(dim=(0, 2, 3))
 
-    def velocity(seen: Seen) -> Velocity:
+    def velocity(seen: RoundConditions) -> Velocity:
         def answer(x: Tensor, time: float, mask: Tensor) -> Branches:
             rest = 0.05 * time + 0.1 * mask[:, None, None, None]
             made = [
@@ -119,7 +119,7 @@ def test_leading_frames_stay_and_svd_fixes_none() -> None:
     images = torch.rand(3, 3, 4, 6) * 2 - 1
     seen: list[Tensor] = []
 
-    def velocity(conditions: Seen) -> Velocity:
+    def velocity(conditions: RoundConditions) -> Velocity:
         def answer(x: Tensor, time: float, mask: Tensor) -> Branches:
             seen.append(mask)
             return x, x

@@ -4,11 +4,9 @@ from pathlib import Path
 
 import pytest
 import torch
-from tests.golden.reading import Table, cases, close, tensors
-from tests.prior.vista.networks import Given, golden_unet, unet_config
 from torch import Tensor
 
-from dreamdrive.prior.vista.engine import Engine, Seen
+from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.kinds import VISTA
 from dreamdrive.prior.vista.sampler import (
     Branches,
@@ -19,7 +17,9 @@ from dreamdrive.prior.vista.sampler import (
     sample,
     sigmas,
 )
-from dreamdrive.prior.vista.stored import Stored
+from dreamdrive.prior.vista.stored import StoredModel
+from tests.golden.reading import Table, cases, close, tensors
+from tests.prior.vista.networks import Given, golden_unet, unet_config
 
 NAMES: dict[str, Schedule] = {"VanillaCFG": "constant", "TrianglePredictionGuider": "triangle"}
 LIMIT = 2e-5
@@ -81,14 +81,16 @@ class Held(Engine):
     def __init__(self, vector: Tensor) -> None:
         unet = golden_unet()
         unet.add_time_proj = Given(vector)  # type: ignore[assignment]
-        super().__init__(Stored(Path("golden"), VISTA, {}), torch.device("cpu"))
+        super().__init__(StoredModel(Path("golden"), VISTA, {}), torch.device("cpu"))
         self._held = "unet", unet
 
 
 def tiny_velocity(given: Table) -> Velocity:
     """What the engine makes of a round's conditions."""
     context, image = given["crossattn"][0, 0], unet_config()["context_dim"]
-    return Held(given["vector"][0]).velocity(Seen(context[:image], given["concat"][0], context[image:]))
+    return Held(given["vector"][0]).velocity(
+        RoundConditions(context[:image], given["concat"][0], context[image:])
+    )
 
 
 TINY = "vista/sampler_tiny_unet.safetensors"

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.prior.vista.tiny import official, save_official
 from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.keys import PARTS
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.stored import NOTE, open_weights
+from tests.prior.vista.tiny import official, save_official
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,14 @@ import re
 import pytest
 import torch
 from diffusers.models.resnet import ResnetBlock2D, TemporalResnetBlock
-from tests.golden.reading import Table, cases, close, tensors
-from tests.prior.vista.networks import Given, golden_unet, unet_config
-from tests.prior.vista.tiny import configs
 from torch import Tensor
 
 from dreamdrive.prior.early_features import watch
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.prior.vista.networks import VideoUNet, make_empty
+from tests.golden.reading import Table, cases, close, tensors
+from tests.prior.vista.networks import Given, golden_unet, unet_config
+from tests.prior.vista.tiny import configs
 
 LIMIT = 3e-5
 """Of the largest value; float32 differs by 2e-6 through all layers, and more where they are more."""
@@ -22,7 +22,7 @@ def unet_forward() -> Table:
     return tensors("vista/unet_forward.safetensors")
 
 
-def look(unet: VideoUNet, given: Table, context: Tensor, *, mask: bool) -> Tensor:
+def predict(unet: VideoUNet, given: Table, context: Tensor, *, mask: bool) -> Tensor:
     """All clips, one after the other: their times differ."""
     frames = int(given["in.num_frames"])
     clips = given["in.x"].unflatten(0, (-1, frames))
@@ -51,7 +51,7 @@ def test_golden_actions_and_fixed_frames(name: str) -> None:
         assert action == ["zeroaction"]
         context[..., image:] = 0
     expected = given[f"out.out_{name}"]
-    made = look(golden_unet(actions=action != ["noaction"]), given, context, mask=mask == "mask")
+    made = predict(golden_unet(actions=action != ["noaction"]), given, context, mask=mask == "mask")
     close(made, expected, LIMIT)
 
 
@@ -77,10 +77,10 @@ def test_golden_blocks_hand_over_what_they_make() -> None:
     kept: dict[str, list[Tensor]] = {name: [] for name in expected}
     per_level = unet_config()["num_res_blocks"]
     handles = [watch(unet, place_of(name, per_level), kept[name].append) for name in expected]
-    look(unet, given, given["in.context_1tok"], mask=True)
+    predict(unet, given, given["in.context_1tok"], mask=True)
     for handle in handles:
         handle.remove()
-    look(unet, given, given["in.context_1tok"], mask=True)
+    predict(unet, given, given["in.context_1tok"], mask=True)
     for name, parts in kept.items():
         close(torch.cat(parts), expected[name], LIMIT, name)
 

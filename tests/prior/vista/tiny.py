@@ -11,7 +11,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from dreamdrive.prior.vista.keys import UNET, Part
-from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, VISTA, Kind
+from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, VISTA, ModelKind
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.prior.vista.stored import FILES
 
@@ -52,7 +52,7 @@ OFFICIAL: dict[Part, dict[str, Any]] = {
 """Sizes of the published Vista."""
 
 
-def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
+def configs(kind: ModelKind) -> dict[Part, dict[str, Any]]:
     """Of each part: one width, as few layers as there can be with the block that the features come from."""
     return {
         "unet": {
@@ -86,7 +86,7 @@ def configs(kind: Kind) -> dict[Part, dict[str, Any]]:
 
 
 @cache
-def states(kind: Kind, seed: int = 0) -> dict[Part, dict[str, Tensor]]:
+def states(kind: ModelKind, seed: int = 0) -> dict[Part, dict[str, Tensor]]:
     """Random weights of each part: matrices keep the size of what goes through them."""
     draw = torch.Generator().manual_seed(seed)
 
@@ -102,7 +102,7 @@ def states(kind: Kind, seed: int = 0) -> dict[Part, dict[str, Tensor]]:
     }
 
 
-def save_folder(folder: Path, kind: Kind, seed: int = 0) -> Path:
+def save_folder(folder: Path, kind: ModelKind, seed: int = 0) -> Path:
     """The model in diffusers' layout."""
     for part, state in states(kind, seed).items():
         (folder / part).mkdir(parents=True)
@@ -111,7 +111,7 @@ def save_folder(folder: Path, kind: Kind, seed: int = 0) -> Path:
     return folder
 
 
-def official(kind: Kind, seed: int = 0) -> dict[str, Tensor]:
+def official(kind: ModelKind, seed: int = 0) -> dict[str, Tensor]:
     """The model by the keys of its official file."""
     all_states = states(kind, seed)
     found: dict[str, Tensor] = {}
@@ -140,7 +140,7 @@ def _second_encoder(found: dict[str, Tensor]) -> dict[str, Tensor]:
     return {f"first_stage_model.encoder.{name}": value.clone() for name, value in second.items()}
 
 
-def save_official(path: Path, kind: Kind, seed: int = 0) -> Path:
+def save_official(path: Path, kind: ModelKind, seed: int = 0) -> Path:
     """The model as an official file."""
     save_file({key: value.contiguous() for key, value in official(kind, seed).items()}, path)
     return path

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Int
 
-from dreamdrive.data.distortion import Distortion, check_bend
+from dreamdrive.data.cameras.distortion import Distortion, check_bend
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 

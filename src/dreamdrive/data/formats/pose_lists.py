@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from dreamdrive.data.cameras.fitted import check_middle
 from dreamdrive.data.formats.rigid import RIGID_TOLERANCE, PoseRows, clean_poses, numbers, pose_name
 from dreamdrive.errors import InputError
 from dreamdrive.files.paths import read_text
@@ -64,6 +65,8 @@ def poses_of_text(text: str, where: str) -> PoseRows:
 
 def poses_of_json(values: Mapping[str, Any], where: str) -> PoseRows:
     """The poses of Trajectory JSON."""
+    if "world_from_camera" not in values:
+        raise InputError(f"{where}: world_from_camera is missing; expected a 4x4 matrix for each pose")
     poses = clean_poses(numbers(values["world_from_camera"], where), where, pose_name)
     times = numbers(values.get("times_s", []), where)
     if times.shape != (len(poses),):
@@ -128,6 +131,7 @@ def parts_of_projection(
     beside = np.eye(4)
     try:
         camera = Camera(matrix[0, 0], matrix[1, 1], matrix[0, 2] + 0.5, matrix[1, 2] + 0.5, *picture)
+        check_middle(camera)
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused below
             beside[:3, 3] = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
     except np.linalg.LinAlgError as error:

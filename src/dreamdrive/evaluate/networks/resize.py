@@ -5,7 +5,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.nn import functional
 
-from dreamdrive.choices import Resize
+from dreamdrive.names import Resize
 
 
 def resize(

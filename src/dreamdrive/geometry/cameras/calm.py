@@ -1,4 +1,4 @@
-"""A path without the errors of single frames."""
+"""Smoothing of a path: the errors of single frames taken out."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Whether given poses can be those of the frames."""
+"""Checks of given poses against the frames."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""How far a camera rolls that stands: a car that waits creeps a few centimetres, and its picture grows."""
+"""Creeping of a car that waits: a few centimetres, seen by its picture that grows."""
 
 from dataclasses import replace
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from dreamdrive.geometry.cameras import sfm
-from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.cameras.sfm import SparseModel
 from dreamdrive.scene.camera import Camera
 
 LADDER = (0.6, 0.75, 1.35, 1.8)
@@ -27,13 +27,13 @@ class Settled:
     The note says what happened, or None when nothing worth a word did.
     """
 
-    model: Model
+    model: SparseModel
     observed: bool
     ladder: dict[str, float]
     note: str | None
 
 
-def settle(database: Path, model: Model, camera: Camera, calibrated: bool, seed: int) -> Settled:
+def settle(database: Path, model: SparseModel, camera: Camera, calibrated: bool, seed: int) -> Settled:
     """Settle the focal length of a model that was mapped with ``camera`` (working size, square pixels).
 
     A calibrated focal length is kept; only a residual radial distortion k is estimated and kept when it
@@ -68,7 +68,7 @@ def settle(database: Path, model: Model, camera: Camera, calibrated: bool, seed:
     )
 
 
-def _with_radial(model: Model) -> Settled:
+def _with_radial(model: SparseModel) -> Settled:
     bent = sfm.adjust(model, free_radial=True)
     if bent.cost < WORTHWHILE_RADIAL * model.cost and abs(bent.lens[4]) < MAX_RADIAL:
         note = f"the lens keeps a radial distortion of k = {bent.lens[4]:.3f} beyond its calibration"
@@ -78,10 +78,10 @@ def _with_radial(model: Model) -> Settled:
 
 def _remap(
     database: Path, camera: Camera, lens: Float[np.ndarray, "5"], count: int, seed: int
-) -> Model | None:
+) -> SparseModel | None:
     sfm.rematch(database, replace(camera, fx_px=float(lens[0]), fy_px=float(lens[0])), seed)
     return sfm.map_globally(database, count, seed)
 
 
-def _sane(model: Model, camera: Camera) -> bool:
+def _sane(model: SparseModel, camera: Camera) -> bool:
     return FIELD[0] < model.lens[0] / camera.width_px < FIELD[1] and bool(model.registered.any())

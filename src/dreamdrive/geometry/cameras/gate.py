@@ -1,4 +1,4 @@
-"""Whether a sparse reconstruction of a drive can be believed."""
+"""The gate that accepts or refuses a sparse reconstruction of a drive."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.cameras.sfm import SparseModel
 from dreamdrive.geometry.options import GateOptions
 
 STRETCH = 3
@@ -14,7 +14,7 @@ STRETCH = 3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class GateVerdict:
     """Outcome of the gate."""
 
     reasons: tuple[str, ...]  # why the model is refused, in words; empty when it is accepted
@@ -26,12 +26,12 @@ class Verdict:
 
 
 def judge(
-    model: Model,
+    model: SparseModel,
     moving: Bool[np.ndarray, " s"],
     options: GateOptions = GateOptions(),
     *,
     little: bool = False,
-) -> Verdict:
+) -> GateVerdict:
     """Test registration, support, fit and the plausibility of the steps.
 
     Only steps (F - 1,) in which the picture moves are held to one direction, as the camera sees it, and to a
@@ -47,7 +47,7 @@ def judge(
     registered = model.registered
     share = float(registered.mean())
     if not registered.any():
-        return Verdict(("structure from motion placed no frame",), {"registered_share": 0.0}, False)
+        return GateVerdict(("structure from motion placed no frame",), {"registered_share": 0.0}, False)
     seen = model.seen[registered].sum(axis=1)
     wobbling = model.reprojection_px > options.wobbling_px
     ways, length = _steps(model.world_from_camera)
@@ -85,7 +85,7 @@ def judge(
     if variation > options.variation:
         reasons.append(f"the length of the steps varies by {100 * variation:.0f} %")
     backwards = bool(usual[2] < 0)
-    return Verdict(tuple(reasons), figures, backwards, few=few, aside_deg=aside_deg, wobbling=wobbling)
+    return GateVerdict(tuple(reasons), figures, backwards, few=few, aside_deg=aside_deg, wobbling=wobbling)
 
 
 def _usual(ways: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "3"]:

@@ -1,15 +1,14 @@
-"""Structure from motion of a clip with its gate: a believable model, or why there is none."""
+"""Structure from motion of a clip with its gate: an accepted model, or why there is none."""
 
-import tempfile
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dreamdrive.files.output import temporary_folder
 from dreamdrive.geometry.cameras import gate, sfm
 from dreamdrive.geometry.cameras.focal import Settled, settle
-from dreamdrive.geometry.cameras.sfm import Model
+from dreamdrive.geometry.cameras.sfm import SparseModel
 from dreamdrive.geometry.depth import Tell, unheard
 from dreamdrive.geometry.evidence import Evidence, Features, features, find_features, shows_little
 from dreamdrive.geometry.options import GateOptions
@@ -28,7 +27,7 @@ STARTS = 6
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MappingOutcome:
     """What structure from motion gave: an accepted model, or why and in what kind there is none.
 
     Notes are sentences on what else was noticed; figures those of the gate and the focal test, as JSON
@@ -45,7 +44,7 @@ class Outcome:
 
 def reconstruct(
     clip: Clip, evidence: Evidence, options: GateOptions, seed: int, tell: Tell = unheard
-) -> Outcome:
+) -> MappingOutcome:
     """Global mapping, focal test and gate; other mappings when the gate refuses; else the reasons.
 
     Where points are few, and where frames show little of the street from the start, the frames are looked at
@@ -55,7 +54,7 @@ def reconstruct(
     if len(clip) < MIN_FRAMES:
         return _refused(f"{len(clip)} frames are too few for structure from motion", "few")
     little = shows_little(clip, evidence)
-    best: Outcome | None = None
+    best: MappingOutcome | None = None
     for closer in (True,) if little else (False, True):
         found = find_features(clip, evidence, closer)
         typical = int(np.median([len(entry.keypoints_px) for entry in found]))
@@ -70,7 +69,7 @@ def reconstruct(
     return best
 
 
-def _points(outcome: Outcome) -> int:
+def _points(outcome: MappingOutcome) -> int:
     return 0 if outcome.settled is None else len(outcome.settled.model.points)
 
 
@@ -83,7 +82,7 @@ def _mapped(
     *,
     little: bool,
     tell: Tell,
-) -> Outcome:
+) -> MappingOutcome:
     """What comes of some features.
 
     Global mapping starts at random positions, and now and then ends in a folded path: other starts are tried
@@ -93,8 +92,8 @@ def _mapped(
     notes: list[str] = []
     reasons: tuple[str, ...] = ()
     figures: dict[str, Any] = {"features": int(np.median([len(entry.keypoints_px) for entry in found]))}
-    with tempfile.TemporaryDirectory(prefix="dreamdrive-sfm-") as folder:
-        database = Path(folder) / "matches.db"
+    with temporary_folder() as folder:
+        database = folder / "matches.db"
         tell()
         sfm.match(database, found, square, seed)
         tell()
@@ -113,12 +112,12 @@ def _mapped(
                     notes += [settled.note] if settled.note else []
                     notes += _noticed(verdict, settled.model)
                     notes += [f"{reasons[0]}: mapped again, {again}"] if reasons else []
-                    return Outcome(settled, (), tuple(notes), figures, sure=verdict.few is None)
+                    return MappingOutcome(settled, (), tuple(notes), figures, sure=verdict.few is None)
             reasons = reasons or failed
-    return Outcome(None, reasons, (), figures, "refused")
+    return MappingOutcome(None, reasons, (), figures, "refused")
 
 
-def _noticed(verdict: gate.Verdict, model: Model) -> list[str]:
+def _noticed(verdict: gate.GateVerdict, model: SparseModel) -> list[str]:
     """What is unusual about a drive, a sentence each."""
     notes = ["the camera drives backwards"] if verdict.backwards and verdict.aside_deg < ASIDE_DEG else []
     if verdict.aside_deg >= ASIDE_DEG:
@@ -134,11 +133,11 @@ def _attempts(seed: int) -> list[tuple[str, str, int]]:
     return [*others, ("incremental", "frame by frame", seed)]
 
 
-def _refused(reason: str, refusal: Fallback) -> Outcome:
-    return Outcome(None, (reason,), (), {}, refusal)
+def _refused(reason: str, refusal: Fallback) -> MappingOutcome:
+    return MappingOutcome(None, (reason,), (), {}, refusal)
 
 
-def _wobbling(model: Model) -> str:
+def _wobbling(model: SparseModel) -> str:
     return (
         f"points miss their pixels by {model.reprojection_px:.2f} px on average: the frames are not quite "
         "pictures of one street, and poses and depth are as exact as they are"

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.geometry.evidence import track
-from dreamdrive.geometry.road import Pair, Road
+from dreamdrive.geometry.road import Pair, RoadSweep
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 
@@ -84,7 +84,7 @@ def steadied(
 ) -> Float[np.ndarray, "f 4 4"]:
     """Poses on lines through those around them: a car does not turn to and fro from frame to frame.
 
-    In a drawn queue frames that the street drifts through are shown 0.9 dB better.
+    In a drawn queue frames of a per-frame street are shown 0.9 dB better.
     """
     turns = Rotation.from_matrix(world_from_camera[:, :3, :3])
     values = np.column_stack([world_from_camera[:, :3, 3], (turns[0].inv() * turns).as_rotvec()])
@@ -140,7 +140,7 @@ def _road_scores(
     for step, seconds in enumerate(interval):
         poses = np.tile(np.eye(4), (2, 1, 1))
         poses[1, :3, :3], poses[1, :3, 3] = turns[step], directions[step]
-        road = Road(grey[step : step + 2], usable[step : step + 2], camera, poses)
+        road = RoadSweep(grey[step : step + 2], usable[step : step + 2], camera, poses)
         road.telling(Pair(0, 1))
         for index, speed in enumerate(ladder):
             poses[1, :3, 3] = directions[step] * speed * seconds

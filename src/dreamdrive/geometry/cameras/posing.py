@@ -9,12 +9,12 @@ from jaxtyping import Float, Int
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.cameras import contradiction, odometry, turning
 from dreamdrive.geometry.cameras.calm import calm_path
-from dreamdrive.geometry.cameras.mapping import Outcome, reconstruct
+from dreamdrive.geometry.cameras.mapping import MappingOutcome, reconstruct
 from dreamdrive.geometry.cameras.paths import fill, path_length, rebase
 from dreamdrive.geometry.depth import Tell, unheard
 from dreamdrive.geometry.evidence import Evidence, observe
 from dreamdrive.geometry.options import GeometryOptions
-from dreamdrive.geometry.road import Metric, Street, depth_points, depth_ratios, scale
+from dreamdrive.geometry.road import Metric, PosedClip, depth_points, depth_ratios, scale
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Fallback, Focal, Ground, Scale
@@ -93,7 +93,9 @@ def pose_clip(
     return _from_model(clip, evidence, outcome, camera_height_m, seed)
 
 
-def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None, seed: int) -> Posed:
+def _from_model(
+    clip: Clip, evidence: Evidence, outcome: MappingOutcome, height_m: float | None, seed: int
+) -> Posed:
     """Cameras of an accepted sparse model, scaled to metres."""
     assert outcome.settled is not None
     model, observed = outcome.settled.model, outcome.settled.observed
@@ -103,7 +105,7 @@ def _from_model(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: floa
         camera = replace(camera, fx_px=camera.fx_px * factor, fy_px=camera.fy_px * factor)
     filled = fill(model.world_from_camera, clip.times_s)
     poses, points = rebase(filled, model.points)
-    street = Street.of(clip, evidence, camera, poses, points)
+    street = PosedClip.of(clip, evidence, camera, poses, points)
     ratios = depth_ratios(clip, camera, poses, points, model.seen)
     if len(ratios):
         metric = scale.from_depth(ratios, street, height_m, seed)
@@ -124,7 +126,8 @@ def _from_known(clip: Clip, evidence: Evidence, height_m: float | None, seed: in
     assert clip.known.world_from_camera is not None
     if clip.known.ground is None:
         street = _known_street(clip, evidence)
-        metric = scale.as_given(street, "poses", 0.0, "the given poses", height_m, seed)
+        still = evidence.motion.standing
+        metric = scale.as_given(street, "poses", 0.0, "the given poses", height_m, seed, still)
     else:
         ground = clip.known.ground.seen_from(clip.known.world_from_camera[0])
         metric = Metric(1.0, ground, Scale("poses", 0.0), ())
@@ -150,14 +153,14 @@ def _from_unscaled(clip: Clip, evidence: Evidence, height_m: float | None, seed:
     return replace(posed, metres_per_unit=metric.factor)
 
 
-def _known_street(clip: Clip, evidence: Evidence) -> Street:
+def _known_street(clip: Clip, evidence: Evidence) -> PosedClip:
     """The frames with the known poses, in these poses' unit."""
     assert clip.known.world_from_camera is not None
     points = depth_points(clip)
     if clip.known.points is not None:
         points = np.concatenate([points, clip.known.points])
     poses, points = rebase(clip.known.world_from_camera.astype(np.float64), points)
-    return Street.of(clip, evidence, clip.rig[0], poses, points)
+    return PosedClip.of(clip, evidence, clip.rig[0], poses, points)
 
 
 def _with_known(
@@ -183,7 +186,7 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     poses = turning.turned(evidence.grey, evidence.street, evidence.small)
     points = depth_points(clip)
     camera = clip.rig[0]
-    street = Street.of(clip, evidence, camera, poses, points)
+    street = PosedClip.of(clip, evidence, camera, poses, points)
     plane = scale.find_ground(street, 0)[0] if len(points) else None
     metric = _level_road(clip, height_m, STANDING_SPREAD)
     if clip.known.depth_m is not None:
@@ -195,7 +198,7 @@ def _standing(clip: Clip, evidence: Evidence, height_m: float | None, reason: st
     return replace(posed, standing=True, fallback=reason, fallback_kind="standing")
 
 
-def _from_odometry(clip: Clip, evidence: Evidence, outcome: Outcome, height_m: float | None) -> Posed:
+def _from_odometry(clip: Clip, evidence: Evidence, outcome: MappingOutcome, height_m: float | None) -> Posed:
     """Frame-to-frame odometry over a road that is taken to be level."""
     metric = _level_road(clip, height_m, FALLBACK_SPREAD)
     assert metric.ground is not None
@@ -254,6 +257,9 @@ def as_posed(
     where it was seen or given.
     """
     cameras = tuple(camera.at(pose) for pose in poses)
+    scale, known = metric.scale, clip.known
+    if known.scale is not None and scale.basis == "given":
+        scale = replace(known.scale, others=scale.others, against=scale.against)
     figures = {
         "flow_px_at_320": float(np.median(evidence.motion.flow_px)) if len(clip) > 1 else 0.0,
         "moving_steps": int(evidence.motion.moving.sum()),
@@ -265,8 +271,8 @@ def as_posed(
         fixed_regions=evidence.fixed.regions,
         region_names=evidence.fixed.names,
         ground=metric.ground,
-        scale=metric.scale,
-        focal=Focal(camera.fx_px, observed),
+        scale=scale,
+        focal=Focal(camera.fx_px, observed and not known.focal_guessed),
         standing=False,
         fallback=None,
         detected=evidence.detected + tuple(notes),

@@ -21,7 +21,7 @@ ROBUST_SCALE_PX = 1.0
 
 
 @dataclass(frozen=True)
-class Model:
+class SparseModel:
     """A sparse reconstruction of a clip, in arbitrary units."""
 
     world_from_camera: Float[np.ndarray, "f 4 4"]  # NaN where a frame was not registered
@@ -43,7 +43,7 @@ def match(database: Path, features: Sequence[Features], camera: Camera, seed: in
 
     Features are in order of time; pairs are verified with the pinhole of the working size.
     """
-    with pycolmap.Database.open(str(database)) as store:
+    with _quiet(), pycolmap.Database.open(str(database)) as store:
         native = _native_camera(camera)
         store.write_camera(native, use_camera_id=True)
         rig = pycolmap.Rig(rig_id=1)
@@ -64,13 +64,13 @@ def match(database: Path, features: Sequence[Features], camera: Camera, seed: in
 
 def rematch(database: Path, camera: Camera, seed: int) -> None:
     """Verify the stored pair matches again with another camera."""
-    with pycolmap.Database.open(str(database)) as store:
+    with _quiet(), pycolmap.Database.open(str(database)) as store:
         store.update_camera(_native_camera(camera))
         store.clear_two_view_geometries()
     _verify_pairs(database, camera, seed)
 
 
-def map_globally(database: Path, count: int, seed: int) -> Model | None:
+def map_globally(database: Path, count: int, seed: int) -> SparseModel | None:
     """Global mapping (GLOMAP, Pan et al. 2024) at a fixed focal length, then robust bundle adjustment.
 
     It starts at random positions of the seed. The largest model, or None when no model comes out.
@@ -88,7 +88,7 @@ def map_globally(database: Path, count: int, seed: int) -> Model | None:
     return _largest(pycolmap.global_mapping, database, options, count)
 
 
-def map_incrementally(database: Path, count: int, seed: int) -> Model | None:
+def map_incrementally(database: Path, count: int, seed: int) -> SparseModel | None:
     """Incremental mapping with the thresholds of a forward drive; the second choice."""
     options = pycolmap.IncrementalPipelineOptions()
     options.num_threads = 1
@@ -109,12 +109,12 @@ def map_incrementally(database: Path, count: int, seed: int) -> Model | None:
 
 
 def adjust(
-    model: Model,
+    model: SparseModel,
     focal_px: float | None = None,
     free_focal: bool = False,
     free_radial: bool = False,
     drop_outliers: bool = True,
-) -> Model:
+) -> SparseModel:
     """Robust bundle adjustment of a copy of the model, from another focal length if one is given.
 
     The focal length and a radial term k (x (1 + k r^2)) are adjusted where free. Dropping outliers adjusts
@@ -169,7 +169,9 @@ def _verify_pairs(database: Path, camera: Camera, seed: int) -> None:
         )
 
 
-def _largest(run: Callable[..., dict[int, Any]], database: Path, options: Any, count: int) -> Model | None:
+def _largest(
+    run: Callable[..., dict[int, Any]], database: Path, options: Any, count: int
+) -> SparseModel | None:
     output = database.parent / "models"
     output.mkdir(exist_ok=True)
     with _quiet():
@@ -215,7 +217,7 @@ def _quiet() -> Generator[None, None, None]:
         pycolmap.logging.minloglevel = level
 
 
-def _read(native: Any, count: int) -> Model:
+def _read(native: Any, count: int) -> SparseModel:
     poses = np.full((count, 4, 4), np.nan)
     pixels: dict[int, np.ndarray] = {}
     for image in native.images.values():
@@ -238,7 +240,7 @@ def _read(native: Any, count: int) -> Model:
     error = _errors_px(poses[frame], points[column], np.array(pixel).reshape(-1, 2), lens)
     cost = ROBUST_SCALE_PX**2 * np.log1p((error / ROBUST_SCALE_PX) ** 2)
     mean = (float(cost.mean()), float(error.mean())) if len(error) else (0.0, 0.0)
-    return Model(poses, points, seen, lens, *mean, native)
+    return SparseModel(poses, points, seen, lens, *mean, native)
 
 
 def _lens(camera: Any) -> np.ndarray:

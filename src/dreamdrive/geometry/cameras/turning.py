@@ -1,4 +1,4 @@
-"""How a camera turns beside its way: its car rides on springs, its mount shakes, or wind shakes its pole."""
+"""Rotation of a camera beside its way: its car rides on springs, its mount shakes, wind shakes its pole."""
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -44,7 +44,7 @@ def shaken(
 
     Each corner is followed into the frame before and the one after. Where a camera drives on smoothly, it
     lies in the middle of both; by how far all of them lie elsewhere, the camera is turned in between. On a
-    phone behind a windscreen frames that the street drifts through are shown 1.4 dB better. Frames and
+    phone behind a windscreen frames of a per-frame street are shown 1.4 dB better. Frames and
     pinhole are those of ``evidence.grey``.
     """
     count = len(grey)

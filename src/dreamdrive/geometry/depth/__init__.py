@@ -1,19 +1,46 @@
 """Plane sweep, its smoothing and its confidence."""
 
-from dreamdrive.geometry.depth.confidence import agreement, combine, fill_flanks, temporal_neighbours
-from dreamdrive.geometry.depth.fusion import PAVED, Fused, fused, with_stereo
-from dreamdrive.geometry.depth.in_time import settled_in_time
-from dreamdrive.geometry.depth.one_frame import sweep_frames
-from dreamdrive.geometry.depth.outlines import weighted_median, with_outlines
-from dreamdrive.geometry.depth.preferred import preferred, shifted_users
-from dreamdrive.geometry.depth.sky import above_horizon, sky_mask
-from dreamdrive.geometry.depth.sweep import Correlation, Warp, inside, misfits, sample
-from dreamdrive.geometry.depth.view import (
-    Tell,
-    View,
-    by_frame,
-    make_view,
-    parallel,
-    single_threaded_opencv,
-    unheard,
-)
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.geometry.depth.confidence import (
+        agreement as agreement,
+        combine as combine,
+        fill_flanks as fill_flanks,
+        temporal_neighbours as temporal_neighbours,
+    )
+    from dreamdrive.geometry.depth.fusion import (
+        PAVED as PAVED,
+        Fused as Fused,
+        fused as fused,
+        with_stereo as with_stereo,
+    )
+    from dreamdrive.geometry.depth.in_time import settled_in_time as settled_in_time
+    from dreamdrive.geometry.depth.one_frame import sweep_frames as sweep_frames
+    from dreamdrive.geometry.depth.outlines import (
+        weighted_median as weighted_median,
+        with_outlines as with_outlines,
+    )
+    from dreamdrive.geometry.depth.preferred import (
+        preferred as preferred,
+        shifted_road_users as shifted_road_users,
+    )
+    from dreamdrive.geometry.depth.sky import above_horizon as above_horizon, sky_mask as sky_mask
+    from dreamdrive.geometry.depth.sweep import (
+        Correlation as Correlation,
+        Warp as Warp,
+        inside as inside,
+        misfits as misfits,
+        sample as sample,
+    )
+    from dreamdrive.geometry.depth.view import (
+        PosedFrames as PosedFrames,
+        Tell as Tell,
+        by_frame as by_frame,
+        make_view as make_view,
+        unheard as unheard,
+    )
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

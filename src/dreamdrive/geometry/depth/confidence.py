@@ -1,4 +1,4 @@
-"""How far neighbouring frames confirm a depth map, and what confirmed depth says of smooth paint below it."""
+"""Confidence of depth maps by agreement with neighbouring frames."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from dreamdrive.geometry.depth.one_frame import Swept
 from dreamdrive.geometry.depth.sweep import Warp, inside
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 GROUND_PRIOR_CONFIDENCE = 0.3  # road that has its depth from the plane alone
 _ABSOLUTE = 0.006  # 1/m

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.geometry.options import FusionOptions
-from dreamdrive.scene.windows import grown
+from dreamdrive.vision.windows import grown
 
 _LEAST_PX = 8  # of a thing that is given a depth
 _BELOW_PX = 2  # rows under a thing's lowest pixel in which the ground is looked for

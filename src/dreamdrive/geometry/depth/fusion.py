@@ -1,4 +1,4 @@
-"""One depth from all that know something of it: stereo, the road, contact with it, and the street network."""
+"""Fusion of depth: stereo, the road, contact with it, and the street network."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.geometry.depth.contact import on_the_road
-from dreamdrive.geometry.depth.view import View, by_frame
+from dreamdrive.geometry.depth.view import PosedFrames, by_frame
 from dreamdrive.geometry.options import FusionOptions
 from dreamdrive.geometry.road import scale
-from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
+from dreamdrive.scene.street.look import Look
+from dreamdrive.scene.street.street_class import FLAT, ROAD_USERS, StreetClass
 
 PAVED = (StreetClass.ROAD, StreetClass.MARKING)
 _NEAREST_M, _FARTHEST_M = 0.5, 500.0
@@ -26,7 +26,7 @@ _PRIOR = 0.03  # weight of the coarser ratio against that of sure pixels
 
 
 @dataclass(frozen=True)
-class Seen:
+class NetworkDepth:
     """What the street network says of one frame; depth along z in any unit, 0 where there is none."""
 
     depth: Float[np.ndarray, "h w"]
@@ -35,7 +35,7 @@ class Seen:
     instances: Integer[np.ndarray, "h w"]
 
     @property
-    def users(self) -> Bool[np.ndarray, "h w"]:
+    def road_users(self) -> Bool[np.ndarray, "h w"]:
         """Pixels of road users."""
         return (self.instances > 0) | np.isin(self.classes, ROAD_USERS)
 
@@ -56,7 +56,7 @@ class Fused:
 
 
 def fused(
-    view: View,
+    view: PosedFrames,
     look: Look,
     inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
@@ -71,7 +71,7 @@ def fused(
 
     def one(frame: int) -> Fused:
         return fuse(
-            Seen(
+            NetworkDepth(
                 look.depth[frame] * np.float32(height_m),
                 look.spread[frame],
                 look.classes[frame],
@@ -79,7 +79,7 @@ def fused(
             ),
             inverse[frame],
             confidence[frame],
-            Plane(view.plane_inverse[frame], tilt_rad / height_m, height_m),
+            RoadDepth(view.plane_inverse[frame], tilt_rad / height_m, height_m),
             view.usable[frame],
             view.options.fusion,
         )
@@ -88,7 +88,7 @@ def fused(
 
 
 def with_stereo(
-    view: View,
+    view: PosedFrames,
     found: Fused,
     standing: Bool[np.ndarray, "f h w"],
     swept_inverse: Float[np.ndarray, "f h w"],
@@ -125,7 +125,7 @@ def _of_frames(found: Mapping[int, Fused], count: int) -> Fused:
 
 
 @dataclass(frozen=True)
-class Plane:
+class RoadDepth:
     """The road's plane in one frame: inverse depth in 1/m, and its relative spread a metre of depth.
 
     The camera is ``height_m`` above it.
@@ -142,10 +142,10 @@ class Plane:
 
 
 def fuse(
-    seen: Seen,
+    seen: NetworkDepth,
     swept_inverse: Float[np.ndarray, "h w"],
     confidence: Float[np.ndarray, "h w"],
-    plane: Plane,
+    plane: RoadDepth,
     usable: Bool[np.ndarray, "h w"],
     options: FusionOptions,
 ) -> Fused:
@@ -155,28 +155,32 @@ def fuse(
     is sure, or less sure and near the aligned depth; the road has the depth of its plane; a road user that of
     its contact with the road, or the aligned depth where its foot is hidden.
     """
-    users = seen.users & usable
+    road_users = seen.road_users & usable
     shown = usable & (seen.classes != StreetClass.SKY) & (seen.depth > 0)
     road = np.isin(seen.classes, PAVED) & (plane.inverse > _ROAD_INVERSE) & usable
     swept, level = _log_depth(swept_inverse), _log_depth(plane.inverse)
     level_spread = np.hypot(options.stereo_spread, plane.spread)
     sure = np.where(
-        shown & ~users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0
+        shown & ~road_users & (swept_inverse > _FAR_INVERSE) & (confidence >= options.sure), confidence, 0
     )
     believable = 0.5 * (options.stereo_spread / level_spread) ** 2
     weight = np.where(road & (sure == 0), believable, sure).astype(np.float32)
     known = np.where(sure > 0, swept, level)
     network = np.log(np.clip(seen.depth, 1e-3, 1e6)).astype(np.float32)
-    aligned, spread = _align(network, seen, known, weight, users, options)
+    aligned, spread = _align(network, seen, known, weight, road_users, options)
     off = np.abs(swept - aligned)
-    stereo = shown & ~users & (swept_inverse > 1 / _FARTHEST_M)
+    stereo = shown & ~road_users & (swept_inverse > 1 / _FARTHEST_M)
     believed = (confidence >= options.sure) & (off < options.sure_spreads * spread + 0.1)
     believed |= (confidence >= options.hinted) & (off < options.hinted_spreads * spread)
     # Of what is far the network knows only that it is far; its parallax tells how far.
     far = (
-        shown & ~users & (confidence >= options.sure) & (aligned > np.log(options.far_m)) & (swept > aligned)
+        shown
+        & ~road_users
+        & (confidence >= options.sure)
+        & (aligned > np.log(options.far_m))
+        & (swept > aligned)
     )
-    stereo = stereo & believed | shown & ~users & far
+    stereo = stereo & believed | shown & ~road_users & far
     log_depth = np.where(stereo, swept, aligned)
     spread = np.where(stereo, options.stereo_spread, spread)
     flat = road & ~stereo & (level_spread < spread)
@@ -198,10 +202,10 @@ def _log_depth(inverse: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
 
 def _align(
     network: Float[np.ndarray, "h w"],
-    seen: Seen,
+    seen: NetworkDepth,
     known: Float[np.ndarray, "h w"],
     weight: Float[np.ndarray, "h w"],
-    users: Bool[np.ndarray, "h w"],
+    road_users: Bool[np.ndarray, "h w"],
     options: FusionOptions,
 ) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
     """The network's log depth in the unit of what is known, and its spread.
@@ -222,7 +226,7 @@ def _align(
     shift, spread = coarse.copy(), own.copy()
     reach = options.reach * width
     ground = np.isin(seen.classes, FLAT)
-    for region in (ground, ~ground & ~users):
+    for region in (ground, ~ground & ~road_users):
         inside = weight * region
         fine = _carried(ratio, inside, coarse, reach)
         # How well the network follows the sure pixels nearby, as far as there are any.

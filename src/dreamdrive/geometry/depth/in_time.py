@@ -1,4 +1,4 @@
-"""Depth maps of neighbouring frames agree on what stands still."""
+"""Temporal consistency: depth maps of neighbouring frames agree on what stands still."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.depth.outlines import weighted_median
 from dreamdrive.geometry.depth.sweep import Warp
-from dreamdrive.geometry.depth.view import View, by_frame
+from dreamdrive.geometry.depth.view import PosedFrames, by_frame
 
 _STEPS = (-4, -2, -1, 1, 2, 4)
 """Neighbours asked, in used frames."""
@@ -15,7 +15,7 @@ _LEAST_SPREAD = 0.01
 
 
 def settled_in_time(
-    view: View,
+    view: PosedFrames,
     inverse: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"],
     still: Bool[np.ndarray, "f h w"],
@@ -30,7 +30,7 @@ def settled_in_time(
 
 def _settled(
     frame: int,
-    view: View,
+    view: PosedFrames,
     inverse: Float[np.ndarray, "f h w"],
     spread: Float[np.ndarray, "f h w"],
     still: Bool[np.ndarray, "f h w"],

@@ -6,8 +6,9 @@ from queue import SimpleQueue
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive.compute.threads import THREADS
 from dreamdrive.geometry.depth import smoothing, sweep
-from dreamdrive.geometry.depth.view import THREADS, View, by_frame
+from dreamdrive.geometry.depth.view import PosedFrames, by_frame
 
 _PLANE_BONUS = 0.20
 _PLANE_MATCH_BONUS = 0.35
@@ -28,15 +29,15 @@ class Swept:
     on_plane: Bool[np.ndarray, "h w"]
 
 
-def sweep_frames(view: View, sky: Bool[np.ndarray, "f h w"]) -> dict[int, Swept | None]:
+def sweep_frames(view: PosedFrames, sky: Bool[np.ndarray, "f h w"]) -> dict[int, Swept | None]:
     """Sweep every used frame against its sources; None for a frame that has none.
 
     Inverse depth 0 is rewarded in the sky (F, H, W).
     """
     _, height, width = view.grey.shape
-    free: SimpleQueue[smoothing.Workspace] = SimpleQueue()
+    free: SimpleQueue[smoothing.CostBuffers] = SimpleQueue()
     for _ in range(THREADS):
-        free.put(smoothing.Workspace(height, sweep.LABELS, width))
+        free.put(smoothing.CostBuffers(height, sweep.LABELS, width))
 
     def one(frame: int) -> Swept | None:
         work = free.get()
@@ -49,7 +50,7 @@ def sweep_frames(view: View, sky: Bool[np.ndarray, "f h w"]) -> dict[int, Swept 
 
 
 def _sweep_frame(
-    view: View, frame: int, sky: Bool[np.ndarray, "h w"], work: smoothing.Workspace
+    view: PosedFrames, frame: int, sky: Bool[np.ndarray, "h w"], work: smoothing.CostBuffers
 ) -> Swept | None:
     chosen = sweep.choose_sources(view.positions_m, view.used, frame, view.options.depth.reach_frames)
     if not chosen:

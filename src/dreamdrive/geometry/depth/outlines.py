@@ -1,12 +1,12 @@
-"""Depth changes where the picture does: outlines of things drawn again by colour."""
+"""Outlines of depth maps moved to those of the picture, by colour."""
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive import _native
-from dreamdrive.geometry.depth.view import View, by_frame
-from dreamdrive.scene.windows import grown, window_px
+from dreamdrive.geometry.depth.view import PosedFrames, by_frame
+from dreamdrive.vision.windows import grown, window_px
 
 _STEP = 0.1  # of log depth between neighbours: an outline
 _NEAR_PX = 2  # of an outline: pixels that are drawn again
@@ -17,7 +17,7 @@ _COLOUR = 0.06  # and over the colour, each channel in [0, 1]
 
 
 def with_outlines(
-    view: View, inverse: Float[np.ndarray, "f h w"], free: Bool[np.ndarray, "f h w"]
+    view: PosedFrames, inverse: Float[np.ndarray, "f h w"], free: Bool[np.ndarray, "f h w"]
 ) -> Float[np.ndarray, "f h w"]:
     """Inverse depth in 1/m of all frames, with the outlines of things where colours change.
 

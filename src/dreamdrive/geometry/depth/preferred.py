@@ -1,4 +1,4 @@
-"""Stereo in place of what was fused, where the frames clearly say so."""
+"""Choice of stereo in place of fused depth, where the frames clearly say so."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,15 +9,15 @@ from jaxtyping import Bool, Float, Integer
 
 from dreamdrive.geometry.depth.fusion import Fused
 from dreamdrive.geometry.depth.sweep import Correlation, Source, Warp, choose_sources, similarity
-from dreamdrive.geometry.depth.view import View, by_frame
-from dreamdrive.scene.windows import grown
+from dreamdrive.geometry.depth.view import PosedFrames, by_frame
+from dreamdrive.vision.windows import grown
 
 _BLUR_PX = 1.5  # of pictures that are 480 wide: what one pixel prefers is noise
 _FEW_PX = 12  # of a road user, whose stereo tells where it stands
 
 
 def preferred(
-    view: View,
+    view: PosedFrames,
     inverse: Float[np.ndarray, "f h w"],
     swept_inverse: Float[np.ndarray, "f h w"],
     confidence: Float[np.ndarray, "f h w"],
@@ -51,8 +51,8 @@ def preferred(
     return chosen
 
 
-def shifted_users(
-    view: View,
+def shifted_road_users(
+    view: PosedFrames,
     instances: Integer[np.ndarray, "f h w"],
     found: Fused,
     swept_inverse: Float[np.ndarray, "f h w"],
@@ -93,7 +93,7 @@ def shifted_users(
     return replace(found, inverse=shifted)
 
 
-def _sources(view: View, frame: int) -> Sequence[Source]:
+def _sources(view: PosedFrames, frame: int) -> Sequence[Source]:
     """The neighbours with which a frame is compared."""
     near = choose_sources(view.positions_m, view.used, frame, view.options.depth.reach_frames)
     return [(Warp(view.cameras[frame], view.cameras[i]), view.grey[i], view.usable[i]) for i in near]

@@ -1,4 +1,4 @@
-"""Which pixels show the sky."""
+"""Segmentation of the sky."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ from jaxtyping import Bool, UInt8
 
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 _GRADIENT = 6.0  # grey levels; the sky is smooth
 _BLUE_B = 124  # Lab b below this is bluish

@@ -10,7 +10,7 @@ _P2 = 0.9  # a jump, on a featureless neighbourhood
 _P2_GRADIENT = 8.0  # grey levels at which the jump costs half
 
 
-class Workspace:
+class CostBuffers:
     """Buffers for one cost volume: fresh memory of this size costs more than the arithmetic on it."""
 
     def __init__(self, height: int, labels: int, width: int) -> None:
@@ -18,7 +18,7 @@ class Workspace:
         self.total = np.zeros_like(self.cost)
 
 
-def best_label(work: Workspace, grey: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+def best_label(work: CostBuffers, grey: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
     """The label of each pixel for which paths of ``work.cost`` over four directions cost least in sum.
 
     It is refined by a parabola through its neighbours. Jumps are cheaper across the edges of the picture.

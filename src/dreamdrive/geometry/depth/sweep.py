@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from dreamdrive import _native
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 LABELS = 64
 MAX_INVERSE_DEPTH = 0.30  # 1/m; nearest plane 3.3 m

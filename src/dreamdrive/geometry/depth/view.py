@@ -1,8 +1,6 @@
 """The posed frames as the dense steps read them."""
 
-from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -10,18 +8,16 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from dreamdrive.compute.threads import parallel
 from dreamdrive.geometry.options import GeometryOptions
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Ground
 
-THREADS = 2
-
 Tell = Callable[[], None]
 """Called for each step that is done."""
 
-A = TypeVar("A")
-B = TypeVar("B")
+T = TypeVar("T")
 
 
 def unheard() -> None:
@@ -29,7 +25,7 @@ def unheard() -> None:
 
 
 @dataclass(frozen=True)
-class View:
+class PosedFrames:
     """Posed frames; a held-out frame is blank here, so that no dense step can see it."""
 
     rgb: UInt8[np.ndarray, "f h w 3"]
@@ -60,7 +56,7 @@ def make_view(
     ground: Ground | None,
     options: GeometryOptions = GeometryOptions(),
     tell: Tell = unheard,
-) -> View:
+) -> PosedFrames:
     """The clip with its poses; frames that are held out are blanked."""
     used = ~clip.held_out
     rgb = np.where(used[:, None, None, None], clip.frames, np.uint8(0))
@@ -69,30 +65,9 @@ def make_view(
     plane = np.zeros(grey.shape, np.float32)
     if ground is not None:
         plane = np.stack([1.0 / ground.depth_m(camera) for camera in cameras]).astype(np.float32)
-    return View(rgb, grey, usable, used, cameras, plane, ground, options, tell)
+    return PosedFrames(rgb, grey, usable, used, cameras, plane, ground, options, tell)
 
 
-@contextmanager
-def single_threaded_opencv() -> Generator[None]:
-    """Keep OpenCV on one thread: DIS flow depends on the number of stripes it is cut into."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)
-
-
-def parallel(function: Callable[[A], B], items: Iterable[A], tell: Tell = unheard) -> list[B]:
-    """``function`` of each item, in order, two at a time; the result does not depend on the threads."""
-    done: list[B] = []
-    with ThreadPoolExecutor(THREADS) as pool:
-        for value in pool.map(function, items):
-            done.append(value)
-            tell()
-    return done
-
-
-def by_frame(view: View, function: Callable[[int], B]) -> dict[int, B]:
+def by_frame(view: PosedFrames, function: Callable[[int], T]) -> dict[int, T]:
     """``function`` of the index of each used frame, by that index."""
     return dict(zip(view.frames, parallel(function, view.frames, view.tell), strict=True))

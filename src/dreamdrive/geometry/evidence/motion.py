@@ -1,4 +1,4 @@
-"""Whether the camera moves at all, from sparse optical flow."""
+"""Motion of the camera or its absence, from sparse optical flow."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,7 @@ FEW_TRACKS = 30
 
 
 @dataclass(frozen=True)
-class Motion:
+class PictureMotion:
     """How much the picture moves."""
 
     flow_px: Float[np.ndarray, " s"]  # 70th percentile from each frame to the next, at 320 px width
@@ -59,7 +59,7 @@ def _follow(first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[
 
 def measure(
     grey: UInt8[np.ndarray, "f h w"], usable: Bool[np.ndarray, "f h w"], times_s: Float[np.ndarray, " f"]
-) -> Motion:
+) -> PictureMotion:
     """Motion of a clip; ``grey`` is at 320 px width.
 
     A step counts as moving when in it, or over two frames and 0.2 s, the 70th percentile of the flow reaches
@@ -80,7 +80,7 @@ def measure(
     for step in range(count - 1):
         around = window_moves[max(0, step - gap + 1) : step + 1]
         moving[step] = around.any() and steps[step][0] >= 0.5 * STANDING_PX / gap * 2
-    return Motion(
+    return PictureMotion(
         flow_px=np.array([upper for upper, _, _ in steps]).reshape(-1),
         moving=moving,
         standing=bool(window_moves.sum() < min(3, max(1, len(windows))) or window_moves.mean() < 0.15),

@@ -1,4 +1,4 @@
-"""A first look at a clip: its motion, its regions fixed to the camera, its light."""
+"""First survey of a clip: its motion, its regions fixed to the camera, its light."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from jaxtyping import Bool, UInt8
 from dreamdrive.geometry.evidence import features, masks, motion
 from dreamdrive.geometry.evidence.features import Features
 from dreamdrive.geometry.evidence.masks import Fixed
-from dreamdrive.geometry.evidence.motion import Motion
+from dreamdrive.geometry.evidence.motion import PictureMotion
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 _AROUND_PX = 5  # the side of the window that outlines grow by: they are not exact
 
@@ -26,7 +26,7 @@ class Evidence:
     street: Bool[np.ndarray, "f h w"]  # pixels that belong to the street, at that size
     small: Camera  # pinhole of that size
     working: Camera  # pinhole of the size at which features are sought
-    motion: Motion
+    motion: PictureMotion
     fixed: Fixed  # to the camera, at the clip's size
     detected: tuple[str, ...]  # sentences for the report
 

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth import Correlation, View, Warp, sample, weighted_median
+from dreamdrive.geometry.depth import Correlation, PosedFrames, Warp, sample, weighted_median
 from dreamdrive.geometry.moving.flow import PairFlow
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 _PLANE_SHARE = 0.85  # static things are no farther than this share of the plane's inverse depth
 _FLOOR_SHARE = 0.8
@@ -32,7 +32,7 @@ _TEXTURE = 3.0  # grey levels, standard deviation
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ContestVerdict:
     """Outcome for one frame."""
 
     excess_px: Float[np.ndarray, "h w"]  # of the flow beyond what any static point could show, or 0
@@ -41,8 +41,12 @@ class Verdict:
 
 
 def judge(
-    view: View, frame: int, flows: Sequence[PairFlow], inverse_depth: Float[np.ndarray, "h w"], known: bool
-) -> Verdict:
+    view: PosedFrames,
+    frame: int,
+    flows: Sequence[PairFlow],
+    inverse_depth: Float[np.ndarray, "h w"],
+    known: bool,
+) -> ContestVerdict:
     """Judge one frame against its neighbours by its flows and its static depth in 1/m.
 
     Depth that is known was given, and so is exact on moving things too.
@@ -65,7 +69,7 @@ def judge(
     textured = correlation.variance > _TEXTURE**2
     off_line = textured & (wins >= min(2, len(flows))) & (wins >= 0.4 * seen) & (wins >= 1)
     excess = _excess(view.plane_inverse[frame], inverse_depth, known, wanted, weight)
-    return Verdict(excess, gain / np.maximum(seen, 1), off_line)
+    return ContestVerdict(excess, gain / np.maximum(seen, 1), off_line)
 
 
 def _excess(
@@ -90,7 +94,12 @@ class _Pair:
     """One frame and one neighbour: where static points may land, and how each explanation matches."""
 
     def __init__(
-        self, view: View, frame: int, flow: PairFlow, inverse_depth: Float[np.ndarray, "h w"], known: bool
+        self,
+        view: PosedFrames,
+        frame: int,
+        flow: PairFlow,
+        inverse_depth: Float[np.ndarray, "h w"],
+        known: bool,
     ) -> None:
         self.flow = flow
         self.grey = view.grey[flow.source]

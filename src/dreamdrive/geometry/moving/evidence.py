@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth import View, by_frame, sample
+from dreamdrive.geometry.depth import PosedFrames, by_frame, sample
 from dreamdrive.geometry.moving import contest
 from dreamdrive.geometry.moving.flow import PairFlow
 from dreamdrive.geometry.moving.oncoming import oncoming
 from dreamdrive.geometry.moving.outline import outline
 from dreamdrive.geometry.options import MovingOptions
-from dreamdrive.scene.windows import grown, window_px
+from dreamdrive.vision.windows import grown, window_px
 
 FLAGGED = 0.5  # evidence from which a pixel counts as moving
 _VOTING_REACH = 2
@@ -24,7 +24,7 @@ _STANDING_LEVELS = 10.0  # grey levels from the temporal median
 
 
 def moving_evidence(
-    view: View,
+    view: PosedFrames,
     flows: Mapping[int, list[PairFlow]],
     inverse_depth: Float[np.ndarray, "f h w"],
     sky: Bool[np.ndarray, "f h w"],
@@ -39,7 +39,7 @@ def moving_evidence(
     """
     options = view.options.moving
 
-    def judged(frame: int) -> contest.Verdict:
+    def judged(frame: int) -> contest.ContestVerdict:
         return contest.judge(view, frame, flows[frame], inverse_depth[frame], known_depth)
 
     verdicts = by_frame(view, judged)
@@ -77,7 +77,7 @@ def moving_evidence(
     return evidence
 
 
-def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
+def standing_evidence(view: PosedFrames) -> Float[np.ndarray, "f h w"]:
     """Evidence (F, H, W) in [0, 1] for a standing camera: pixels that differ from their temporal median."""
     evidence = np.zeros(view.grey.shape, np.float32)
     rgb = view.rgb[view.used].astype(np.float32)
@@ -97,7 +97,7 @@ def standing_evidence(view: View) -> Float[np.ndarray, "f h w"]:
 
 
 def _beyond(
-    verdict: contest.Verdict, excess_px: float, gain: float, options: MovingOptions
+    verdict: contest.ContestVerdict, excess_px: float, gain: float, options: MovingOptions
 ) -> Bool[np.ndarray, "h w"]:
     beyond = (verdict.excess_px > excess_px) & (verdict.gain > gain)
     return beyond | verdict.off_line if options.off_line else beyond

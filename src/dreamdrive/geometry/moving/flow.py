@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.geometry.depth import Correlation, View, Warp, inside, parallel, sample
+from dreamdrive.compute.threads import parallel
+from dreamdrive.geometry.depth import Correlation, PosedFrames, Warp, inside, sample
 
 OFFSETS = (-4, -2, -1, 1, 2, 4)  # neighbours in the order of the used frames
 _WINDOW_PX = 9
@@ -37,7 +38,7 @@ def pixel_grid(height: int, width: int) -> tuple[Float[np.ndarray, "h w"], Float
     return x, y
 
 
-def neighbour_flows(view: View) -> dict[int, list[PairFlow]]:
+def neighbour_flows(view: PosedFrames) -> dict[int, list[PairFlow]]:
     """Flow from every used frame to its neighbours at ``OFFSETS``."""
     frames = view.frames
     pairs = [
@@ -55,7 +56,7 @@ def neighbour_flows(view: View) -> dict[int, list[PairFlow]]:
     return result
 
 
-def _flow(view: View, frame: int, other: int, offset: int) -> tuple[np.ndarray, np.ndarray]:
+def _flow(view: PosedFrames, frame: int, other: int, offset: int) -> tuple[np.ndarray, np.ndarray]:
     """DIS flow after warping ``other`` by the road plane, and where that matches clearly better, by infinity.
 
     Bare asphalt then defaults to lying still on the plane, and the large flow of the near road need not be
@@ -72,7 +73,7 @@ def _flow(view: View, frame: int, other: int, offset: int) -> tuple[np.ndarray, 
 
 
 def _flow_from(
-    view: View, frame: int, other: int, inverse_depth: Float[np.ndarray, "h w"]
+    view: PosedFrames, frame: int, other: int, inverse_depth: Float[np.ndarray, "h w"]
 ) -> tuple[np.ndarray, np.ndarray]:
     map_x, map_y = Warp(view.cameras[frame], view.cameras[other])(inverse_depth)
     warped = sample(view.grey[other], map_x, map_y)
@@ -85,7 +86,7 @@ def _flow_from(
 
 
 def _checked(
-    view: View,
+    view: PosedFrames,
     pair: tuple[int, int, int],
     by_pair: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]],
 ) -> PairFlow:

@@ -1,4 +1,4 @@
-"""Road users from frame to frame."""
+"""Tracking of road users from frame to frame."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt8
 from scipy.ndimage import gaussian_filter
 
-from dreamdrive.geometry.depth import View
+from dreamdrive.geometry.depth import PosedFrames
 from dreamdrive.geometry.moving.flow import PairFlow
-from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import Look
+from dreamdrive.scene.street.street_class import StreetClass
 
 _LEAST_PX = 12  # of a road user that is followed
 _TONES = 16  # of each channel that are told apart ...
@@ -28,7 +28,7 @@ class Sighting:
 
 
 def follow(
-    view: View,
+    view: PosedFrames,
     look: Look,
     flows: Mapping[int, Sequence[PairFlow]],
     telling: Bool[np.ndarray, "f h w"],
@@ -101,7 +101,7 @@ def _counts(
     return np.bincount(both.ravel(), minlength=shape[0] * shape[1]).reshape(shape)
 
 
-def _alike(view: View, look: Look, one: tuple[int, int], other: tuple[int, int]) -> float:
+def _alike(view: PosedFrames, look: Look, one: tuple[int, int], other: tuple[int, int]) -> float:
     """Share of the colours of two road users, each a frame and a label, that both have, in [0, 1]."""
     colours = [_colours(view.rgb[frame][look.instances[frame] == label]) for frame, label in (one, other)]
     return float(np.minimum(*colours).sum())

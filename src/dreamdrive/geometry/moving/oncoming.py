@@ -1,4 +1,4 @@
-"""Oncoming traffic, which every pair of frames takes for standing and only the road contradicts.
+"""Detection of oncoming traffic, which pairs of frames take for standing and only the road contradicts.
 
 What drives straight towards a camera that drives straight moves in the pictures like a standing thing at
 another distance: with equal speeds at half of it. A standing thing meets the road at its own distance, an
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.geometry.depth import View, Warp, by_frame, inside, misfits, sample
+from dreamdrive.geometry.depth import PosedFrames, Warp, by_frame, inside, misfits, sample
 from dreamdrive.geometry.moving.outline import TALLEST_M
 
 _INVERSE = np.geomspace(1 / 27, 0.45, 31)  # 1/m; at which a thing may seem to be
@@ -70,7 +70,7 @@ class _Columns:
     row: Int[np.ndarray, " w"]
 
 
-def oncoming(view: View) -> dict[int, Bool[np.ndarray, "h w"]]:
+def oncoming(view: PosedFrames) -> dict[int, Bool[np.ndarray, "h w"]]:
     """Pixels of each used frame that show what comes towards the camera; none without a road plane.
 
     These are things that seem to be nearer than where they meet the road, 1.4 to 2.75 times, in two frames or
@@ -90,7 +90,7 @@ def oncoming(view: View) -> dict[int, Bool[np.ndarray, "h w"]]:
     return by_frame(view, agreed)
 
 
-def _carried(view: View, thing: _Thing, frame: int, to: int) -> Bool[np.ndarray, "h w"]:
+def _carried(view: PosedFrames, thing: _Thing, frame: int, to: int) -> Bool[np.ndarray, "h w"]:
     """Where a thing of one frame is in another, as if it stood where it seems to be."""
     ahead_m = float(
         (view.positions_m[to] - view.positions_m[frame]) @ view.cameras[frame].world_from_camera[:3, 2]
@@ -102,7 +102,7 @@ def _carried(view: View, thing: _Thing, frame: int, to: int) -> Bool[np.ndarray,
     return sample(thing.pixels.astype(np.float32), x, y) > 0.5
 
 
-def _things(view: View, frame: int) -> list[_Thing]:
+def _things(view: PosedFrames, frame: int) -> list[_Thing]:
     plane = view.plane_inverse[frame]
     things: list[_Thing] = []
     if not plane.any():
@@ -123,7 +123,7 @@ def _things(view: View, frame: int) -> list[_Thing]:
     return things
 
 
-def _misfits(view: View, frame: int) -> _Misfits:
+def _misfits(view: PosedFrames, frame: int) -> _Misfits:
     frames = view.frames
     at = frames.index(frame)
     near = [frames[k] for k in range(max(0, at - _REACH), min(len(frames), at + _REACH + 1)) if k != at]

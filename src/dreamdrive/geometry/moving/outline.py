@@ -1,4 +1,4 @@
-"""Whole moving things around what is known to move.
+"""Completion of what is known to move to whole outlines.
 
 Parallax shows movement only where there is texture, and above the horizon not at all. What stands in between
 (dark windows, plain doors, roofs) moves as its surroundings do: from the part that is known the motion of the
@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive import _native
-from dreamdrive.geometry.depth import View, Warp, inside, sample
+from dreamdrive.geometry.depth import PosedFrames, Warp, inside, sample
 from dreamdrive.geometry.moving.flow import PairFlow, pixel_grid
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 _REACH = 2  # offsets beyond this are not asked
 _SAME_PX = 2.0  # explanations that land this near are one
@@ -46,7 +46,7 @@ Window = tuple[slice, slice]
 
 
 def outline(
-    view: View,
+    view: PosedFrames,
     frame: int,
     flows: Sequence[PairFlow],
     inverse_depth: Float[np.ndarray, "h w"],
@@ -79,7 +79,7 @@ def outline(
     return whole
 
 
-def _window(view: View, frame: int, box: np.ndarray) -> Window:
+def _window(view: PosedFrames, frame: int, box: np.ndarray) -> Window:
     """Rows and columns that a thing may fill whose part has this bounding box (left, top, width, height)."""
     left, top, width, height = (int(value) for value in box[:4])
     bottom, middle = top + height - 1, left + width // 2
@@ -100,7 +100,7 @@ def _with_rim(window: Window, rim_px: int) -> tuple[Window, Window]:
 
 
 def _gain(
-    view: View,
+    view: PosedFrames,
     frame: int,
     near: Sequence[PairFlow],
     inverse_depth: Float[np.ndarray, "h w"],
@@ -179,7 +179,7 @@ def _hanging_together(cut: Bool[np.ndarray, "u v"], part: Bool[np.ndarray, "u v"
 
 
 def _misfit(
-    view: View,
+    view: PosedFrames,
     frame: int,
     other: int,
     window: Window,

@@ -1,4 +1,4 @@
-"""Who rides a two-wheeler, and the two-wheeler, made one road user."""
+"""Riders and their two-wheelers, joined to one road user."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt16
 
-from dreamdrive.scene.look import Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
 
 _BORDER_PX = 3  # least border that a rider shares with what is ridden
 _ABOVE = 0.5  # of the narrower one's width lies over the other
@@ -23,8 +23,8 @@ def with_riders(look: Look, frames: Sequence[int]) -> tuple[Look, Bool[np.ndarra
     instances = look.instances.copy()
     ridden = np.zeros(instances.shape, bool)
     for frame in frames:
-        seen, users = look.instances[frame], look.road_users[frame]
-        kinds = {number: user for number, user in enumerate(users, start=1)}
+        seen, road_users = look.instances[frame], look.road_users[frame]
+        kinds = {number: user for number, user in enumerate(road_users, start=1)}
         wheels = {n: user for n, user in kinds.items() if user.kind == StreetClass.TWO_WHEELER}
         for number, user in kinds.items():
             if user.kind != StreetClass.PERSON:

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from dreamdrive.geometry.road.ground_points import Plane, up_direction
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.windows import window_px
+from dreamdrive.vision.windows import window_px
 
 ROWS, COLUMNS = (0.62, 0.97), (0.25, 0.75)
 HEIGHTS = 56
@@ -34,7 +34,7 @@ class Pair:
     source: int
 
 
-class Road:
+class RoadSweep:
     """The road trapezoid of a clip at 320 px and how well a plane explains it."""
 
     def __init__(
@@ -116,7 +116,7 @@ class Road:
         return covariance / np.sqrt((self.variance[pair.reference] + NOISE) * variance), inside
 
 
-def sweep(road: Road, heights: tuple[float, float] | None = None) -> Plane | None:
+def sweep(road: RoadSweep, heights: tuple[float, float] | None = None) -> Plane | None:
     """Best plane over height, pitch and roll, or None when the profile has no clear peak.
 
     Without a range of camera heights, in the units of the poses, 0.08 to 12 steps are tried. A peak at either
@@ -174,7 +174,7 @@ def _tilted(poses: np.ndarray, pitch_deg: float, roll_deg: float) -> np.ndarray:
     return normal / np.linalg.norm(normal)
 
 
-def _scorer(road: Road, pairs: Sequence[Pair]) -> Callable[[float, float, float], float]:
+def _scorer(road: RoadSweep, pairs: Sequence[Pair]) -> Callable[[float, float, float], float]:
     centre = road.poses[:, :3, 3].mean(axis=0)
 
     def score(height: float, pitch_deg: float, roll_deg: float) -> float:

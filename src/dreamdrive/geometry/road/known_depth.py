@@ -1,4 +1,4 @@
-"""What known depth says about scale and road."""
+"""Scale and road plane from known depth."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ POINTS_A_FRAME = 400
 def depth_points(clip: Clip) -> Float[np.ndarray, "p 3"]:
     """Known depth as points (P, 3) in the frame of the known poses, or of the one pose of a standing clip.
 
-    A regular grid of pixels of up to eight frames, nearer than 40 m; empty without known depth.
+    Of up to eight frames, each n-th pixel that is known and nearer than 40 m; empty without known depth.
     """
     if clip.known.depth_m is None:
         return np.zeros((0, 3))
@@ -24,11 +24,11 @@ def depth_points(clip: Clip) -> Float[np.ndarray, "p 3"]:
     for frame in np.unique(np.linspace(0, len(clip) - 1, min(8, len(clip))).round().astype(int)):
         camera = clip.rig[0]
         pose = np.eye(4) if clip.known.world_from_camera is None else clip.known.world_from_camera[frame]
-        stride = max(1, round(np.sqrt(camera.width_px * camera.height_px / POINTS_A_FRAME)))
-        depth = clip.known.depth_m[frame, ::stride, ::stride]
-        local = camera.rays()[::stride, ::stride] * depth[..., None]
-        good = (depth > 0) & (depth < MAX_DEPTH_M)
-        clouds.append(local[good] @ pose[:3, :3].T + pose[:3, 3])
+        depth = clip.known.depth_m[frame]
+        there = np.argwhere((depth > 0) & (depth < MAX_DEPTH_M))
+        rows, columns = there[:: max(1, len(there) // POINTS_A_FRAME)].T
+        local = camera.rays()[rows, columns] * depth[rows, columns, None]
+        clouds.append(local @ pose[:3, :3].T + pose[:3, 3])
     return np.concatenate(clouds).astype(np.float64)
 
 

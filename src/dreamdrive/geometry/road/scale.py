@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from dreamdrive.geometry.evidence import Evidence
 from dreamdrive.geometry.road.ground_points import Plane, fit_points
-from dreamdrive.geometry.road.ground_sweep import Road, sweep
+from dreamdrive.geometry.road.ground_sweep import RoadSweep, sweep
 from dreamdrive.geometry.road.known_depth import factor_of
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -25,7 +25,7 @@ GIVEN_SPREAD, USUAL_SPREAD, FOCAL_SPREAD, SPEED_SPREAD = 0.03, 0.15, 0.35, 0.6
 
 
 @dataclass(frozen=True)
-class Street:
+class PosedClip:
     """A clip with poses, in which the road is looked for."""
 
     grey: UInt8[np.ndarray, "f h w"]  # at 320 px width
@@ -43,11 +43,11 @@ class Street:
         camera: Camera,
         world_from_camera: Float[np.ndarray, "f 4 4"],
         points: Float[np.ndarray, "p 3"],
-    ) -> "Street":
+    ) -> "PosedClip":
         """A clip with the pinhole of its frames, poses and points."""
         small = camera.resized(evidence.small.width_px, evidence.small.height_px)
         frames = evidence.grey, evidence.street, small
-        return Street(*frames, world_from_camera, points, clip.times_s, asked_m_s(clip))
+        return PosedClip(*frames, world_from_camera, points, clip.times_s, asked_m_s(clip))
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Metric:
 
 
 def find_ground(
-    street: Street, seed: int, heights: tuple[float, float] | None = None
+    street: PosedClip, seed: int, heights: tuple[float, float] | None = None
 ) -> tuple[Plane | None, str]:
     """The road plane and the name of the estimator that gave it.
 
@@ -71,7 +71,7 @@ def find_ground(
     plane = fit_points(street.points, street.world_from_camera, seed)
     if plane is not None and plane.support >= MIN_INLIERS and plane.share >= MIN_SHARE:
         return plane, "points"
-    road = Road(street.grey, street.usable, street.camera, street.world_from_camera)
+    road = RoadSweep(street.grey, street.usable, street.camera, street.world_from_camera)
     return sweep(road, heights), "road texture"
 
 
@@ -80,7 +80,7 @@ def focal_spread_of(observed: bool) -> float:
     return 0.0 if observed else FOCAL_SPREAD
 
 
-def from_ground(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric:
+def from_ground(street: PosedClip, height_m: float | None, focal_spread: float, seed: int) -> Metric:
     """Scale from the height of the camera above the road; from a speed, asked for or assumed, without a road.
 
     Without a height 1.5 m, a car's, is assumed. The scale is as uncertain as the focal length, which may be
@@ -105,7 +105,9 @@ def _by_plane(plane: Plane, how: str, height_m: float | None, focal_spread: floa
     return Metric(factor, Ground(plane.normal, plane.offset * factor), found, ())
 
 
-def from_road_points(street: Street, height_m: float | None, focal_spread: float, seed: int) -> Metric | None:
+def from_road_points(
+    street: PosedClip, height_m: float | None, focal_spread: float, seed: int
+) -> Metric | None:
     """Scale from the height of the camera above the road that measured depth shows, however slow the path.
 
     Unlike a plane that is found by warping, it does not rest on the motion of the camera: the points of the
@@ -119,7 +121,9 @@ def from_road_points(street: Street, height_m: float | None, focal_spread: float
     return None if median_speed(street) * found.factor > SPEEDS_M_S[1] else found
 
 
-def from_depth(ratios: Float[np.ndarray, " n"], street: Street, height_m: float | None, seed: int) -> Metric:
+def from_depth(
+    ratios: Float[np.ndarray, " n"], street: PosedClip, height_m: float | None, seed: int
+) -> Metric:
     """Scale from known depth over the depth of sparse points, ``ratios`` (N,)."""
     factor, spread = factor_of(ratios)
     plane, _ = find_ground(street, seed)
@@ -150,15 +154,21 @@ def height_basis(height_m: float | None) -> Basis:
 
 
 def as_given(
-    street: Street, source: str, spread: float, words: str, height_m: float | None, seed: int
+    street: PosedClip,
+    source: str,
+    spread: float,
+    words: str,
+    height_m: float | None,
+    seed: int,
+    still: bool = False,
 ) -> Metric:
     """The unit of the poses is the metre already, says ``source``; the road is only looked for.
 
     The metre may be off by the fraction ``spread``. ``words`` name the source in a note, where the road
-    disagrees.
+    disagrees. On a path of a camera that stands ``still`` no road shows another unit.
     """
     plane, _ = find_ground(street, seed, KNOWN_HEIGHTS_M)
-    if plane is None:
+    if plane is None and not still:
         plane, _ = find_ground(street, seed)  # in whatever unit, to say that it is no metre
     ground = None if plane is None else Ground(plane.normal, plane.offset)
     found_m = None if plane is None else plane.height
@@ -183,7 +193,7 @@ def contradicted(found_m: float | None, height_m: float | None, speed_m_s: float
     return f"the car drives {speed_m_s:.0f} m/s" if speed_m_s > SPEEDS_M_S[1] else ""
 
 
-def _from_speed(street: Street, problem: str) -> Metric:
+def _from_speed(street: PosedClip, problem: str) -> Metric:
     speed, word, rest = street.asked_m_s, "taken as asked for", "the speed that was asked for"
     basis: Basis = "asked speed"
     if speed is None:
@@ -201,7 +211,7 @@ def asked_m_s(clip: Clip) -> float | None:
     return speed if speed >= SPEEDS_M_S[0] else None
 
 
-def median_speed(street: Street) -> float:
+def median_speed(street: PosedClip) -> float:
     """Median speed of the steps that move, in units of the poses a second."""
     return _median_speed(street.world_from_camera, street.times_s)
 

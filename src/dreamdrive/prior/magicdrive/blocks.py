@@ -1,4 +1,4 @@
-"""Transformer blocks that look at the neighbouring cameras, and at other times."""
+"""Transformer blocks that attend to the neighbouring cameras, and to other times."""
 
 from typing import Any
 
@@ -12,9 +12,9 @@ from dreamdrive.prior.magicdrive.config import KEY_FRAMES, Temporal
 
 
 def sparse_causal(frames: int) -> list[list[int]]:
-    """For each frame those that the sparse causal attention looks at, as the 16- and the 61-frame models do.
+    """For each frame those that the sparse causal attention covers, as the 16- and the 61-frame models do.
 
-    The key frames before and after, the frame before, and the frame itself. A key frame looks at its
+    The key frames before and after, the frame before, and the frame itself. A key frame attends to its
     neighbours among the key frames; at the ends, at the two next ones (16 frames) or at itself (the last of
     61). Some are listed twice, which weighs them twice.
     """
@@ -57,16 +57,16 @@ class CrossViewBlock(nn.Module):
     ) -> Float[Tensor, "b d c"]:
         """Self-attention, tokens (b, l, e), neighbours, feed-forward, each with a residual."""
         x = hidden_states
-        x = x + self.look_within(self.norm1(x))
+        x = x + self.attend_within(self.norm1(x))
         x = x + self.attn2(self.norm2(x), encoder_hidden_states=encoder_hidden_states)
-        x = x + self.connector(self.look_beside(self.norm4(x)))
+        x = x + self.connector(self.attend_beside(self.norm4(x)))
         return x + self.ff(self.norm3(x))
 
-    def look_within(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
+    def attend_within(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
         """The first attention."""
         return self.attn1(x)
 
-    def look_beside(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
+    def attend_beside(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
         """Attention to the camera on the left plus attention to that on the right."""
         ring = x.unflatten(0, (-1, self.views))
         sides = [ring.roll(shift, dims=1).flatten(0, 1) for shift in (1, -1)]
@@ -75,7 +75,7 @@ class CrossViewBlock(nn.Module):
 
 
 class TemporalBlock(CrossViewBlock):
-    """A cross-view block that also looks along time, as MagicDrive-t does."""
+    """A cross-view block that also attends over time, as MagicDrive-t does."""
 
     def __init__(self, block: BasicTransformerBlock, views: int, temporal: Temporal) -> None:
         super().__init__(block, views)
@@ -90,12 +90,12 @@ class TemporalBlock(CrossViewBlock):
     ) -> Float[Tensor, "b d c"]:
         """The cross-view block, then attention of each pixel along time."""
         x = super().forward(hidden_states, encoder_hidden_states)
-        return x + self.temp_connector(self.look_along(x))
+        return x + self.temp_connector(self.attend_along(x))
 
-    def look_within(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
+    def attend_within(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
         """Attention of each frame to the pixels of its sources."""
         if self.sources is None:
-            return super().look_within(x)
+            return super().attend_within(x)
         clips = x.unflatten(0, (-1, self.frames, self.views))
         out = torch.empty_like(clips)
         for frame, sources in enumerate(self.sources):
@@ -105,7 +105,7 @@ class TemporalBlock(CrossViewBlock):
             out[:, frame] = looked.unflatten(0, (-1, self.views))
         return out.flatten(0, 2)
 
-    def look_along(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
+    def attend_along(self, x: Float[Tensor, "b d c"]) -> Float[Tensor, "b d c"]:
         """Attention of each pixel to itself at all times."""
         clips = x.unflatten(0, (-1, self.frames, self.views))
         lines = clips.permute(0, 2, 3, 1, 4)  # clip, camera, pixel, frame

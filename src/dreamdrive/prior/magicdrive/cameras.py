@@ -12,15 +12,15 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.layout import Ego, track_function
-from dreamdrive.world import upright
+from dreamdrive.scene.level import upright
+from dreamdrive.scene.street.layout import Ego, track_function
 
 FULL_SIZE = (1600, 900)
 """Width and height of the pictures that the intrinsics belong to."""
 
 
 @dataclass(frozen=True)
-class Mounted:
+class _Mounted:
     """A camera of the car, its intrinsics those of the full picture, its yaw from ahead to the left.
 
     The car's frame is x ahead, y left, z up, on the road below the rear axle.
@@ -34,12 +34,12 @@ class Mounted:
 
 
 NUSCENES = (
-    Mounted("CAM_FRONT", 1266.0, (816.0, 491.0), (1.70, 0.0, 1.51), 0.0),
-    Mounted("CAM_FRONT_RIGHT", 1261.0, (808.0, 495.0), (1.55, -0.49, 1.50), -56.0),
-    Mounted("CAM_BACK_RIGHT", 1260.0, (807.0, 501.0), (1.01, -0.48, 1.56), -110.0),
-    Mounted("CAM_BACK", 809.0, (829.0, 482.0), (0.03, 0.0, 1.58), 180.0),
-    Mounted("CAM_BACK_LEFT", 1257.0, (792.0, 493.0), (1.04, 0.48, 1.59), 108.0),
-    Mounted("CAM_FRONT_LEFT", 1273.0, (827.0, 480.0), (1.52, 0.49, 1.51), 55.0),
+    _Mounted("CAM_FRONT", 1266.0, (816.0, 491.0), (1.70, 0.0, 1.51), 0.0),
+    _Mounted("CAM_FRONT_RIGHT", 1261.0, (808.0, 495.0), (1.55, -0.49, 1.50), -56.0),
+    _Mounted("CAM_BACK_RIGHT", 1260.0, (807.0, 501.0), (1.01, -0.48, 1.56), -110.0),
+    _Mounted("CAM_BACK", 809.0, (829.0, 482.0), (0.03, 0.0, 1.58), 180.0),
+    _Mounted("CAM_BACK_LEFT", 1257.0, (792.0, 493.0), (1.04, 0.48, 1.59), 108.0),
+    _Mounted("CAM_FRONT_LEFT", 1273.0, (827.0, 480.0), (1.52, 0.49, 1.51), 55.0),
 )
 """Clockwise from the front camera. MagicDrive's own list starts one place earlier, at CAM_FRONT_LEFT; it is
 the same ring, and the network knows cameras only by their neighbours and their matrices."""
@@ -49,7 +49,7 @@ _LEVEL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 """Axes of a camera that looks ahead (x right, y down, z ahead) in the car's frame."""
 
 
-def car_from_camera(camera: Mounted) -> Float[np.ndarray, "4 4"]:
+def car_from_camera(camera: _Mounted) -> Float[np.ndarray, "4 4"]:
     """Pose of a camera in the car's frame."""
     pose = upright(np.array([*camera.place_m[:2], np.deg2rad(camera.yaw_deg)]))
     pose[:3, :3] = pose[:3, :3] @ _LEVEL

@@ -1,4 +1,4 @@
-"""From a street to what MagicDrive's networks read: its map as a raster, its road users as corners, words."""
+"""Conditions of MagicDrive from a street: its map as a raster, its road users as corners, words."""
 
 from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
@@ -11,8 +11,8 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.magicdrive.cameras import Ring, map_from_car, typical_ring
-from dreamdrive.scene.layout import AreaKind, BoxKind, Layout, LineKind, track_function
-from dreamdrive.world import upright
+from dreamdrive.scene.level import upright
+from dreamdrive.scene.street.layout import AreaKind, BoxKind, Layout, LineKind, track_function
 
 LOCATION = "boston-seaport"
 """Where nuScenes was recorded that drives on the right, as drawn streets do."""
@@ -77,7 +77,7 @@ LINE_CELLS = 2
 
 
 @runtime_checkable
-class Surroundings(Protocol):
+class StreetCondition(Protocol):
     """A street and the car in it, as the networks are told of them."""
 
     @property
@@ -154,7 +154,7 @@ class Conditions:
 
 
 def see(
-    street: Surroundings, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
+    street: StreetCondition, times_s: Float[np.ndarray, " t"], cells: int, words: Float[Tensor, "1 l e"]
 ) -> Conditions:
     """What the cameras are told at given times of the street, on the device of the words' tokens.
 

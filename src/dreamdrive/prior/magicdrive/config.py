@@ -31,7 +31,7 @@ _CAMERA = {"input_dims": (3,), "num_freqs": (4,), "include_input": (True,), "log
 
 @dataclass(frozen=True)
 class Temporal:
-    """How the blocks of the temporal variant look at the other frames of a clip.
+    """How the blocks of the temporal variant attend to the other frames of a clip.
 
     The first attention is ``sparse`` causal (``_s_ff_t_last``), or each frame sees itself (``t_last``). That
     along time has learned positions or none, and a linear layer, the connector, behind it or none.

@@ -1,4 +1,4 @@
-"""What MagicDrive's UNet sees in its own finished pictures: the activations of an early block, as Z_ref.
+"""Features Z_ref of MagicDrive: activations of an early block of its UNet on its own finished pictures.
 
 As Vista's are (``prior.vista.features``): the finished latents get a little noise and go through the UNet
 once, told of cameras, boxes and words. The map takes no part: the ControlNet adds it to what leaves the
@@ -12,14 +12,14 @@ from torch import Tensor
 
 from dreamdrive.prior.early_features import BLOCK, SIGMA, watch
 from dreamdrive.prior.magicdrive.condition import Conditions
-from dreamdrive.prior.magicdrive.folder import Parts
+from dreamdrive.prior.magicdrive.folder import MagicDriveNetworks
 from dreamdrive.prior.magicdrive.networks import denoised
 from dreamdrive.prior.running import check_finite
 
 
 @torch.inference_mode()
 def activations(
-    parts: Parts,
+    parts: MagicDriveNetworks,
     conditions: Conditions,
     latents: Float[Tensor, "bn c h w"],
     kept: Float[Tensor, " t"],

@@ -13,10 +13,10 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.compute.machine import free_bytes
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
-from dreamdrive.machine import free_bytes
 from dreamdrive.models import check_sizes, fill, read_state, sha256
 from dreamdrive.prior.early_features import BLOCK
 from dreamdrive.prior.magicdrive.config import EXPECTED, Settings, read_settings
@@ -47,7 +47,7 @@ DECODE_PICTURES = 2
 
 
 @dataclass(frozen=True)
-class Parts:
+class MagicDriveNetworks:
     """All networks of a folder, ready to run.
 
     ``scheduler`` is the table of ``scheduler_config.json``, ``digests`` are of the files that are
@@ -93,7 +93,7 @@ def vae_stride(vae: AutoencoderKL) -> int:
     return 2 ** (len(vae.config["block_out_channels"]) - 1)
 
 
-def read_parts(folder: Path, *, temporal: bool) -> Parts:
+def read_parts(folder: Path, *, temporal: bool) -> MagicDriveNetworks:
     """Load a folder (see ``EXPECTED``); nothing in it is executed, nothing is fetched.
 
     On a GPU the networks run in half precision, elsewhere in float32.
@@ -126,7 +126,7 @@ def read_parts(folder: Path, *, temporal: bool) -> Parts:
         network.eval().requires_grad_(False)
         return nn.Module.to(network, device, dtype)  # diffusers' own prints a warning about nothing
 
-    return Parts(
+    return MagicDriveNetworks(
         settings=settings,
         unet=filled(unet, "unet"),
         controlnet=filled(controlnet, "controlnet"),

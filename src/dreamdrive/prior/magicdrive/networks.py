@@ -163,18 +163,18 @@ class BevControlNet(ControlNetModel):
 
 
 def multiview_unet(config: dict[str, Any], settings: Settings) -> UNet2DConditionModel:
-    """The UNet of Stable Diffusion whose transformer blocks look at neighbouring cameras."""
+    """The UNet of Stable Diffusion whose transformer blocks attend to neighbouring cameras."""
     unet = UNet2DConditionModel(**plain_settings(UNet2DConditionModel, config))
     for layer in unet.modules():
         if isinstance(layer, Transformer2DModel):
             layer.transformer_blocks = nn.ModuleList(
-                _looking_beside(cast(BasicTransformerBlock, block), settings)
+                _with_attention_beside(cast(BasicTransformerBlock, block), settings)
                 for block in layer.transformer_blocks
             )
     return unet
 
 
-def _looking_beside(block: BasicTransformerBlock, settings: Settings) -> CrossViewBlock:
+def _with_attention_beside(block: BasicTransformerBlock, settings: Settings) -> CrossViewBlock:
     if settings.temporal is None:
         return CrossViewBlock(block, settings.views)
     return TemporalBlock(block, settings.views, settings.temporal)

@@ -1,4 +1,4 @@
-"""From a scene of a data set to what MagicDrive's networks read: its cameras, boxes, map layers and words."""
+"""Conditions of MagicDrive from a scene of a data set: its cameras, boxes, map layers and words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ from dreamdrive.prior.magicdrive.condition import (
     box_corners,
     prompt_of,
 )
-from dreamdrive.prior.street import Street
+from dreamdrive.prior.street import StreetSource
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.log import BoxTrack, Log, LogCamera, OfLog, word_of
+from dreamdrive.scene.level import upright
+from dreamdrive.scene.street.log import BoxTrack, Log, LogCamera, OfLog, word_of
 from dreamdrive.scene.trajectory import Trajectory
-from dreamdrive.world import upright
 
 CATEGORIES = {
     "vehicle.car": "car",
@@ -137,7 +137,7 @@ class OfScene:
         return prompt_of(words, self.log.location if self.log.location in LOCATIONS else LOCATION)
 
 
-def of_street(street: Street) -> OfScene:
+def of_street(street: StreetSource) -> OfScene:
     """A scene with the six cameras that are asked for, in their ring.
 
     Raises:

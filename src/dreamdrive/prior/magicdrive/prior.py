@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.logs import ALL
-from dreamdrive.data.select import Selection, held_out_mask
+from dreamdrive.data.frames.select import Selection, held_out_mask
+from dreamdrive.datasets.logs import ALL
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.early_features import BLOCK
 from dreamdrive.prior.magicdrive.cameras import NUSCENES
-from dreamdrive.prior.magicdrive.condition import OfLayout, Surroundings, check_map, prompt_of
+from dreamdrive.prior.magicdrive.condition import OfLayout, StreetCondition, check_map, prompt_of
 from dreamdrive.prior.magicdrive.config import EXPECTED
 from dreamdrive.prior.magicdrive.of_scene import OfScene, of_street
-from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.protocol import Input, Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE, enough_memory
-from dreamdrive.prior.street import TAKES, Street, read_street, wanted_frames
+from dreamdrive.prior.street import StreetSource, read_street, wanted_frames
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Control, StreetInput, fields_of
+from dreamdrive.scene.geometry import Scale
 from dreamdrive.scene.trajectory import Trajectory
 
 RATE_HZ = 12.0
@@ -36,19 +37,20 @@ MOST_STEPS = 1000
 CAMERAS = len(NUSCENES)
 
 
-def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool = False) -> Clip:
+def magicdrive(opened: Input, progress: Progress = silent, *, temporal: bool = False) -> Clip:
     """Six pictures of every time step, each of them sampled by itself, or all together.
 
     Always sampled together is the whole length of the weights, at 12 Hz from time 0 of the street. Z_ref is
     ``features["appearance"]`` and what the UNet sees in the pictures.
     """
-    street, weights = _inputs(control)
+    control = opened.control
+    street, weights = _inputs(opened)
     seen = OfLayout(street.layout) if street.log is None else of_street(street)
     rate_hz = RATE_HZ if control.fps is None else control.fps
     wanted = None if temporal else _time_steps(control, street, rate_hz, None)
     try:
         from dreamdrive.prior.magicdrive.folder import read_parts
-        from dreamdrive.prior.magicdrive.sample import Run, generate
+        from dreamdrive.prior.magicdrive.sample import SampleRun, generate
     except ImportError as error:
         raise InputError(f"the prior magicdrive cannot start ({error}): {INSTALL}") from None
     with enough_memory("take the weights for 400x224, which need least, or a GPU with more memory"):
@@ -57,7 +59,7 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
             wanted = _time_steps(control, street, rate_hz, parts.settings.frames)
         steps = STEPS if control.steps is None else control.steps
         prompt = seen.prompt(control.prompt) if isinstance(seen, OfScene) else prompt_of(control.prompt)
-        run = Run(seen, parts, prompt, steps, control.seed, rate_hz)
+        run = SampleRun(seen, parts, prompt, steps, control.seed, rate_hz)
         made = generate(run, wanted, progress)
     name = MAGICDRIVE_T.name if temporal else MAGICDRIVE.name
     valid = np.ones(made.frames.shape[:3], dtype=bool)
@@ -77,7 +79,9 @@ def magicdrive(control: Control, progress: Progress = silent, *, temporal: bool 
     )
 
 
-def _time_steps(control: Control, street: Street, rate_hz: float, count: int | None) -> Int[np.ndarray, " t"]:
+def _time_steps(
+    control: Control, street: StreetSource, rate_hz: float, count: int | None
+) -> Int[np.ndarray, " t"]:
     """The time steps to make, of as many as there are, if that is given by the weights."""
     if count is None:
         wanted = wanted_frames(control, TIME_STEPS, rate_hz, street)
@@ -93,8 +97,9 @@ def _time_steps(control: Control, street: Street, rate_hz: float, count: int | N
     return np.array(wanted)
 
 
-def _inputs(control: Control) -> tuple[Street, Path]:
+def _inputs(opened: Input) -> tuple[StreetSource, Path]:
     """The street and the folder of weights."""
+    control = opened.control
     if control.weights is None:
         raise InputError(f"the prior magicdrive needs --weights, {EXPECTED}")
     if control.steps is not None and control.steps > MOST_STEPS:
@@ -104,14 +109,14 @@ def _inputs(control: Control) -> tuple[Street, Path]:
             "the prior magicdrive needs a layout: a JSON, see docs/layout.md; dreamdrive world make draws "
             "one. Or a folder of a data set with six cameras and a map"
         )
-    street = read_street(control, control.path, without=ALL)
+    street = read_street(opened, control.path, without=ALL)
     if street.log is None:
         check_map(street.layout, str(control.path))
     return street, control.weights
 
 
 def _cameras(
-    seen: Surroundings, times_s: Float[np.ndarray, " t"], size: tuple[int, int], temporal: bool
+    seen: StreetCondition, times_s: Float[np.ndarray, " t"], size: tuple[int, int], temporal: bool
 ) -> dict[str, Any]:
     """Times, rig and the path by time, then camera; the world is the front camera of the first time step.
 
@@ -129,12 +134,14 @@ def _cameras(
         "times_s": np.repeat(since_s, CAMERAS),
         "camera": np.tile(np.arange(CAMERAS), len(times_s)),
         "rig": pinholes,
-        "known": Known(poses, intrinsics=True, generated=True),
+        "known": Known(
+            poses, intrinsics=True, generated=True, scale=Scale("the path asked for", 0.0, basis="asked path")
+        ),
         "requested": Trajectory(world_from_front, since_s),
     }
 
 
-def _notes(name: str, street: Street, temporal: bool) -> list[str]:
+def _notes(name: str, street: StreetSource, temporal: bool) -> list[str]:
     return [
         f"The frames are generated from {street.name} by {name}, six cameras at each time step, for "
         "intrinsics, mountings and a path that a generated picture follows only roughly.",
@@ -159,7 +166,7 @@ _ALONE = (
 MAGICDRIVE = Prior(
     name="magicdrive",
     make=magicdrive,
-    takes=TAKES | {"frames", "prompt", "steps", "hold_out", "fps"},
+    takes=fields_of(StreetInput) - {"size"} | {"prompt", "steps"},
     of_street=True,
     gives="six cameras at each time step, the intrinsics, mountings and path asked for, latents, features",
     about="six cameras from a layout or a scene of a data set by MagicDrive, each time step by itself",

@@ -1,4 +1,4 @@
-"""From a street and networks to pictures, latents and features: UniPC with guidance, then the decoder."""
+"""Sampling of MagicDrive: UniPC with guidance, then the decoder, then features."""
 
 import warnings
 from collections.abc import Callable
@@ -14,9 +14,9 @@ from jaxtyping import Float, Float16, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.prior.early_features import onto_frames
-from dreamdrive.prior.magicdrive.condition import Conditions, Surroundings, see
+from dreamdrive.prior.magicdrive.condition import Conditions, StreetCondition, see
 from dreamdrive.prior.magicdrive.features import activations
-from dreamdrive.prior.magicdrive.folder import DECODE_PICTURES, Parts
+from dreamdrive.prior.magicdrive.folder import DECODE_PICTURES, MagicDriveNetworks
 from dreamdrive.prior.magicdrive.networks import BevControlNet, denoised
 from dreamdrive.prior.pca import reduce
 from dreamdrive.prior.running import check_finite, counted
@@ -34,11 +34,11 @@ _SCHEDULE = (
 
 
 @dataclass(frozen=True)
-class Run:
+class SampleRun:
     """What one run samples: time steps at ``rate_hz``, from start noise of the seed."""
 
-    street: Surroundings
-    parts: Parts
+    street: StreetCondition
+    parts: MagicDriveNetworks
     prompt: str
     steps: int
     seed: int
@@ -69,7 +69,7 @@ class Generated:
     notes: tuple[str, ...]
 
 
-def generate(run: Run, wanted: Int[np.ndarray, " t"], progress: Progress) -> Generated:
+def generate(run: SampleRun, wanted: Int[np.ndarray, " t"], progress: Progress) -> Generated:
     """Make time steps.
 
     The temporal variant samples all time steps of its length, others each wanted one by itself.
@@ -96,7 +96,7 @@ def generate(run: Run, wanted: Int[np.ndarray, " t"], progress: Progress) -> Gen
 
 
 def _sampled(
-    run: Run, times_s: Float[np.ndarray, " t"], tell: Callable[[], None]
+    run: SampleRun, times_s: Float[np.ndarray, " t"], tell: Callable[[], None]
 ) -> tuple[Float[Tensor, "bn c h w"], Float16[np.ndarray, "bn h2 w2 d"]]:
     """Latents of time steps that are sampled together, and what the UNet sees in them."""
     parts = run.parts
@@ -112,7 +112,7 @@ def _sampled(
     return latents, values
 
 
-def start_noise(run: Run) -> Float[Tensor, "bn c h w"]:
+def start_noise(run: SampleRun) -> Float[Tensor, "bn c h w"]:
     """Noise of the pictures that are sampled together.
 
     One for all cameras, and, since it depends on the seed alone, for all time steps that are sampled by

@@ -1,4 +1,4 @@
-"""How the street goes on beyond the borders of a photo."""
+"""Outpainting: the street beyond the borders of a photo."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import numpy as np
 
 from dreamdrive.prior.photo.fill import grown, inpainted
 from dreamdrive.prior.photo.pavement import AHEAD, along_road
-from dreamdrive.prior.photo.street import FAR_M, Street
-from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
+from dreamdrive.prior.photo.street import FAR_M, PhotoStreet
+from dreamdrive.scene.street.street_class import FLAT, ROAD_USERS, StreetClass
 
 THIN = (*ROAD_USERS, StreetClass.POLE)
 """What something goes on behind: all of it is hidden street."""
@@ -16,7 +16,7 @@ RIM_PX = 9
 """The outline of a road user is not exact, and its colours would be smeared over all that it hides."""
 
 
-def widened(street: Street, margin: int) -> Street:
+def widened(street: PhotoStreet, margin: int) -> PhotoStreet:
     """The street with so many pixels more to the left, to the right and below.
 
     The road goes on; all else is mirrored, and no nearer than the border. Who is cut off by a side of the
@@ -38,18 +38,18 @@ def widened(street: Street, margin: int) -> Street:
     classes[own > 0] = StreetClass.ROAD
     height, width = classes.shape
     photo = slice(0, height), slice(margin, margin + width)
-    users = wider(street.users, cv2.BORDER_REFLECT_101)
-    users[users != wider(street.users, cv2.BORDER_REPLICATE)] = 0
-    users[height:] = 0
-    users[photo] = street.users
+    road_users = wider(street.road_users, cv2.BORDER_REFLECT_101)
+    road_users[road_users != wider(street.road_users, cv2.BORDER_REPLICATE)] = 0
+    road_users[height:] = 0
+    road_users[photo] = street.road_users
     hidden = np.isin(classes, THIN)
     empty = inpainted(rgb, grown(hidden, 5))
     rgb_out = wider(empty, cv2.BORDER_REFLECT_101)
-    rgb_out = np.where(users[..., None] > 0, wider(rgb, cv2.BORDER_REFLECT_101), rgb_out)
+    rgb_out = np.where(road_users[..., None] > 0, wider(rgb, cv2.BORDER_REFLECT_101), rgb_out)
     rgb_out[photo] = rgb
     standing = np.where(hidden, StreetClass.STRUCTURE, classes).astype(np.uint8)
     mirrored, level = wider(classes, cv2.BORDER_REFLECT_101), wider(standing, cv2.BORDER_REPLICATE)
-    classes = np.where(users > 0, mirrored, level)
+    classes = np.where(road_users > 0, mirrored, level)
     classes[photo] = np.where(own > 0, StreetClass.ROAD, street.classes)
     depth = wider(street.depth_m, cv2.BORDER_REPLICATE)
     plane = street.ground.depth_m(camera)
@@ -58,7 +58,7 @@ def widened(street: Street, margin: int) -> Street:
     flat = outside & (np.isin(classes, FLAT) | (plane < depth))
     depth = np.where(flat, np.minimum(plane, FAR_M), depth)
     depth[outside & (classes == StreetClass.SKY)] = 0
-    bare = ~outside & np.isin(classes, FLAT) & ~grown((users > 0) | outside, RIM_PX)
+    bare = ~outside & np.isin(classes, FLAT) & ~grown((road_users > 0) | outside, RIM_PX)
     rgb_out, left = along_road(rgb_out, camera, street.ground, flat & (plane < FAR_M), bare, AHEAD)
     rgb_out = inpainted(rgb_out, left)
-    return Street(rgb_out, camera, depth.astype(np.float32), classes, users, street.ground)
+    return PhotoStreet(rgb_out, camera, depth.astype(np.float32), classes, road_users, street.ground)

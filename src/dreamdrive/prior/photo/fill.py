@@ -1,4 +1,4 @@
-"""Holes in pictures and maps are continued from around them."""
+"""Inpainting of holes in pictures and maps from around them."""
 
 import cv2
 import numpy as np

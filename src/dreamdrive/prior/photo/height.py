@@ -1,4 +1,4 @@
-"""How high the camera is above the road, by the sizes of road users and the widths of lanes in a photo."""
+"""The camera's height above the road, by the sizes of road users and the widths of lanes in a photo."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.prior.photo.lanes import lane_widths
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.look import Look, RoadUser
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import Look, RoadUser
+from dreamdrive.scene.street.street_class import StreetClass
 
 USUAL_M = 1.5
 _USUAL_SPREAD = 0.25
@@ -29,7 +29,7 @@ _READING, _TOP_PX, _FOOT_PX = 0.06, 2.0, 1.5
 _TOO_TALL = 0.05
 """By how much vehicles are read too tall: what the network takes for them reaches out of them."""
 _WRONG = 0.15
-"""Chance that what was read means nothing: hidden feet, two users taken for one."""
+"""Chance that what was read means nothing: hidden feet, two road users taken for one."""
 _LANE_M, _LANE_SPREAD, _NO_LANE = 3.35, 0.1, 0.2
 """Widths of lanes, and the chance that what lies between two lines is none."""
 _LEAST_SCORE, _LEAST_PX, _LEAST_DROP_PX, _MOST_M = 0.3, 12, 3.0, 30.0
@@ -45,13 +45,13 @@ class Height:
     Attributes:
         metres: The height.
         spread: Standard deviation of its logarithm.
-        users: How many road users told it.
+        road_users: How many road users told it.
         lanes: And how many lanes.
     """
 
     metres: float
     spread: float
-    users: int
+    road_users: int
     lanes: int = 0
 
 
@@ -102,7 +102,7 @@ def _top(user: RoadUser, mask: Bool[np.ndarray, "h w"]) -> int:
 
 
 def _likely(tall_px: float, drop_px: Float[np.ndarray, " o"], kind: StreetClass) -> Float[np.ndarray, "o n"]:
-    """How likely a user of that kind is seen so tall, by rows of the horizon and heights of the camera."""
+    """How likely a road user of a kind is seen so tall, by rows of the horizon and heights of the camera."""
     spread = np.sqrt(_READING**2 + (_TOP_PX / tall_px) ** 2 + (_FOOT_PX / drop_px) ** 2)
     read = np.log(_GRID_M[None] * (tall_px / drop_px)[:, None])
     read -= _TOO_TALL if kind == StreetClass.VEHICLE else 0.0

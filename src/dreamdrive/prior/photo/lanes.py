@@ -1,4 +1,4 @@
-"""How wide the lanes of a photo are, by the lines that the street network sees on the road."""
+"""Widths of the lanes of a photo, by the lines that the street network sees on the road."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,8 +6,8 @@ from jaxtyping import Float
 from dreamdrive.prior.photo.way import level_axes
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import StreetClass
+from dreamdrive.scene.street.look import Look
+from dreamdrive.scene.street.street_class import StreetClass
 
 _NEAR, _FAR, _ASIDE = 3.0, 14.0, 6.0
 """Where lines are looked for: distances ahead and aside, in heights of the camera."""

@@ -11,11 +11,11 @@ from jaxtyping import Bool, Float, UInt8, UInt16
 from dreamdrive.prior.photo.beyond import RIM_PX, THIN, widened
 from dreamdrive.prior.photo.fill import continued, grown, inpainted, smoothed
 from dreamdrive.prior.photo.pavement import AROUND, along_road
-from dreamdrive.prior.photo.street import FAR_M, Street
+from dreamdrive.prior.photo.street import FAR_M, PhotoStreet
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.sky import Sky
-from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
+from dreamdrive.scene.street.street_class import FLAT, ROAD_USERS, StreetClass
 from dreamdrive.scene.surfels import surfels, tangents
 
 _ROOM_M = 25.0
@@ -85,15 +85,17 @@ class _Sheet:
     depth_m: Float[np.ndarray, "h w"]
 
 
-def layers_of(street: Street, leaving: Sequence[int] = (), options: LayerOptions = LayerOptions()) -> Layers:
-    """All that a drive into the photo may uncover; users of the numbers ``leaving``, from 1, drive on."""
+def layers_of(
+    street: PhotoStreet, leaving: Sequence[int] = (), options: LayerOptions = LayerOptions()
+) -> Layers:
+    """All that a drive into the photo may uncover; road users ``leaving``, numbered from 1, drive on."""
     margin = round(options.beyond * street.camera.width_px)
     wide = widened(street, margin)
     inside = np.zeros(wide.classes.shape, bool)
     photo = slice(0, street.camera.height_px), slice(margin, margin + street.camera.width_px)
     inside[photo] = street.classes != StreetClass.OWN_CAR
     behind = _behind(wide, leaving, options)
-    none = np.zeros_like(wide.users)
+    none = np.zeros_like(wide.road_users)
     front = _gaussians(_Sheet(wide.rgb, wide.depth_m), wide.camera, inside, _whole(wide), options)
     back = _gaussians(_Sheet(behind.rgb, behind.depth_m), wide.camera, np.zeros_like(inside), none, options)
     gaussians = Gaussians.concatenate(front, back)
@@ -103,19 +105,19 @@ def layers_of(street: Street, leaving: Sequence[int] = (), options: LayerOptions
     return Layers(gaussians, sky_of(street), wide.rgb, wide.camera, is_behind, nowhere, none_moves)
 
 
-def _whole(street: Street) -> UInt16[np.ndarray, "h w"]:
+def _whole(street: PhotoStreet) -> UInt16[np.ndarray, "h w"]:
     """Road users with the rim that is as deep as they are, which would stay behind when they move."""
-    around = cv2.dilate(street.users, np.ones((5, 5)))
-    deep = cv2.dilate(np.where(street.users > 0, street.depth_m, 0).astype(np.float32), np.ones((5, 5)))
-    rim = (street.users == 0) & (around > 0) & (street.depth_m < 1.05 * deep)
+    around = cv2.dilate(street.road_users, np.ones((5, 5)))
+    deep = cv2.dilate(np.where(street.road_users > 0, street.depth_m, 0).astype(np.float32), np.ones((5, 5)))
+    rim = (street.road_users == 0) & (around > 0) & (street.depth_m < 1.05 * deep)
     rim &= ~np.isin(street.classes, FLAT)
-    return np.where(rim, around, street.users)
+    return np.where(rim, around, street.road_users)
 
 
-def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _Sheet:
+def _behind(street: PhotoStreet, leaving: Sequence[int], options: LayerOptions) -> _Sheet:
     """What is hidden: the street without road users and poles, and what goes on behind edges."""
     solid, plane = street.depth_m > 0, street.ground.depth_m(street.camera)
-    shadow = np.isin(street.classes, FLAT) & (street.users > 0)
+    shadow = np.isin(street.classes, FLAT) & (street.road_users > 0)
     thin = np.isin(street.classes, THIN) | shadow
     reach = 2 * round(options.reach_px * street.camera.width_px / 480) + 1
     inverse = np.where(solid, 1 / np.maximum(street.depth_m, 1e-3), 1 / FAR_M).astype(np.float32)
@@ -124,7 +126,7 @@ def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _S
     # A road user's whole shape hides something: there depth runs from side to side.
     around = ~grown(thin, RIM_PX) & (street.classes != StreetClass.OWN_CAR)
     across = _across(inverse, around)
-    road = np.isin(street.users, leaving)
+    road = np.isin(street.road_users, leaving)
     across = np.where(road, np.minimum(across, 1 / (street.depth_m + _ROOM_M)), across)
     inverse_behind = np.maximum(np.where(thin, across, smooth), 1 / FAR_M)
     level = plane * inverse_behind < 1 + _LEVEL
@@ -138,19 +140,19 @@ def _behind(street: Street, leaving: Sequence[int], options: LayerOptions) -> _S
 
 
 def _without(
-    street: Street, hidden: Bool[np.ndarray, "h w"], level: Bool[np.ndarray, "h w"]
+    street: PhotoStreet, hidden: Bool[np.ndarray, "h w"], level: Bool[np.ndarray, "h w"]
 ) -> UInt8[np.ndarray, "h w 3"]:
     """The picture without what hides something: ground goes on as ground, what stands as what stands."""
     flat, sky = np.isin(street.classes, FLAT), street.classes == StreetClass.SKY
-    users = grown((street.users > 0) | np.isin(street.classes, ROAD_USERS), RIM_PX)
+    road_users = grown((street.road_users > 0) | np.isin(street.classes, ROAD_USERS), RIM_PX)
     hiding = grown(hidden, 3)
     edges = inpainted(street.rgb, hiding)
-    stands = smoothed(street.rgb, users | flat | sky)
-    bare = flat & ~hiding & ~users
+    stands = smoothed(street.rgb, road_users | flat | sky)
+    bare = flat & ~hiding & ~road_users
     wanted = level & ~bare & (street.ground.depth_m(street.camera) < FAR_M)
     found, left = along_road(street.rgb, street.camera, street.ground, wanted, bare, AROUND)
     ground = smoothed(found, ~bare & (left | ~wanted))
-    return np.where(level[..., None], ground, np.where(users[..., None], stands, edges))
+    return np.where(level[..., None], ground, np.where(road_users[..., None], stands, edges))
 
 
 def _across(values: Float[np.ndarray, "h w"], known: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
@@ -168,7 +170,7 @@ def _gaussians(
     sheet: _Sheet,
     camera: Camera,
     shown: Bool[np.ndarray, "h w"],
-    users: UInt16[np.ndarray, "h w"],
+    road_users: UInt16[np.ndarray, "h w"],
     options: LayerOptions,
 ) -> Gaussians:
     """A disc for each pixel that has depth."""
@@ -184,7 +186,7 @@ def _gaussians(
         logit_opacities=torch.full((count,), float(np.log(options.opacity / (1 - options.opacity)))),
         sh=_tensor((colour - 0.5) / SH_C0)[:, None],
         source_frame=torch.from_numpy(np.where(shown[chosen], 0, 1)),
-        actor=torch.from_numpy(users[chosen].astype(np.int64) - 1),
+        actor=torch.from_numpy(road_users[chosen].astype(np.int64) - 1),
     )
 
 
@@ -192,7 +194,7 @@ def _tensor(values: np.ndarray) -> Float[torch.Tensor, "..."]:
     return torch.tensor(values, dtype=torch.float32)
 
 
-def sky_of(street: Street) -> Sky:
+def sky_of(street: PhotoStreet) -> Sky:
     """The photo's sky, continued in all directions ahead; below it a blur of what stands there."""
     reach = np.pi / 2
     texel_rad = 2 / street.camera.fx_px

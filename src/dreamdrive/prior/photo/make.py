@@ -1,18 +1,18 @@
-"""A drive into a photo."""
+"""The clip of a drive into a photo."""
 
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from dreamdrive.choices import FILL_INPAINT
-from dreamdrive.data.intrinsics import GUESSED
+from dreamdrive.data.cameras.intrinsics import GUESSED
+from dreamdrive.data.frames.select import Selection, held_out_mask
 from dreamdrive.data.photo import Photo, read_photo
-from dreamdrive.data.select import Selection, held_out_mask
-from dreamdrive.data.size import check_largest
+from dreamdrive.data.pictures.turned import turned_photo
 from dreamdrive.errors import InputError
-from dreamdrive.knowledge import NO_KNOWLEDGE, SHIPPED, look
+from dreamdrive.names import FILL_INPAINT
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.pca import reduce
 from dreamdrive.prior.photo.fill import grown
@@ -20,16 +20,19 @@ from dreamdrive.prior.photo.height import Height, height_of
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.network import Before, PhotoNetwork, load_photo_network, mended
 from dreamdrive.prior.photo.sight import Sight, sight_of
-from dreamdrive.prior.photo.street import Street, street_of
+from dreamdrive.prior.photo.street import PhotoStreet, street_of
 from dreamdrive.prior.photo.traffic import TRAFFIC, going_ahead, velocities_of
 from dreamdrive.prior.photo.unseen import unseen_of
 from dreamdrive.prior.photo.way import path_for
+from dreamdrive.prior.protocol import Input, Seeing
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.control import Control
-from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import FLAT, StreetClass
+from dreamdrive.scene.control import Control, check_video_size
+from dreamdrive.scene.geometry import Basis, Scale
+from dreamdrive.scene.street.look import Look
+from dreamdrive.scene.street.street_class import FLAT, StreetClass
+from dreamdrive.street_network import HALF_TURN, NO_KNOWLEDGE, load_knowledge, look, turns_to_upright
 
 FRAMES = 25
 RATE_HZ = 10.0
@@ -47,19 +50,18 @@ _LEAST_SOLID, _LITTLE_GROUND = 0.05, 0.05
 _LEAST_CONTRAST = 3.0  # grey levels: a street at night has more
 
 
-def make_clip(control: Control, progress: Progress) -> Clip:
+def make_clip(opened: Input, progress: Progress, seeing: Seeing) -> Clip:
     """The frames of a drive, with the poses, depth, sky and road that they were drawn from."""
+    control = opened.control
     if control.path is None:
         raise InputError("the prior photo needs an input: a photo of a street")
-    if control.knowledge == NO_KNOWLEDGE:
+    if seeing.knowledge == NO_KNOWLEDGE:
         raise InputError("the prior photo sees depth by the street network; leave --knowledge none out")
     size = control.size or SIZE
-    if size[0] % 2 or size[1] % 2:
-        raise InputError(f"--size {size[0]}x{size[1]}: expected even numbers, such as {SIZE[0]}x{SIZE[1]}")
-    check_largest(size, f"--size {size[0]}x{size[1]}")
+    check_video_size(size)
     wanted = _wanted(control.frames)
-    photo = read_photo(control.path, size, control.intrinsics, control.hfov_deg, control.view)
-    street, seen, height = seen_in(photo, control.knowledge or SHIPPED, control.camera_height_m)
+    photo = _read(control.path, control, size, seeing.knowledge)
+    street, seen, height = seen_in(photo, seeing.knowledge, seeing.camera_height_m)
     velocities = velocities_of(street, control.traffic or TRAFFIC, control.traffic_speed_m_s)
     ahead = going_ahead(street, velocities)
     path = path_for(control, street, wanted / RATE_HZ, gone=ahead)
@@ -71,6 +73,7 @@ def make_clip(control: Control, progress: Progress) -> Clip:
     first = np.linalg.inv(path.world_from_camera[0])
     cameras = [street.camera.at(pose) for pose in path.world_from_camera]
     valid = np.ones(frames.shape[:3], bool)
+    guessed = not (photo.calibrated or photo.hfov)
     return Clip(
         frames=frames,
         times_s=(wanted - wanted[0]) / RATE_HZ,
@@ -87,14 +90,27 @@ def make_clip(control: Control, progress: Progress) -> Clip:
             sky=sky,
             unseen=unseen_of(layers, velocities, cameras, depth_m) if np.allclose(first, np.eye(4)) else None,
             generated=True,
+            scale=_scale(seeing, seen, height, guessed=guessed),
+            focal_guessed=guessed,
         ),
         requested=path if control.trajectory is not None else None,
         set_in_motion=moving,
-        provenance={"prior": "photo", "notes": _notes(control, photo, seen, height, velocities)},
+        provenance={
+            "prior": "photo",
+            "notes": _notes(seeing, photo, seen, height, velocities),
+            "set_in_motion": int(velocities.any(1).sum()),
+        },
     )
 
 
-def seen_in(photo: Photo, knowledge: str, height_m: float | None) -> tuple[Street, Look, Height]:
+def _read(path: Path, control: Control, size: tuple[int, int], knowledge: str) -> Photo:
+    """The photo, turned by half where the camera hung upside down."""
+    photo = read_photo(path, size, control.intrinsics, control.hfov_deg, control.view)
+    turns = turns_to_upright(photo.rgb[None], load_knowledge(knowledge))
+    return turned_photo(photo) if turns == HALF_TURN else photo
+
+
+def seen_in(photo: Photo, knowledge: str, height_m: float | None) -> tuple[PhotoStreet, Look, Height]:
     """The street of a photo, what the network saw in it, and how high the camera is, unless that is told.
 
     Raises:
@@ -135,7 +151,7 @@ def _wanted(frames: str | None) -> Int[np.ndarray, " f"]:
 
 
 def _driven(
-    street: Street,
+    street: PhotoStreet,
     layers: Iterable[Layers],
     poses: Float[np.ndarray, "f 4 4"],
     network: PhotoNetwork | None,
@@ -159,20 +175,35 @@ def _driven(
     return (frames, depth_m, sky, moving), inner
 
 
-def view(layers: Layers, camera: Camera, street: Street) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:
+def view(layers: Layers, camera: Camera, street: PhotoStreet) -> tuple[UInt8[np.ndarray, "h w 3"], Sight]:
     """What a camera sees, with its holes filled from around them."""
     sight = sight_of(layers, camera, street.ground)
     return sight.filled, sight
 
 
+def _scale(seeing: Seeing, seen: Look, height: Height, *, guessed: bool) -> Scale:
+    """What metres rest on: a camera of another height, or a wider view, is a street of another size."""
+    focal_spread = seen.camera.focal_spread if guessed else 0.0
+    if seeing.camera_height_m is not None:
+        return Scale(f"camera height {height.metres:.2f} m (given)", focal_spread, basis="height")
+    source = f"camera height of {height.metres:.2f} m (by {_told_by(height)})"
+    basis: Basis = "seen sizes" if height.road_users or height.lanes else "usual height"
+    return Scale(source, float(np.hypot(height.spread, focal_spread)), basis=basis)
+
+
 def _told_by(height: Height) -> str:
-    users, lanes = f"the sizes of {height.users} road users", f"the widths of {height.lanes} lanes"
-    told = [words for words, count in ((users, height.users), (lanes, height.lanes)) if count]
+    road_users = (
+        "the size of 1 road user"
+        if height.road_users == 1
+        else f"the sizes of {height.road_users} road users"
+    )
+    lanes = "the width of 1 lane" if height.lanes == 1 else f"the widths of {height.lanes} lanes"
+    told = [words for words, count in ((road_users, height.road_users), (lanes, height.lanes)) if count]
     return " and ".join(told) or "what is usual"
 
 
 def _notes(
-    control: Control, photo: Photo, seen: Look, height: Height, velocities: Float[np.ndarray, "u 3"]
+    seeing: Seeing, photo: Photo, seen: Look, height: Height, velocities: Float[np.ndarray, "u 3"]
 ) -> list[str]:
     notes = [note for note in photo.notes if note != GUESSED]  # the street network guesses better
     notes.append("The frames are drawn from one photo: what it does not show is made up.")
@@ -189,7 +220,7 @@ def _notes(
             "The lens seems to bend straight lines: what is near the borders will be off; --intrinsics takes "
             "the bend out."
         )
-    if control.camera_height_m is None:
+    if seeing.camera_height_m is None:
         by = _told_by(height)
         notes.append(
             f"Metres rest on a camera {height.metres:.2f} m above the road, by {by} (within "

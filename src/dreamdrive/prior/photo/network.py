@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
-from dreamdrive.choices import FILL_INPAINT, FILL_NETWORK
 from dreamdrive.errors import InputError
 from dreamdrive.models import fill_network, read_state
+from dreamdrive.names import FILL_INPAINT, FILL_NETWORK
 from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
 

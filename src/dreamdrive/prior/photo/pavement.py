@@ -1,4 +1,4 @@
-"""Ground that a photo does not show looks as it does before and behind that place, along the road."""
+"""Texture of ground that a photo does not show, from before and behind that place along the road."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What a camera sees of the layers of a photo."""
+"""Rendering of the layers of a photo."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,11 +8,12 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.layers import Layers
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.splat import one_torch_thread, render
+from dreamdrive.splat import render
 
 _HALF, _SOLID = 0.5, 0.8
 _EDGE, _JITTER = 0.1, 0.04

@@ -1,4 +1,4 @@
-"""What a photo shows, as depth in metres over a level road."""
+"""The street of a photo, as depth in metres over a level road."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, UInt8, UInt16
 from dreamdrive.prior.photo.upright import poles_stand, upright
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.look import Look
-from dreamdrive.scene.street_class import FLAT, StreetClass
+from dreamdrive.scene.street.look import Look
+from dreamdrive.scene.street.street_class import FLAT, StreetClass
 
 FAR_M = 250.0
 _LEVEL_M, _HILLY_M = 40.0, 120.0
@@ -23,11 +23,11 @@ _NEARER = 0.93
 """What faces the camera is nearer than where the lowest pixels of a road user meet the road: 8 % on lidar."""
 _EDGE = 0.1
 _SHADOW, _DARK = 0.2, 0.75
-"""How far a shadow reaches over the size of its user, and how light it is over the ground below."""
+"""How far a shadow reaches over the size of its road user, and how light it is over the ground below."""
 
 
 @dataclass(frozen=True)
-class Street:
+class PhotoStreet:
     """A picture with depth: the world is its camera, in metres.
 
     Attributes:
@@ -35,7 +35,7 @@ class Street:
         camera: Its pinhole, at the identity.
         depth_m: Depth along z (H, W); 0 in the sky and on the own car.
         classes: ``StreetClass`` of each pixel (H, W).
-        users: 1 + the index of a road user (H, W); 0 where there is none.
+        road_users: 1 + the index of a road user (H, W); 0 where there is none.
         ground: The level road.
     """
 
@@ -43,7 +43,7 @@ class Street:
     camera: Camera
     depth_m: Float[np.ndarray, "h w"]
     classes: UInt8[np.ndarray, "h w"]
-    users: UInt16[np.ndarray, "h w"]
+    road_users: UInt16[np.ndarray, "h w"]
     ground: Ground
 
     @property
@@ -52,7 +52,7 @@ class Street:
         return self.classes == StreetClass.SKY
 
 
-def street_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Camera, look: Look, height_m: float) -> Street:
+def street_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Camera, look: Look, height_m: float) -> PhotoStreet:
     """Depth of a photo from a look at it, on a level road ``height_m`` below the camera.
 
     The look's tilt tells the road: on drawn streets its plane is better than the look's depth within 20 m.
@@ -60,15 +60,15 @@ def street_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Camera, look: Look, heigh
     """
     ground = Ground(look.camera.up_in(camera), height_m)
     plane = ground.depth_m(camera)
-    seen, classes, users = look.depth[0] * np.float64(height_m), look.classes[0], look.instances[0]
+    seen, classes, road_users = look.depth[0] * np.float64(height_m), look.classes[0], look.instances[0]
     flat = np.isin(classes, FLAT)
     depth = seen * _factor(plane, seen, flat & (plane < _LEVEL_M))
-    for user in range(1, int(users.max()) + 1):
-        _stand(depth, plane, users == user)
+    for user in range(1, int(road_users.max()) + 1):
+        _stand(depth, plane, road_users == user)
     poles_stand(depth, classes, plane)
     stands = ~flat & ~np.isin(classes, (StreetClass.SKY, StreetClass.OWN_CAR))
     depth = _sharp(depth, rgb)
-    depth = upright(depth, users.astype(np.int64) + 1000 * (classes == StreetClass.POLE), stands)
+    depth = upright(depth, road_users.astype(np.int64) + 1000 * (classes == StreetClass.POLE), stands)
     share = np.clip((plane - _LEVEL_M) / (_HILLY_M - _LEVEL_M), 0, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         on_road = np.exp((1 - share) * np.log(plane) + share * np.log(np.maximum(depth, 1e-3)))
@@ -77,23 +77,25 @@ def street_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Camera, look: Look, heigh
     depth = np.where(plane < _LEVEL_M, np.minimum(depth, plane), depth)
     depth = np.clip(depth, 0, FAR_M)
     depth[(classes == StreetClass.SKY) | (classes == StreetClass.OWN_CAR)] = 0
-    return Street(rgb, camera, depth.astype(np.float32), classes, _with_shadows(users, classes, rgb), ground)
+    return PhotoStreet(
+        rgb, camera, depth.astype(np.float32), classes, _with_shadows(road_users, classes, rgb), ground
+    )
 
 
 def _with_shadows(
-    users: UInt16[np.ndarray, "h w"], classes: UInt8[np.ndarray, "h w"], rgb: UInt8[np.ndarray, "h w 3"]
+    road_users: UInt16[np.ndarray, "h w"], classes: UInt8[np.ndarray, "h w"], rgb: UInt8[np.ndarray, "h w 3"]
 ) -> UInt16[np.ndarray, "h w"]:
     """Road users with the dark ground under them, which goes where they go."""
-    light, flat, out = rgb.mean(2), np.isin(classes, FLAT), users.copy()
-    for user in range(1, int(users.max(initial=0)) + 1):
-        mask = users == user
+    light, flat, out = rgb.mean(2), np.isin(classes, FLAT), road_users.copy()
+    for user in range(1, int(road_users.max(initial=0)) + 1):
+        mask = road_users == user
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         if not len(rows):
             continue
         down, aside = max(2, int(_SHADOW * len(rows))), max(1, int(_SHADOW * len(columns) / 2))
         around = np.ones((2 * down + 1, 2 * aside + 1), np.uint8)
         around[down + 1 :] = 0  # what is above a pixel reaches down to it
-        under = (cv2.dilate(mask.astype(np.uint8), around) > 0) & flat & (users == 0)
+        under = (cv2.dilate(mask.astype(np.uint8), around) > 0) & flat & (road_users == 0)
         under[: rows[-1] - 2 * down] = False
         road = flat[rows[-1] :, columns[0] : columns[-1] + 1]
         if under.any() and road.any():

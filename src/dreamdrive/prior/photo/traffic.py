@@ -1,4 +1,4 @@
-"""How the road users of a photo go on: vehicles along their lane, people along the street."""
+"""Motion of the road users of a photo: vehicles along their lane, people along the street."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.choices import TrafficName
-from dreamdrive.prior.photo.street import Street
+from dreamdrive.names import TrafficName
+from dreamdrive.prior.photo.street import PhotoStreet
 from dreamdrive.prior.photo.way import DRIVEN_M_S, level_axes
-from dreamdrive.scene.street_class import FLAT, ROAD_USERS, StreetClass
+from dreamdrive.scene.street.street_class import FLAT, ROAD_USERS, StreetClass
 
 TRAFFIC: TrafficName = "flow"
 """Unless told."""
@@ -22,9 +22,9 @@ _FAST_M_S = 15.0
 _LANE_M = 3.5
 _FAR_M = 80.0
 _LEAST_PX = 60
-"""Of what is set in motion: smaller users are a few specks."""
+"""Of what is set in motion: smaller road users are a few specks."""
 _FOOT = 0.1
-"""Share of a user's height that counts as its foot."""
+"""Share of a road user's height that counts as its foot."""
 _BESIDE_M, _KERB_M = 0.8, 2.5
 """How far beside a vehicle the road has to go on, and how far to the kerb: one that is parked is near it."""
 _ON_ROAD = 0.7
@@ -35,7 +35,7 @@ _LAMPS = (0.003, 0.15)
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a user stands: metres to the right and ahead, its lowest row, whether it is cut off."""
+    """Where a road user stands: metres to the right and ahead, its lowest row, whether it is cut off."""
 
     right_m: float
     ahead_m: float
@@ -43,19 +43,21 @@ class _Place:
     cut_off: bool
 
 
-def velocities_of(street: Street, traffic: TrafficName, speed_m_s: float | None) -> Float[np.ndarray, "u 3"]:
+def velocities_of(
+    street: PhotoStreet, traffic: TrafficName, speed_m_s: float | None
+) -> Float[np.ndarray, "u 3"]:
     """Velocities of the road users in the street's world, in m/s; row k is of user k + 1."""
     if traffic == "still":
-        return np.zeros((int(street.users.max(initial=0)), 3))
+        return np.zeros((int(street.road_users.max(initial=0)), 3))
     return flowing(street, SPEED_M_S if speed_m_s is None else speed_m_s)
 
 
-def going_ahead(street: Street, velocities: Float[np.ndarray, "u 3"]) -> list[int]:
-    """Numbers, from 1, of the users that drive ahead no slower than the own car does unless told."""
+def going_ahead(street: PhotoStreet, velocities: Float[np.ndarray, "u 3"]) -> list[int]:
+    """Numbers, from 1, of the road users that drive ahead no slower than the own car does unless told."""
     return (1 + np.flatnonzero(velocities @ level_axes(street.ground)[:, 2] >= DRIVEN_M_S)).tolist()
 
 
-def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "u 3"]:
+def flowing(street: PhotoStreet, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "u 3"]:
     """Velocities of the road users in the street's world, in m/s; row k is of user k + 1.
 
     What is in the own lane, or beside it on the own side with road all around, drives ahead; on the other
@@ -63,13 +65,13 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
     may do, are parked, and nearly all that the picture's border cuts off; on the own side none are where
     traffic is fast. Far users stand still.
     """
-    count = int(street.users.max(initial=0))
+    count = int(street.road_users.max(initial=0))
     velocities, axes = np.zeros((count, 3)), level_axes(street.ground)
     points = street.camera.rays() * street.depth_m[..., None] @ axes
     side = _own_side(street, axes)
     stands = ~np.isin(street.classes, FLAT)  # shadows tell nothing of the place
     for user in range(1, count + 1):
-        mask = (street.users == user) & stands
+        mask = (street.road_users == user) & stands
         place = _place_of(mask, street.depth_m, points)
         if place is None:
             continue
@@ -84,7 +86,7 @@ def flowing(street: Street, speed_m_s: float = SPEED_M_S) -> Float[np.ndarray, "
     return velocities
 
 
-def _own_side(street: Street, axes: Float[np.ndarray, "3 3"]) -> int:
+def _own_side(street: PhotoStreet, axes: Float[np.ndarray, "3 3"]) -> int:
     """1 where traffic keeps to the right, -1 to the left: the road goes on to the other side."""
     plane = street.ground.depth_m(street.camera)
     near = (plane > 4.0) & (plane < 20.0)
@@ -98,7 +100,7 @@ def _own_side(street: Street, axes: Float[np.ndarray, "3 3"]) -> int:
 def _place_of(
     mask: Bool[np.ndarray, "h w"], depth_m: Float[np.ndarray, "h w"], points: Float[np.ndarray, "h w 3"]
 ) -> _Place | None:
-    """None where the user is far or hardly seen."""
+    """None where the road user is far or hardly seen."""
     if mask.sum() < _LEAST_PX:
         return None
     rows = np.flatnonzero(mask.any(1))
@@ -113,7 +115,7 @@ def _place_of(
 
 
 def _direction(
-    street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, side: int, *, parked: bool
+    street: PhotoStreet, mask: Bool[np.ndarray, "h w"], place: _Place, side: int, *, parked: bool
 ) -> int:
     """1 ahead, -1 towards the camera, 0 where it is parked; on the own side none may be."""
     if not parked and place.right_m * side > -_LANE_M / 2:
@@ -128,8 +130,10 @@ def _direction(
     return -1 if strict and not place.cut_off else 0
 
 
-def _on_road(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, *, hidden_is_road: bool) -> bool:
-    """Whether the road goes on at both sides of the foot; what other users hide is road or is not."""
+def _on_road(
+    street: PhotoStreet, mask: Bool[np.ndarray, "h w"], place: _Place, *, hidden_is_road: bool
+) -> bool:
+    """Whether the road goes on at both sides of the foot; what other road users hide is road or is not."""
     kerb = (_KERB_M, _BESIDE_M) if place.right_m < 0 else (_BESIDE_M, _KERB_M)
     left, right = (max(2, round(street.camera.fx_px * metres / place.ahead_m)) for metres in kerb)
     columns = np.flatnonzero(mask[max(place.row - 1, 0) : place.row + 1].any(0))
@@ -142,7 +146,7 @@ def _on_road(street: Street, mask: Bool[np.ndarray, "h w"], place: _Place, *, hi
     return all(each.size > 0 and float(each.mean()) > _ON_ROAD for each in beside)
 
 
-def _back_is_seen(street: Street, mask: Bool[np.ndarray, "h w"]) -> bool:
+def _back_is_seen(street: PhotoStreet, mask: Bool[np.ndarray, "h w"]) -> bool:
     """Whether red lamps are seen, and not a red car."""
     rgb = cv2.GaussianBlur(street.rgb, (3, 3), 0)[mask].astype(np.float64)
     red = (rgb[:, 0] > 70) & (rgb[:, 0] > _RED * rgb[:, 1:].max(1))

@@ -1,4 +1,4 @@
-"""What stands in the layers of a photo and no frame of a drive shows."""
+"""Gaussians of a photo's layers that no frame of a drive shows."""
 
 from collections.abc import Sequence
 

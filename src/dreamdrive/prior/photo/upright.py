@@ -1,10 +1,10 @@
-"""What stands is upright: depth of a network, which waves, becomes smooth along each surface."""
+"""Smoothing of a network's depth along upright surfaces, where it waves."""
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from dreamdrive.scene.street_class import FLAT, StreetClass
+from dreamdrive.scene.street.street_class import FLAT, StreetClass
 
 _ALONG_PX, _ACROSS_PX = 60.0, 8.0
 """How far depth is averaged down a surface and across it, in a picture 480 wide."""

@@ -1,4 +1,4 @@
-"""Where a photo is driven into: the path that was asked for, or straight ahead as far as the road is free."""
+"""The path into a photo: the one that was asked for, or straight ahead as far as the road is free."""
 
 from collections.abc import Sequence
 
@@ -7,11 +7,10 @@ from jaxtyping import Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.path import asked_path, path_of, wanted_path
-from dreamdrive.prior.photo.street import Street
-from dreamdrive.scene.action import AT_S, Action, Command, Four, Goal, Steering, Waypoints
-from dreamdrive.scene.control import Control
+from dreamdrive.prior.photo.street import PhotoStreet
+from dreamdrive.scene.control import AT_S, Action, Command, Control, Four, Goal, Steering, Waypoints
 from dreamdrive.scene.geometry import Ground
-from dreamdrive.scene.street_class import FLAT
+from dreamdrive.scene.street.street_class import FLAT
 from dreamdrive.scene.trajectory import Trajectory
 
 DRIVEN_M_S = 6.0
@@ -26,7 +25,7 @@ _LEAST_PX = 20
 
 
 def path_for(
-    control: Control, street: Street, times_s: Float[np.ndarray, " f"], gone: Sequence[int] = ()
+    control: Control, street: PhotoStreet, times_s: Float[np.ndarray, " f"], gone: Sequence[int] = ()
 ) -> Trajectory:
     """The camera's path from its place in the photo on, at the times of the frames since then.
 
@@ -46,7 +45,7 @@ def path_for(
     return Trajectory(_tilted(level, street.ground).world_from_camera[-len(times_s) :], times_s)
 
 
-def free_m(street: Street, gone: Sequence[int] = ()) -> float:
+def free_m(street: PhotoStreet, gone: Sequence[int] = ()) -> float:
     """How far the own way is free ahead, in metres along z; infinite where nothing is in it.
 
     Road users whose numbers, from 1, are among ``gone`` do not count.
@@ -54,12 +53,12 @@ def free_m(street: Street, gone: Sequence[int] = ()) -> float:
     points = street.camera.rays() * street.depth_m[..., None]
     up = street.ground.height_m(points)
     solid = (street.depth_m > 0) & (up > _LOW_M) & (up < _HIGH_M) & (np.abs(points[..., 0]) < _HALF_WIDTH_M)
-    solid &= ~np.isin(street.classes, FLAT) & ~np.isin(street.users, gone)
+    solid &= ~np.isin(street.classes, FLAT) & ~np.isin(street.road_users, gone)
     return float(np.sort(street.depth_m[solid])[_LEAST_PX]) if solid.sum() > _LEAST_PX else float("inf")
 
 
 def _driven(
-    action: Action | None, street: Street, seconds: float, gone: Sequence[int]
+    action: Action | None, street: PhotoStreet, seconds: float, gone: Sequence[int]
 ) -> Waypoints | Steering:
     if isinstance(action, Waypoints | Steering):
         return action
@@ -77,7 +76,7 @@ def _driven(
     return Steering((speed, speed, speed, speed), wheel)
 
 
-def _to(goal: Goal, street: Street) -> Waypoints:
+def _to(goal: Goal, street: PhotoStreet) -> Waypoints:
     """Along the circle from here, straight ahead at first, to a point of the road."""
     camera, plane = street.camera, street.ground.depth_m(street.camera)
     row = min(int(goal.row * camera.height_px), camera.height_px - 1)

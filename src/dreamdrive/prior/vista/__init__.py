@@ -4,26 +4,28 @@ from dataclasses import replace
 from functools import partial
 
 from dreamdrive.errors import InputError
-from dreamdrive.prior.protocol import Prior
+from dreamdrive.prior.protocol import Input, Prior
 from dreamdrive.prior.running import INSTALL, PACKAGE
 from dreamdrive.prior.vista.kinds import KINDS
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Driving, VideoModelInput, fields_of
+
+_TAKES = fields_of(VideoModelInput) - {"fps", "prompt"}
 
 
-def _make(kind: str, control: Control, progress: Progress) -> Clip:
+def _make(kind: str, opened: Input, progress: Progress) -> Clip:
     try:
         from dreamdrive.prior.vista.make import make_clip
     except ImportError as error:
         raise InputError(f"prior {kind}: {error.name} cannot be imported ({error}): {INSTALL}") from None
-    return make_clip(KINDS[kind], control, progress)
+    return make_clip(KINDS[kind], opened.control, progress)
 
 
 SVD = Prior(
     name="svd",
     make=partial(_make, "svd"),
-    takes=frozenset({"path", "frames", "size", "hfov_deg", "intrinsics", "hold_out", "steps"}),
+    takes=_TAKES - fields_of(Driving),
     gives="25 frames at 7 Hz, latents, features; no poses",
     about="a photo goes on for 25 frames (Stable Video Diffusion)",
     licence=(
@@ -43,7 +45,7 @@ VISTA = replace(
     SVD,
     name="vista",
     make=partial(_make, "vista"),
-    takes=SVD.takes | {"action", "actions", "trajectory", "trajectories"},
+    takes=_TAKES,
     gives="22 frames a round and 3, at 10 Hz, latents, features; no poses",
     about="a street goes on from a photo or up to three frames, as told by an action (Vista)",
     licence=(

@@ -1,4 +1,4 @@
-"""What the network is told beside the noise: the first frame and the action. Importing this loads diffusers.
+"""Conditions of the network: the first frame and the action. Importing this loads diffusers.
 
 Units and signs of the actions are those of nuScenes' CAN bus, on which Vista was trained. Its code states
 none of them, so some are [inferred]: from nuScenes' documentation and from what similar code does.
@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from dreamdrive.prior.vista.kinds import ACTION_COLUMNS
-from dreamdrive.scene.action import Action, Command, Goal, Steering, Waypoints
+from dreamdrive.scene.control import Action, Command, Goal, Steering, Waypoints
 
 NUMBERS = {"command": 1, "trajectory": 8, "speed": 4, "angle": 4, "goal": 2}
 """Kinds of action in the order of their columns, and how many numbers each has."""

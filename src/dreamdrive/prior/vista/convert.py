@@ -1,4 +1,4 @@
-"""From an official single file to a folder in diffusers' layout, a tensor at a time."""
+"""Conversion of an official single file to a folder in diffusers' layout, a tensor at a time."""
 
 import json
 import struct
@@ -10,13 +10,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from dreamdrive.choices import DtypeName
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import new_folder
+from dreamdrive.names import DtypeName
 from dreamdrive.prior.running import counted
 from dreamdrive.prior.vista.configs import Shapes
 from dreamdrive.prior.vista.keys import IGNORED, PARTS, Part
-from dreamdrive.prior.vista.stored import FILES, NOTE, Stored, notes_of, open_weights
+from dreamdrive.prior.vista.stored import FILES, NOTE, StoredModel, notes_of, open_weights
 from dreamdrive.progress import Progress, silent
 
 _DTYPES = {"float16": (torch.float16, "F16"), "float32": (torch.float32, "F32")}
@@ -31,7 +31,7 @@ _CLASSES: dict[Part, dict[str, str]] = {
 class Converted:
     """What was made of which file; how many tensors were left out, by what they are; what to say of it."""
 
-    stored: Stored
+    stored: StoredModel
     ignored: dict[str, int]
     notes: list[str]
 

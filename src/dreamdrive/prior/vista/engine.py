@@ -1,4 +1,4 @@
-"""The stored networks as what sampling, decoding and features ask for. Importing this loads diffusers."""
+"""The stored networks, ready for sampling, decoding and features. Importing this loads diffusers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,22 +7,22 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from dreamdrive.compute.machine import free_bytes
 from dreamdrive.errors import InputError
-from dreamdrive.machine import free_bytes
 from dreamdrive.prior.vista.condition import clip_pixels
 from dreamdrive.prior.vista.keys import Part
 from dreamdrive.prior.vista.kinds import MOTION_BUCKET
 from dreamdrive.prior.vista.memory import Free, Job, check_memory
 from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.prior.vista.sampler import Branches, Velocity
-from dreamdrive.prior.vista.stored import Stored
+from dreamdrive.prior.vista.stored import StoredModel
 
 Images = Float[Tensor, "n 3 h w"]
 """Frames in [-1, 1]."""
 
 
 @dataclass(frozen=True)
-class Seen:
+class RoundConditions:
     """The conditions of one round: its first frame described, and as the autoencoder has it, not scaled.
 
     The columns of the action are None in SVD.
@@ -39,7 +39,7 @@ class Engine:
     On a GPU the UNet computes in float16, the others never do. All but what a velocity sees lies on the CPU.
     """
 
-    def __init__(self, stored: Stored, device: torch.device) -> None:
+    def __init__(self, stored: StoredModel, device: torch.device) -> None:
         self.stored, self.device = stored, device
         self._half = device.type == "cuda"
         self._held: tuple[Part, nn.Module] | None = None
@@ -84,26 +84,26 @@ class Engine:
         shown = clip_pixels(images.to(self.device), side_px)
         return self.network("image_encoder")(shown).image_embeds[0]
 
-    def velocity(self, seen: Seen) -> Velocity:
+    def velocity(self, seen: RoundConditions) -> Velocity:
         """The UNet without and with the conditions of a round; without them frame and action are zeros.
 
         One after the other, which takes half the memory of both at once.
         """
 
         def answer(x: Float[Tensor, "t c h w"], time: float, mask: Float[Tensor, " t"]) -> Branches:
-            return self.look(seen, x, time, mask, 0.0), self.look(seen, x, time, mask, 1.0)
+            return self.predict(seen, x, time, mask, 0.0), self.predict(seen, x, time, mask, 1.0)
 
         return answer
 
-    def look(
+    def predict(
         self,
-        seen: Seen,
+        seen: RoundConditions,
         x: Float[Tensor, "t c h w"],
         time: float,
         mask: Float[Tensor, " t"],
         given: float = 1.0,
     ) -> Float[Tensor, "t c h w"]:
-        """One look of the UNet at scaled noisy latents.
+        """One prediction of the UNet at scaled noisy latents.
 
         ``time`` is 0.25 ln sigma, ``mask`` one for frames that are known; ``given`` is one with the
         conditions of the round, zero without.

@@ -1,4 +1,4 @@
-"""What the video model sees in frames: the activations of a block, as features Z_ref. Loads diffusers.
+"""Features Z_ref of the video model: activations of a block. Loads diffusers.
 
 The paper takes features from "early layers" of its diffusion model. Here the finished frames, made or
 recorded, get a little noise and go through the UNet once, as in DIFT (Tang et al., NeurIPS 2023); nothing
@@ -16,13 +16,13 @@ import torch
 from jaxtyping import Float, Float16, UInt8
 from torch import Tensor
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.prior.early_features import BLOCK, SIGMA, onto_frames, watch
 from dreamdrive.prior.pca import CHANNELS, reduce
 from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round
-from dreamdrive.prior.vista.engine import Engine, Seen
+from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.memory import LOOKING, Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, check_size, nearest_side, to_images
@@ -30,7 +30,7 @@ from dreamdrive.prior.vista.rollout import SCALE
 from dreamdrive.prior.vista.sampler import time_of
 from dreamdrive.prior.vista.stored import open_weights
 from dreamdrive.progress import Progress, silent
-from dreamdrive.scene.action import Action, check_action
+from dreamdrive.scene.control import Action, check_action
 
 _BLOCKS = re.compile(r"conv_in|(mid_block|(down|up)_blocks\.\d+)(\.(attentions|resnets)\.\d+)?")
 """What gives activations (B T, C, h, w)."""
@@ -152,7 +152,7 @@ def extract(
     made: list[Float16[np.ndarray, "h w c"]] = []
     for window, image in zip(windows, described, strict=True):
         part = slice(window.span.start, window.span.stop)
-        seen = Seen(image, latents[window.span.start] / SCALE, window.action)
+        seen = RoundConditions(image, latents[window.span.start] / SCALE, window.action)
         values = _activations(engine, seen, latents[part], noise[part], chosen, window.fixed)
         made += list(values[len(made) - window.span.start :])
         tell()
@@ -167,7 +167,7 @@ def spans_of(count: int, length: int) -> list[range]:
 
 def _activations(
     engine: Engine,
-    seen: Seen,
+    seen: RoundConditions,
     latents: Float[Tensor, "t c h w"],
     noise: Float[Tensor, "t c h w"],
     options: FeatureOptions,
@@ -181,7 +181,7 @@ def _activations(
     handle = watch(engine.network("unet"), options.block, caught.append)
     try:
         scaled = (noisy / (options.sigma**2 + 1) ** 0.5).to(engine.device)
-        engine.look(seen, scaled, time_of(options.sigma), mask.to(scaled))
+        engine.predict(seen, scaled, time_of(options.sigma), mask.to(scaled))
     finally:
         handle.remove()
     values = caught[0].permute(0, 2, 3, 1).half()

@@ -1,4 +1,4 @@
-"""From the names in the official single files to those of diffusers and transformers, as rules.
+"""Rules from the names in the official single files to those of diffusers and transformers.
 
 The files are ``vista.safetensors`` (Gao et al., NeurIPS 2024) and ``svd_xt.safetensors`` (Blattmann et al.,
 2023).

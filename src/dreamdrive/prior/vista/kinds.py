@@ -7,7 +7,7 @@ ACTION_COLUMNS = 2432
 
 
 @dataclass(frozen=True)
-class Kind:
+class ModelKind:
     """What tells one model's use from the other's.
 
     It is told the frame rate that its frames have, and the standard deviation of the noise on the first one.
@@ -23,8 +23,8 @@ class Kind:
     overlap: int
 
 
-SVD = Kind("svd", "Stable Video Diffusion", rate_hz=7.0, noise=0.02, steps=25, overlap=0)
-VISTA = Kind("vista", "Vista", rate_hz=10.0, noise=0.0, steps=50, overlap=3)
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (SVD, VISTA)}
+SVD = ModelKind("svd", "Stable Video Diffusion", rate_hz=7.0, noise=0.02, steps=25, overlap=0)
+VISTA = ModelKind("vista", "Vista", rate_hz=10.0, noise=0.0, steps=50, overlap=3)
+KINDS: dict[str, ModelKind] = {kind.name: kind for kind in (SVD, VISTA)}
 MOTION_BUCKET = 127
 """How much motion both are asked for; the value of Vista's sampling script and of SVD's pipeline."""

@@ -1,4 +1,4 @@
-"""A photo, or a few leading frames, becomes a clip. Importing this loads diffusers."""
+"""Clips made of a photo or a few leading frames. Importing this loads diffusers."""
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -9,8 +9,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from dreamdrive.data.select import Selection, held_out_mask
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.data.frames.select import Selection, held_out_mask
 from dreamdrive.errors import InputError
 from dreamdrive.prior.appearance import appearance
 from dreamdrive.prior.early_features import BLOCK
@@ -19,21 +19,20 @@ from dreamdrive.prior.running import check_finite, counted, enough_memory
 from dreamdrive.prior.vista.condition import columns_by_round, embed_action, numbers_of
 from dreamdrive.prior.vista.engine import Engine
 from dreamdrive.prior.vista.features import Window, extract
-from dreamdrive.prior.vista.kinds import SVD, Kind
+from dreamdrive.prior.vista.kinds import SVD, ModelKind
 from dreamdrive.prior.vista.memory import Job, smaller_size
 from dreamdrive.prior.vista.picture import NATIVE, Leading, check_size, read_leading, to_frames, to_images
 from dreamdrive.prior.vista.rollout import SCALE, decode_in_chunks, roll_out, rounds_for
 from dreamdrive.prior.vista.stored import notes_of, open_weights
 from dreamdrive.progress import Progress
-from dreamdrive.scene.action import Action, Goal, Steering, Waypoints
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.scene.control import Control
+from dreamdrive.scene.control import Action, Control, Goal, Steering, Waypoints
 from dreamdrive.scene.trajectory import Trajectory
 
 _MOST_FRAMES = 1000
 
 
-def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
+def make_clip(kind: ModelKind, control: Control, progress: Progress) -> Clip:
     """Generate the clip; Z_ref is ``features["appearance"]`` and the video model's own.
 
     The input is a photo, or a video or folder whose first frames are kept (up to three by Vista, one by SVD).
@@ -89,7 +88,7 @@ def make_clip(kind: Kind, control: Control, progress: Progress) -> Clip:
     )
 
 
-def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, " f"]:
+def _wanted(frames: str | None, kind: ModelKind, per_round: int) -> Int[np.ndarray, " f"]:
     """Indices of the frames to keep, among all that are made."""
     selection = Selection.parse(frames)
     if selection.needs_count:
@@ -111,7 +110,7 @@ def _wanted(frames: str | None, kind: Kind, per_round: int) -> Int[np.ndarray, "
 
 
 def _told(
-    control: Control, kind: Kind, spans: list[range], times_s: Float[np.ndarray, " f"]
+    control: Control, kind: ModelKind, spans: list[range], times_s: Float[np.ndarray, " f"]
 ) -> tuple[list[Float[Tensor, " a"] | None], Trajectory | None]:
     """Columns of the action in each round, None for SVD; and the path that it asks for, if it does."""
     if kind is SVD:
@@ -129,7 +128,7 @@ def _told(
 
 def _sample(
     engine: Engine,
-    kind: Kind,
+    kind: ModelKind,
     leading: Leading,
     windows: list[Window],
     steps: int,
@@ -153,7 +152,7 @@ def _sample(
 
 
 def _provenance(
-    kind: Kind, control: Control, leading: Leading, steps: int, rounds: int, noticed: list[str]
+    kind: ModelKind, control: Control, leading: Leading, steps: int, rounds: int, noticed: list[str]
 ) -> dict[str, Any]:
     assert control.path is not None
     notes = [

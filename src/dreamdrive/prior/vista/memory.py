@@ -1,4 +1,4 @@
-"""What memory a run will take, told before anything is loaded.
+"""Memory that a run will take, told before anything is loaded.
 
 One network at a time is in memory. What each needs beside its weights was found by running the networks of
 official size without numbers (on torch's meta device) and adding up what lived at once; it grows with the
@@ -12,7 +12,7 @@ from typing import Literal
 
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.picture import SIDE, nearest_side
-from dreamdrive.prior.vista.stored import Stored
+from dreamdrive.prior.vista.stored import StoredModel
 
 CHUNK = 14
 """Frames that Vista decodes at once."""
@@ -50,7 +50,7 @@ class Free:
 
 
 @dataclass(frozen=True)
-class Plan:
+class MemoryUse:
     """Bytes that each network takes at work, its weights included, and decoded frames in main memory."""
 
     steps: Mapping[Step, int]
@@ -71,7 +71,7 @@ class Plan:
         return f"{steps}" + (f", decoded frames {_gb(self.frames)}" if self.frames else "")
 
 
-def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
+def plan_memory(stored: StoredModel, job: Job, *, half: bool) -> MemoryUse:
     """What a run will take; ``half`` is whether the UNet computes in float16."""
     pixels = job.size[0] * job.size[1] // 64
     width = {part: stored.parts[part].config["block_out_channels"][0] for part in ("unet", "vae")}
@@ -85,10 +85,10 @@ def plan_memory(stored: Stored, job: Job, *, half: bool) -> Plan:
         "decoder": int(vae + alive * _DECODER * min(CHUNK, job.frames)),
     }
     frames = _RESULT * job.frames * job.size[0] * job.size[1] if "decoder" in job.steps else 0
-    return Plan({step: steps[step] for step in job.steps}, frames)
+    return MemoryUse({step: steps[step] for step in job.steps}, frames)
 
 
-def check_memory(stored: Stored, job: Job, free: Free, *, half: bool) -> None:
+def check_memory(stored: StoredModel, job: Job, free: Free, *, half: bool) -> None:
     """Refuse a run that does not fit, naming a size that does; with ``half`` the UNet computes in float16."""
     plan = plan_memory(stored, job, half=half)
     if plan.fits(free):

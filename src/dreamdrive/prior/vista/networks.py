@@ -14,14 +14,14 @@ from torch import Tensor, nn
 from transformers import CLIPVisionConfig, CLIPVisionModelWithProjection
 
 from dreamdrive.prior.vista.keys import Part
-from dreamdrive.prior.vista.kinds import VISTA, Kind
+from dreamdrive.prior.vista.kinds import VISTA, ModelKind
 
 _EPS = 1e-5
 """Of the residual blocks' normalisations in Stability's code; diffusers has 1e-6 in 72 of them."""
 
 
 class _Change:
-    """What a look at a clip adds to the embedding of each frame (B T, D), None where no frame is known.
+    """What a prediction for a clip adds to the embedding of each frame (B T, D), None where none is known.
 
     The hooks of the blocks must not hold the network: it would hold itself by them, and stay in memory after
     its last use.
@@ -50,7 +50,7 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         time_ids: Float[Tensor, "b 3"],
         fixed: Float[Tensor, " t"] | None = None,
     ) -> Float[Tensor, "b t c2 h w"]:
-        """One look at scaled noisy latents with the condition latents behind them.
+        """One prediction at scaled noisy latents with the condition latents behind them.
 
         ``time`` is 0.25 ln sigma, ``context`` the first frame and the action, ``time_ids`` are frame rate
         - 1, motion bucket and noise on the first frame, and ``fixed`` is one for frames that are known.
@@ -85,7 +85,7 @@ class VideoUNet(UNetSpatioTemporalConditionModel):
         return fixed[:, None] * change
 
 
-def make_empty(part: Part, config: Mapping[str, Any], kind: Kind) -> nn.Module:
+def make_empty(part: Part, config: Mapping[str, Any], kind: ModelKind) -> nn.Module:
     """A network of a model by the configuration of its class, whose weights take no memory yet."""
     known = {key: value for key, value in config.items() if not key.startswith("_")}
     with init_empty_weights():

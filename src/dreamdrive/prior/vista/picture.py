@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dreamdrive.data.intrinsics import Calibration, calibration
-from dreamdrive.data.lens import Lens, Undistorter
+from dreamdrive.data.cameras.intrinsics import Calibration, calibration
+from dreamdrive.data.cameras.lens import SourceLens, Undistorter
+from dreamdrive.data.frames.size import Sizing
 from dreamdrive.data.photo import leading_frames
-from dreamdrive.data.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -117,7 +117,7 @@ def read_leading(
     photos = [each.rgb for each in raw]
     if lens.distortion is not None:
         straight = Undistorter.create(
-            Lens(lens.distortion, lens.camera), lens.camera, Sizing(source, source, (0, 0), source)
+            SourceLens(lens.distortion, lens.camera), lens.camera, Sizing(source, source, (0, 0), source)
         )
         photos = [straight.apply(photo) for photo in photos]
         notes.append("The lens was taken out of the photo; where it then shows nothing, it is black.")

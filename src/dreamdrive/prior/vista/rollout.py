@@ -1,4 +1,4 @@
-"""Round after round: each starts from the last frames of the one before."""
+"""Rollouts: rounds of frames, each from the last ones of the round before."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,8 +6,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dreamdrive.prior.vista.engine import Engine, Images, Seen
-from dreamdrive.prior.vista.kinds import Kind
+from dreamdrive.prior.vista.engine import Engine, Images, RoundConditions
+from dreamdrive.prior.vista.kinds import ModelKind
 from dreamdrive.prior.vista.memory import CHUNK
 from dreamdrive.prior.vista.sampler import guidance, sample
 
@@ -17,7 +17,7 @@ SHARED = 3
 """Frames that two chunks of the decoder have in common."""
 
 
-def rounds_for(frames: int, kind: Kind, per_round: int) -> int:
+def rounds_for(frames: int, kind: ModelKind, per_round: int) -> int:
     """Rounds after which so many frames are there."""
     if frames <= per_round:
         return 1
@@ -26,7 +26,7 @@ def rounds_for(frames: int, kind: Kind, per_round: int) -> int:
 
 def roll_out(
     engine: Engine,
-    kind: Kind,
+    kind: ModelKind,
     leading: Images,
     noise: Float[Tensor, "r t c y x"],
     actions: Sequence[Float[Tensor, " a"] | None],
@@ -44,7 +44,7 @@ def roll_out(
     rounds, count = noise.shape[:2]
     coded = engine.encode(leading)
     shown = coded[0] if first is None else engine.encode(first)[0]
-    seen = Seen(engine.describe(leading[:1]), shown, actions[0])
+    seen = RoundConditions(engine.describe(leading[:1]), shown, actions[0])
     known = SCALE * coded[: kind.overlap]
     several = "constant" if rounds == 1 else "triangle"
     scale = guidance("linear" if kind.overlap == 0 else several, count)
@@ -53,7 +53,9 @@ def roll_out(
         if made is not None:
             tail = decode_in_chunks(engine.decode, made[-CHUNK:] / SCALE)
             known = made[-kind.overlap :]
-            seen = Seen(engine.describe(tail[-kind.overlap][None]), known[0] / SCALE, actions[number])
+            seen = RoundConditions(
+                engine.describe(tail[-kind.overlap][None]), known[0] / SCALE, actions[number]
+            )
         mask, clean = noise.new_zeros(count), torch.zeros_like(noise[number])
         mask[: len(known)], clean[: len(known)] = 1, known
         velocity = engine.velocity(seen)

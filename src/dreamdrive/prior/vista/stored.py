@@ -15,7 +15,7 @@ from dreamdrive.files.tensor_file import DAMAGE, briefly, header_problem
 from dreamdrive.models import check_sizes, in_words, misfits, some
 from dreamdrive.prior.vista.configs import Shapes, config_of
 from dreamdrive.prior.vista.keys import PARTS, Part, Recipes, recipes_of
-from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, Kind
+from dreamdrive.prior.vista.kinds import ACTION_COLUMNS, KINDS, SVD, VISTA, ModelKind
 from dreamdrive.prior.vista.networks import make_empty
 
 EXPECTED = (
@@ -66,16 +66,16 @@ class StoredPart:
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredModel:
     """A video model on disk, checked by names and shapes; ``ignored`` keys are left out on purpose."""
 
     path: Path
-    kind: Kind
+    kind: ModelKind
     parts: Mapping[Part, StoredPart]
     ignored: tuple[str, ...] = ()
 
 
-def open_weights(path: Path, wanted: Kind | None = None) -> Stored:
+def open_weights(path: Path, wanted: ModelKind | None = None) -> StoredModel:
     """Look at weights (see ``EXPECTED``) without reading them, and refuse all that is not ``wanted``.
 
     Files may be damaged, tensors missing, unknown or of another shape, or it may be the other model.
@@ -134,17 +134,17 @@ def open_tensors(path: Path) -> tuple[Shapes, Callable[[str], Tensor]]:
     return shapes, read
 
 
-def _open_file(path: Path) -> Stored:
+def _open_file(path: Path) -> StoredModel:
     shapes, read = open_tensors(path)
     recipes = recipes_of(shapes)
     if recipes.unknown:
         raise InputError(f"{path} holds unknown tensors: {some(recipes.unknown)}; expected {EXPECTED}")
     kind = _kind_of(path, recipes)
     parts: dict[Part, StoredPart] = {part: _part(path, part, recipes, shapes, read) for part in PARTS}
-    return Stored(path, kind, parts, tuple(recipes.ignored))
+    return StoredModel(path, kind, parts, tuple(recipes.ignored))
 
 
-def _kind_of(path: Path, recipes: Recipes) -> Kind:
+def _kind_of(path: Path, recipes: Recipes) -> ModelKind:
     """Vista has action adapters and a second time embedding, SVD has neither."""
     second = any(name.startswith(_SECOND_TIME) for name in recipes.parts["unet"])
     if second != bool(recipes.actions):
@@ -173,13 +173,13 @@ def _part(
     return StoredPart(config, own, lambda name: chosen[name].make(read))
 
 
-def _open_folder(path: Path) -> Stored:
+def _open_folder(path: Path) -> StoredModel:
     parts: dict[Part, StoredPart] = {part: _folder_part(path, part) for part in PARTS}
     second = any(name.startswith(_SECOND_TIME) for name in parts["unet"].shapes)
     kind = VISTA if second else SVD
     if (path / NOTE).is_file():
         kind = KINDS.get(str(read_json(path / NOTE, "--weights").get("kind")), kind)
-    return Stored(path, kind, parts)
+    return StoredModel(path, kind, parts)
 
 
 def _folder_part(path: Path, part: Part) -> StoredPart:
@@ -193,7 +193,7 @@ def _folder_part(path: Path, part: Part) -> StoredPart:
     return StoredPart(read_json(config, "--weights"), shapes, read)
 
 
-def _check(stored: Stored, part: Part) -> None:
+def _check(stored: StoredModel, part: Part) -> None:
     """Whether the tensors are those of the network, by name and shape."""
     own = stored.parts[part]
     if lacking := [name for name in _NEEDED[part] if name not in own.config]:
@@ -212,7 +212,7 @@ def _check(stored: Stored, part: Part) -> None:
         )
 
 
-def _check_config(stored: Stored, part: Part) -> None:
+def _check_config(stored: StoredModel, part: Part) -> None:
     """Whether the sizes in a configuration are those of the tensors, before a network is built of them."""
     own = stored.parts[part]
     where = f"{stored.path}: config.json of the {TITLES[part]}"
@@ -236,7 +236,7 @@ def _blamed(part: Part, groups: dict[str, list[str]]) -> str:
     return TITLES[part] if whole else "set of action adapters"
 
 
-def notes_of(stored: Stored) -> list[str]:
+def notes_of(stored: StoredModel) -> list[str]:
     """What has to be said of a model's encoders, a sentence each: nothing where one does the work of both."""
     if stored.path.is_dir():
         note = stored.path / NOTE

@@ -6,37 +6,37 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from dreamdrive.geometry import GeometryOptions, reconstruct
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, KnownCameras, align
+from dreamdrive.geometry.backends.dust3r.network.images import resize_crop
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive.geometry.measured import Measured
+from dreamdrive.geometry.resize import ResizeCrop
+from dreamdrive.scene.clip import Clip, Known as KnownOfClip
+from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.street.truth import DriveTruth
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps
+from streetworld import make_street
 from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes
 from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
 from tests.streets import street_clip
 
-from dreamdrive.geometry import GeometryOptions, reconstruct
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
-from dreamdrive.geometry.backends.dust3r.network.images import fitting
-from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from dreamdrive.geometry.fitting import Fitting
-from dreamdrive.geometry.measured import Measured
-from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.clip import Known as KnownOfClip
-from dreamdrive.scene.geometry import Geometry
-from dreamdrive.world import Drive, make_street
-from geometry.simulated_pairs import Noise, Truth, pair_maps
-
 MODULE = import_module("dreamdrive.geometry.backends.dust3r.reconstruct")
 FRAMES, SIZE, LONG_SIDE = 5, (160, 120), 128
 CUT = 10  # rows cut off below, so that the principal point is not in the middle
-HOW = fitting(160, 110, LONG_SIDE)  # 128x88, of which 128x80 are left
+HOW = resize_crop(160, 110, LONG_SIDE)  # 128x88, of which 128x80 are left
 EXACT = Noise(0, 1 / 8, 0, 0, 0)
 
 
 @pytest.fixture(scope="module")
-def street() -> Drive:
+def street() -> DriveTruth:
     return make_street(5, FRAMES, 5.0, SIZE, movers=0)
 
 
 @pytest.fixture(scope="module")
-def clip(street: Drive) -> Clip:
+def clip(street: DriveTruth) -> Clip:
     """The upper 110 rows of the frames, and their pinhole."""
     whole = street_clip(street)
     return replace(
@@ -54,7 +54,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return save_pth(tmp_path_factory.mktemp("weights") / "tiny.pth", tiny(), img_size=(LONG_SIDE, LONG_SIDE))
 
 
-def pictured(street: Drive, clip: Clip, how: Fitting) -> Truth:
+def pictured(street: DriveTruth, clip: Clip, how: ResizeCrop) -> Truth:
     """The street at the pixels of the pictures, which the network counts from 0."""
     camera, (width, height) = how.picture_camera(clip.rig[0]), how.size
     assert camera.fx_px == pytest.approx(camera.fy_px)
@@ -95,7 +95,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, clip: Clip, weights: Path) -> Meas
     return handed.value.args[0]
 
 
-def off(found: Measured, street: Drive) -> tuple[float, np.ndarray]:
+def off(found: Measured, street: DriveTruth) -> tuple[float, np.ndarray]:
     """The unit of what was measured, and how far its depth on the road is off, relative."""
     true = street.trajectory.world_from_camera
     unit = np.linalg.norm(true[-1, :3, 3]) / np.linalg.norm(found.world_from_camera[-1, :3, 3])
@@ -106,7 +106,7 @@ def off(found: Measured, street: Drive) -> tuple[float, np.ndarray]:
 
 
 def test_known_pinholes_poses_and_depth_are_the_truth(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     """A pixel of the network amounts to 1 to 3 % of depth on the road: an offset of half of one shows."""
     knowing(monkeypatch, pictured(street, clip, HOW))
@@ -126,7 +126,7 @@ def test_known_pinholes_poses_and_depth_are_the_truth(
 
 @pytest.mark.slow
 def test_the_wrong_pinhole_would_show(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     truth = pictured(street, clip, HOW)
     knowing(monkeypatch, replace(truth, principal_px=None))
@@ -135,7 +135,7 @@ def test_the_wrong_pinhole_would_show(
 
 
 def test_without_a_calibration_the_principal_point_is_where_the_network_has_it(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     truth = replace(pictured(street, clip, HOW), principal_px=None)
     knowing(monkeypatch, truth)
@@ -148,7 +148,7 @@ def test_without_a_calibration_the_principal_point_is_where_the_network_has_it(
 
 @pytest.mark.slow
 def test_what_the_network_says_of_the_sky_does_not_count(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     def sure(maps: PairMaps) -> PairMaps:
         return replace(
@@ -167,7 +167,7 @@ def test_what_the_network_says_of_the_sky_does_not_count(
 
 
 def test_held_out_frames_are_posed_and_give_no_depth(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     knowing(monkeypatch, pictured(street, clip, HOW))
     held = np.arange(FRAMES) == 2
@@ -179,7 +179,7 @@ def test_held_out_frames_are_posed_and_give_no_depth(
 
 
 def test_known_poses_give_depth_their_unit(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     knowing(monkeypatch, pictured(street, clip, HOW))
     poses = street.trajectory.world_from_camera
@@ -193,7 +193,7 @@ def test_known_poses_give_depth_their_unit(
 
 
 def test_a_standing_camera_needs_no_unit_of_its_poses(
-    monkeypatch: pytest.MonkeyPatch, street: Drive, clip: Clip, weights: Path
+    monkeypatch: pytest.MonkeyPatch, street: DriveTruth, clip: Clip, weights: Path
 ) -> None:
     still = np.zeros(FRAMES, int)
     noise = np.random.default_rng(0).integers(-4, 5, clip.frames.shape)
@@ -213,7 +213,7 @@ def test_a_standing_camera_needs_no_unit_of_its_poses(
     assert np.median(found.depth_m[both] / street.depth_m[still, :-CUT][both]) == pytest.approx(1, abs=0.08)
 
 
-def test_cameras_are_solved_without_what_moves_and_its_depth_still_is(street: Drive, clip: Clip) -> None:
+def test_cameras_are_solved_without_what_moves_and_its_depth_still_is(street: DriveTruth, clip: Clip) -> None:
     """A thing that fills a part of all images and is sure to be elsewhere."""
     truth = pictured(street, clip, HOW)
     edges = np.array([(i, j) for i in range(FRAMES) for j in range(FRAMES) if i != j and abs(i - j) < 3])
@@ -229,7 +229,7 @@ def test_cameras_are_solved_without_what_moves_and_its_depth_still_is(street: Dr
     moving = PairMaps(edges, points, trust)
     still = MODULE._still(_in_frames(there), np.ones((FRAMES, *there.shape), bool), HOW)
     assert not still[:, there].any()
-    options, known = AlignOptions(samples_per_image=500), Known(pinholes(truth))
+    options, known = AlignOptions(samples_per_image=500), KnownCameras(pinholes(truth))
     without, withal = (align(moving, options, known, mask) for mask in (tuple(still), None))
     errors = [path_error(each.world_from_camera, truth.world_from_camera) for each in (without, withal)]
     for depth in without.depth:

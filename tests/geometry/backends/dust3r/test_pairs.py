@@ -1,12 +1,11 @@
 """Which frames are paired."""
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.golden.reading import values
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
+from tests.golden.reading import values
 
 
 def test_golden_pairs() -> None:

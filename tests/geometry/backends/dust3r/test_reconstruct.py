@@ -5,16 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.networks import tiny
-from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
-from tests.streets import street_clip
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions, reconstruct
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
-from dreamdrive.geometry.backends.dust3r.network.images import fitting
+from dreamdrive.geometry.backends.dust3r.network.images import resize_crop
 from dreamdrive.geometry.backends.dust3r.pairs import make_pairs, video_graph
 from dreamdrive.geometry.backends.dust3r.reconstruct import measured, planned_pairs
 from dreamdrive.geometry.evidence import observe
@@ -22,7 +19,10 @@ from dreamdrive.geometry.finish import finish
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.progress import Work
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.world import make_street
+from streetworld import make_street
+from tests.geometry.backends.dust3r.network.networks import tiny
+from tests.geometry.backends.dust3r.network.test_checkpoint import save_pth
+from tests.streets import street_clip
 
 FRAMES, SIZE = 6, (160, 96)
 MODULE = import_module("dreamdrive.geometry.backends.dust3r.reconstruct")
@@ -139,7 +139,7 @@ def aligned(**changes: object) -> Aligned:
 )
 def test_what_shows_the_focal_length_is_said(clip: Clip, changes: dict[str, object], said: str | None):
     alone, found = replace(clip, known=Known()), aligned(**changes)
-    seen = measured(alone, found, fitting(*SIZE, SIZE[0]))
+    seen = measured(alone, found, resize_crop(*SIZE, SIZE[0]))
     assert (seen.focal_observed, seen.focal_spread) == (found.focal_observed, found.focal_error)
     assert [said is not None and said in note for note in seen.notes] == ([] if said is None else [True])
 

@@ -5,24 +5,25 @@ from pathlib import Path
 
 import pytest
 import torch
-from tests.geometry.backends.feedforward.fakes import KINDS, Truth, install, save_weights
-from tests.streets import street_clip
 from torch import Tensor
 
-from dreamdrive.geometry.fitting import Fitting
+from dreamdrive.geometry.resize import ResizeCrop
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.world import Drive, make_street
+from dreamdrive.scene.street.truth import DriveTruth
+from streetworld import make_street
+from tests.geometry.backends.feedforward.fakes import KINDS, Truth, install, save_weights
+from tests.streets import street_clip
 
 FRAMES, SIZE = 8, (160, 96)
 
 
 @pytest.fixture(scope="session")
-def drive() -> Drive:
+def drive() -> DriveTruth:
     return make_street(5, FRAMES, 5.0, SIZE, movers=0)
 
 
 @pytest.fixture(scope="session")
-def clip(drive: Drive) -> Clip:
+def clip(drive: DriveTruth) -> Clip:
     return replace(street_clip(drive, 4), known=Known(), features={})
 
 
@@ -32,7 +33,7 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def truth(drive: Drive, shown: dict[Fitting, Tensor]) -> Truth:
+def truth(drive: DriveTruth, shown: dict[ResizeCrop, Tensor]) -> Truth:
     return Truth(drive, shown=shown)
 
 
@@ -46,6 +47,6 @@ def weights(kind: str, truth: Truth, tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.fixture(scope="session")
-def shown() -> dict[Fitting, Tensor]:
+def shown() -> dict[ResizeCrop, Tensor]:
     """Pictures of the street, made once."""
     return {}

@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 
 from dreamdrive.geometry.backends.feedforward.network import fit_patches, show, standardise
-from dreamdrive.geometry.fitting import Fitting
-from dreamdrive.world import Drive
+from dreamdrive.geometry.resize import ResizeCrop
+from dreamdrive.scene.street.truth import DriveTruth
 
 SKY_M = 400.0
 
@@ -36,10 +36,10 @@ class Truth:
         shown: The pictures of all frames.
     """
 
-    drive: Drive
+    drive: DriveTruth
     factors: list[float] = field(default_factory=lambda: [0.1])
     asked: list[dict[str, Any]] = field(default_factory=list)
-    shown: dict[Fitting, Tensor] = field(default_factory=dict)
+    shown: dict[ResizeCrop, Tensor] = field(default_factory=dict)
 
     def of(self, pictures: Tensor, *, standardised: bool = False, metric: bool = False, **asked: Any) -> Any:
         """Poses (N, 4, 4) from the first shown, pinholes, depth, points and confidence of (N, 3, H, W)."""

@@ -4,13 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.chunks import chunks, join
-from dreamdrive.geometry.backends.feedforward.network import Seen
+from dreamdrive.geometry.backends.feedforward.network import FeedforwardResult
 from dreamdrive.scene.camera import Camera
 
 CAMERA = Camera(30.0, 30.0, 16.0, 12.0, 32, 24)
@@ -29,7 +28,7 @@ def test_chunks_cover_the_clip_and_overlap(count: int, length: int, data: st.Dat
         assert before.stop - after.start >= overlap
 
 
-def scene(noise: float = 0.0) -> list[tuple[range, Seen]]:
+def scene(noise: float = 0.0) -> list[tuple[range, FeedforwardResult]]:
     """Three chunks of a camera that turns and rides before a hilly wall, each in its own world."""
     rng = np.random.default_rng(0)
     poses = np.tile(np.eye(4), (FRAMES, 1, 1))
@@ -46,13 +45,13 @@ def scene(noise: float = 0.0) -> list[tuple[range, Seen]]:
         seen = (scale * depth[own] * np.exp(rng.normal(0, noise, depth[own].shape))).astype(np.float32)
         seen[:, :4][rng.random((len(frames), 4, 32)) < 0.5] *= 3  # outliers: sky, say
         matrices = np.tile(CAMERA.matrix, (len(frames), 1, 1))
-        parts.append((frames, Seen(moved, matrices, seen, rng.random(seen.shape))))
+        parts.append((frames, FeedforwardResult(moved, matrices, seen, rng.random(seen.shape))))
     return parts
 
 
 @pytest.mark.parametrize(("noise", "tolerance"), [(0.0, 1e-3), (0.05, 0.02)])
 def test_outliers_and_noise_do_not_bend_the_path(noise: float, tolerance: float) -> None:
-    found = join(scene(noise), CAMERA, np.ones((FRAMES, 24, 32), bool))
+    found = join(scene(noise), CAMERA, np.ones((FRAMES, 24, 32), bool), np.arange(FRAMES))
     path = found.world_from_camera[:, :3, 3]
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     assert steps / steps.mean() == pytest.approx(1, abs=tolerance)
@@ -64,5 +63,5 @@ def test_outliers_and_noise_do_not_bend_the_path(noise: float, tolerance: float)
 def test_chunks_without_a_usable_pixel_in_common_are_refused() -> None:
     usable = np.ones((FRAMES, 24, 32), bool)
     usable[2:5] = False
-    with pytest.raises(InputError, match="frames 2 to 4: two chunks see nothing in common"):
-        join(scene(), CAMERA, usable)
+    with pytest.raises(InputError, match="frames 16 to 22: two chunks see nothing in common"):
+        join(scene(), CAMERA, usable, 10 + 3 * np.arange(FRAMES))

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.geometry.backends.feedforward.fakes import BACKEND, METRIC, Truth
 
 from dreamdrive.geometry import BACKENDS
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.measured import Measured
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.world import Drive
+from dreamdrive.scene.street.truth import DriveTruth
+from tests.geometry.backends.feedforward.fakes import BACKEND, METRIC, Truth
 
 
 def way_of(kind: str, **changes: int) -> FeedForward:
@@ -24,7 +24,7 @@ def measure(way: FeedForward, clip: Clip, weights: Path, seed: int = 0) -> Measu
     return way.measure(clip, clip.valid, weights, seed)
 
 
-def reprojected(found: Measured, drive: Drive, first: int, second: int) -> np.ndarray:
+def reprojected(found: Measured, drive: DriveTruth, first: int, second: int) -> np.ndarray:
     """Depth in the second frame by the first frame's, relative to what the second says there."""
     street = drive.depth_m[first] > 0
     local = (found.camera.rays() * found.depth[first][..., None])[street]
@@ -38,7 +38,7 @@ def reprojected(found: Measured, drive: Drive, first: int, second: int) -> np.nd
 
 
 def test_the_depth_of_a_frame_is_that_of_the_others(
-    kind: str, clip: Clip, drive: Drive, weights: Path
+    kind: str, clip: Clip, drive: DriveTruth, weights: Path
 ) -> None:
     clip = replace(clip, held_out=np.zeros(len(clip), bool))
     found = measure(way_of(kind), clip, weights)
@@ -50,7 +50,7 @@ def test_the_depth_of_a_frame_is_that_of_the_others(
 
 
 def test_path_and_depth_are_the_truth_in_some_unit(
-    kind: str, clip: Clip, drive: Drive, weights: Path, truth: Truth
+    kind: str, clip: Clip, drive: DriveTruth, weights: Path, truth: Truth
 ) -> None:
     found = measure(way_of(kind), clip, weights)
     factor = 1.0 if kind in METRIC else truth.factors[0]
@@ -82,7 +82,9 @@ def test_pixels_that_show_no_street_have_no_depth(kind: str, clip: Clip, weights
     assert (found.depth[1, :80] > 0).all()
 
 
-def test_known_intrinsics_are_kept(kind: str, clip: Clip, drive: Drive, weights: Path, truth: Truth) -> None:
+def test_known_intrinsics_are_kept(
+    kind: str, clip: Clip, drive: DriveTruth, weights: Path, truth: Truth
+) -> None:
     fx_px = 1.5 * clip.rig[0].fx_px
     camera = replace(clip.rig[0], fx_px=fx_px, fy_px=113.0, cx_px=79.0)
     known = replace(clip, rig=(camera,), known=Known(intrinsics=True))
@@ -101,7 +103,7 @@ def test_known_intrinsics_are_kept(kind: str, clip: Clip, drive: Drive, weights:
 
 @pytest.mark.parametrize("metric", [True, False])
 def test_known_poses_are_kept_and_give_the_depth_their_unit(
-    kind: str, clip: Clip, drive: Drive, weights: Path, truth: Truth, metric: bool
+    kind: str, clip: Clip, drive: DriveTruth, weights: Path, truth: Truth, metric: bool
 ) -> None:
     poses = drive.trajectory.world_from_camera.copy()
     poses[:, :3, 3] *= 0.3
@@ -120,7 +122,7 @@ def test_known_poses_are_kept_and_give_the_depth_their_unit(
 
 
 def test_chunks_of_different_units_become_one_world(
-    kind: str, clip: Clip, drive: Drive, weights: Path, truth: Truth
+    kind: str, clip: Clip, drive: DriveTruth, weights: Path, truth: Truth
 ) -> None:
     truth.factors[:] = [0.1, 0.35, 0.02]
     found = measure(way_of(kind, chunk=4, overlap=2), clip, weights)

@@ -24,7 +24,7 @@ def test_da3_small_goes_from_disk_to_poses_and_depth(tmp_path: Path) -> None:
     (tmp_path / "config.json").write_text('{"model_name": "da3-small"}')
     network = load_da3(tmp_path)
     with torch.inference_mode():
-        seen = network.look(Views(torch.rand(3, 3, 70, 126)))
+        seen = network.predict(Views(torch.rand(3, 3, 70, 126)))
     assert network.unit is None
     assert seen.depth.shape == seen.confidence.shape == (3, 70, 126)
     assert (seen.depth > 0).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.geometry.backends.feedforward.network import fit_patches, show, standardise
-from dreamdrive.geometry.fitting import in_frames
+from dreamdrive.geometry.resize import in_frames
 from dreamdrive.scene.camera import Camera
 
 

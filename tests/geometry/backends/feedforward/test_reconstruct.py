@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.feedforward.fakes import Truth
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import BACKENDS, GeometryOptions, reconstruct
 from dreamdrive.scene.clip import Clip, Known
-from dreamdrive.world import Drive
+from dreamdrive.scene.street.truth import DriveTruth
+from tests.geometry.backends.feedforward.fakes import Truth
 
 
 @pytest.mark.parametrize("kind", ["mapanything"])
-def test_a_metric_network_keeps_its_metre(kind: str, clip: Clip, drive: Drive, weights: Path) -> None:
+def test_a_metric_network_keeps_its_metre(kind: str, clip: Clip, drive: DriveTruth, weights: Path) -> None:
     found = reconstruct(clip, GeometryOptions(method=kind, weights=weights, camera_height_m=3.0))
     assert found.scale.source == "the metric network MapAnything"
     assert found.scale.spread == 0.15
@@ -24,7 +24,7 @@ def test_a_metric_network_keeps_its_metre(kind: str, clip: Clip, drive: Drive, w
 
 
 @pytest.mark.parametrize("kind", ["da3"])
-def test_another_gets_it_from_the_road(kind: str, clip: Clip, drive: Drive, weights: Path) -> None:
+def test_another_gets_it_from_the_road(kind: str, clip: Clip, drive: DriveTruth, weights: Path) -> None:
     found = reconstruct(clip, GeometryOptions(method=kind, weights=weights, camera_height_m=1.5))
     truth = drive.trajectory.world_from_camera[-1, :3, 3]
     error = found.cameras[-1].world_from_camera[:3, 3] - truth

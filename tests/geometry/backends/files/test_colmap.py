@@ -7,18 +7,18 @@ import numpy as np
 import pycolmap
 import pytest
 from hypothesis import given, settings
-from tests.geometry.backends.files import drives
 
-from dreamdrive.data.lens import Lens
+from dreamdrive.data.cameras.lens import SourceLens
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach, bent_model
 from dreamdrive.scene.camera import Camera
+from tests.geometry.backends.files import drives
 
 NAMES = [f"{i:04d}.jpg" for i in range(6)]
 TRUTH = np.array([drives.pose((0, 0.02 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(truth=drives.drives(3))
 def test_poses_survive_and_points_land_where_colmap_has_them(tmp_path_factory, truth):
     folder = tmp_path_factory.mktemp("colmap")
@@ -138,7 +138,7 @@ def test_a_bent_lens_needs_frames_without_it(tmp_path, model, numbers, bend):
     np.testing.assert_allclose(got.known.world_from_camera, drives.relative(TRUTH[:2]), atol=1e-9)
     # The same bend as COLMAP's own.
     ray = np.array([[0.2, -0.15, 1.0]])
-    bent = Lens.from_json(lens).distortion.distort(ray[:, :2])[0]
+    bent = SourceLens.from_json(lens).distortion.distort(ray[:, :2])[0]
     camera = pycolmap.Reconstruction(str(folder)).cameras[1]
     focal = (camera.focal_length_x, camera.focal_length_y)
     np.testing.assert_allclose(bent * focal + (77.25, 50.5), camera.img_from_cam(ray)[0], atol=1e-9)
@@ -158,13 +158,13 @@ def test_a_lens_of_another_kind_is_named(tmp_path):
 
 def test_a_pinhole_unlike_the_undistorted_frames_is_refused(tmp_path):
     drives.write_colmap_text(tmp_path / "model", TRUTH, NAMES)
-    lens = Lens(bent_lens(), Camera(40.0, 40.0, 20.0, 12.0, 40, 24)).to_json()
+    lens = SourceLens(bent_lens(), Camera(40.0, 40.0, 20.0, 12.0, 40, 24)).to_json()
     with pytest.raises(InputError, match="undistorted to one of 40"):
         attach(drives.make_clip(tmp_path / "clip", [0, 1], lens=lens), tmp_path / "model")
 
 
 def bent_lens():
-    from dreamdrive.data.distortion import Distortion
+    from dreamdrive.data.cameras.distortion import Distortion
 
     return Distortion("opencv", (-0.1, 0.0, 0.0, 0.0))
 

@@ -6,16 +6,16 @@ import struct
 import cv2
 import numpy as np
 import pytest
-from tests.geometry.backends.files import drives
 
-from dreamdrive.data.distortion import Distortion
-from dreamdrive.data.lens import Lens
+from dreamdrive.data.cameras.distortion import Distortion
+from dreamdrive.data.cameras.lens import SourceLens
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach
 from dreamdrive.geometry.backends.files.attach import OntoClip
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.geometry.backends.files.given import read_declared
 from dreamdrive.scene.camera import Camera
+from tests.geometry.backends.files import drives
 
 DEPTH = np.linspace(2, 50, 6 * 10, dtype=np.float32).reshape(6, 10)
 
@@ -54,7 +54,7 @@ def test_exr_is_read_by_its_package(tmp_path, channel):
 def test_exr_without_its_package_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "OpenEXR", None)
     (tmp_path / "a.exr").write_bytes(b"v/1\x01")
-    with pytest.raises(InputError, match=r"a.exr.*pip install 'dreamdrive\[exr\]'"):
+    with pytest.raises(InputError, match=r"a.exr.*pip install -e '\.\[exr\]'"):
         read_depth(tmp_path / "a.exr", None)
 
 
@@ -172,7 +172,7 @@ def test_each_pixel_gets_the_depth_under_its_centre():
 def test_depth_of_a_bent_picture_follows_the_lens():
     camera = Camera(32.5, 32.5, 19.0, 12.5, 40, 24)
     onto = OntoClip(
-        (40, 24), (160, 96), (40, 24), (0, 0), Lens(Distortion("opencv", (-0.2, 0, 0, 0)), camera)
+        (40, 24), (160, 96), (40, 24), (0, 0), SourceLens(Distortion("opencv", (-0.2, 0, 0, 0)), camera)
     )
     columns = np.tile(np.arange(160, dtype=np.float32) + 1, (96, 1))
     got = onto.depth(columns, True, "depth")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.geometry.backends.files import drives
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.formats import companions, recognise
@@ -13,6 +12,7 @@ from dreamdrive.geometry.backends.files.readers import (
     read_pose_list,
     read_transforms,
 )
+from tests.geometry.backends.files import drives
 
 POSE = np.eye(4).tolist()
 

@@ -2,18 +2,17 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.geometry.backends.files import drives
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach, bent_model, companions
+from tests.geometry.backends.files import drives
 
 NAMES = [f"images/{i:04d}.png" for i in range(6)]  # other endings than the clip's
 TRUTH = np.array([drives.pose((0, 0.02 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(truth=drives.drives(3))
 def test_points_land_where_opengl_axes_have_them(tmp_path_factory, truth):
     folder = tmp_path_factory.mktemp("nerfstudio")
@@ -114,7 +113,7 @@ def test_bad_files_are_refused(tmp_path, content, words):
     assert str(path) in str(caught.value)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     key=st.sampled_from(
         ["w", "h", "fl_x", "cx", "camera_model", "k1", "frames", "transform_matrix", "file_path"]

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from tests.geometry.backends.files import drives
 
 from dreamdrive.data import read_clip
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach
+from tests.geometry.backends.files import drives
 
 TRUTH = np.array([drives.pose((0.3, 0.05 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 ENTRY = {

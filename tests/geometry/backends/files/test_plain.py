@@ -7,8 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry import GeometryOptions, reconstruct
@@ -125,7 +124,7 @@ def test_bad_cameras_are_refused_with_a_reason(tmp_path, content, words):
     assert "cameras.json" in str(caught.value)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     key=st.sampled_from(["width", "height", "intrinsics", "world_from_camera", "frames"]),
     value=st.recursive(

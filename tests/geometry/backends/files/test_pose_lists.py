@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from tests.geometry.backends.files import drives
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files import attach, companions
+from tests.geometry.backends.files import drives
 
 TRUTH = np.array([drives.pose((0, 0.05 * i, 0), (0.1 * i, 0, 1.0 * i)) for i in range(6)])
 CALIBRATION = (
@@ -28,7 +28,7 @@ def tum(truth: np.ndarray, times: np.ndarray) -> str:
     return "\n".join(lines)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(truth=drives.drives(3))
 def test_poses_survive_both_formats(tmp_path_factory, truth):
     folder = tmp_path_factory.mktemp("lists")

@@ -4,6 +4,7 @@ Written from the architecture as published; the weights are a file that the user
 are for research only (CC BY-NC-SA 4.0, and the terms of the data they were trained with).
 """
 
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
 from dreamdrive.geometry.backends.dust3r.reconstruct import reconstruct
 from dreamdrive.geometry.protocol import GeometryBackend
 

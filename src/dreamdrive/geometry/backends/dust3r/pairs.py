@@ -1,4 +1,4 @@
-"""Which pairs of frames the network looks at, and what it says of them."""
+"""Pairs of frames for the network, and their pointmaps."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A clip through DUSt3R: pairs, pointmaps, alignment."""
+"""Reconstruction of a clip with DUSt3R: pairs, pointmaps, alignment."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,32 +6,32 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align import (
     Aligned,
     AlignOptions,
-    Known,
+    KnownCameras,
     align,
     check_memory,
 )
 from dreamdrive.geometry.backends.dust3r.network import (
     BUDGET_BYTES,
     Dust3r,
-    fitting,
     infer,
     load_dust3r,
     plan_memory,
+    resize_crop,
 )
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs, video_graph
 from dreamdrive.geometry.cameras import stands
 from dreamdrive.geometry.depth import above_horizon, sky_mask
 from dreamdrive.geometry.evidence import Evidence, free_pixels
 from dreamdrive.geometry.finish import begin, finish
-from dreamdrive.geometry.fitting import Fitting, in_frames, prepare, prepare_mask
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.moving import FLAGGED
 from dreamdrive.geometry.options import GeometryOptions
+from dreamdrive.geometry.resize import ResizeCrop, in_frames, prepare, prepare_mask
 from dreamdrive.progress import Progress, Work
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -67,11 +67,11 @@ def reconstruct(clip: Clip, options: GeometryOptions, *, seed: int = 0, work: Wo
     return first if still is None else found(tuple(still))
 
 
-def _seen(clip: Clip, weights: Path, progress: Progress) -> tuple[PairMaps, Fitting]:
+def _seen(clip: Clip, weights: Path, progress: Progress) -> tuple[PairMaps, ResizeCrop]:
     """What the network says of pairs of frames; it is gone from memory afterwards."""
     device = chosen_device()
     network = load_dust3r(weights, bfloat16=device.type == "cuda").to(device)
-    how = fitting(*clip.size, network.config.image_size)
+    how = resize_crop(*clip.size, network.config.image_size)
     pictures = [prepare(frame, how) for frame in clip.frames]
     return infer(network, pictures, planned_pairs(network, len(clip), how.size), progress=progress), how
 
@@ -96,7 +96,7 @@ def planned_pairs(network: Dust3r, frames: int, size: tuple[int, int]) -> Int[np
     raise refused
 
 
-def measured(clip: Clip, aligned: Aligned, how: Fitting) -> Measured:
+def measured(clip: Clip, aligned: Aligned, how: ResizeCrop) -> Measured:
     """The alignment in pixels of the clip; confidence becomes the share of pixels that are trusted less."""
     width, height = how.size
     focal_px = float(np.median(aligned.focals_px))
@@ -146,14 +146,14 @@ def _focal_notes(clip: Clip, aligned: Aligned) -> list[str]:
     return [f"the turns of the camera show a focal length {abs(off):.1%} {word} than the network's"]
 
 
-def _usable(clip: Clip, evidence: Evidence, how: Fitting) -> Bool[np.ndarray, "n h w"]:
+def _usable(clip: Clip, evidence: Evidence, how: ResizeCrop) -> Bool[np.ndarray, "n h w"]:
     """Pixels of the pictures that show the street, and not the sky."""
     free = free_pixels(clip, evidence)
     return np.stack([prepare_mask(one & ~_sky(clip, k, one), how) for k, one in enumerate(free)])
 
 
 def _still(
-    moving: Float[np.ndarray, "n _ _"], usable: Bool[np.ndarray, "n h w"], how: Fitting
+    moving: Float[np.ndarray, "n _ _"], usable: Bool[np.ndarray, "n h w"], how: ResizeCrop
 ) -> Bool[np.ndarray, "n h w"] | None:
     """Usable pixels of the pictures without what was found to move; None where next to nothing does.
 
@@ -175,10 +175,10 @@ def _sky(clip: Clip, frame: int, free: Bool[np.ndarray, "h w"]) -> Bool[np.ndarr
     return sky_mask(clip.frames[frame], above_horizon(clip.rig[0].at(np.eye(4)), None), free)
 
 
-def _known(clip: Clip, how: Fitting) -> Known:
+def _known(clip: Clip, how: ResizeCrop) -> KnownCameras:
     intrinsics = None
     if clip.known.intrinsics:
         matrix = how.picture_camera(clip.rig[0]).matrix.copy()
         matrix[:2, 2] -= 0.5  # the alignment counts pixels from 0
         intrinsics = np.tile(matrix, (len(clip), 1, 1))
-    return Known(intrinsics, clip.known.world_from_camera)
+    return KnownCameras(intrinsics, clip.known.world_from_camera)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.feedforward.network import Seen
+from dreamdrive.geometry.backends.feedforward.network import FeedforwardResult
 from dreamdrive.geometry.measured import ranks, weighted_median
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.similarity import Similarity, nearest_rotation
@@ -37,15 +37,20 @@ def chunks(count: int, length: int, overlap: int) -> list[range]:
     return [range(start, start + length) for start in starts]
 
 
-def join(parts: Sequence[tuple[range, Seen]], camera: Camera, usable: Bool[np.ndarray, "f h w"]) -> Joined:
+def join(
+    parts: Sequence[tuple[range, FeedforwardResult]],
+    camera: Camera,
+    usable: Bool[np.ndarray, "f h w"],
+    source_index: Int[np.ndarray, " f"],
+) -> Joined:
     """Bring each chunk onto the one before by the frames they share.
 
     Where two chunks overlap, a frame is taken from the one whose edge is further away. Of the pictures are
-    the camera and the usable pixels.
+    the camera, the usable pixels and the numbers in the source.
     """
     similarities, misses = [Similarity(1.0, np.eye(3), np.zeros(3))], []
     for before, after in pairwise(parts):
-        step, miss = _onto(before, after, camera, usable)
+        step, miss = _onto(before, after, camera, usable, source_index)
         last = similarities[-1]
         similarities.append(
             Similarity(last.scale * step.scale, last.rotation @ step.rotation, last(step.translation))
@@ -77,7 +82,11 @@ def _middle(before: range, after: range) -> int:
 
 
 def _onto(
-    before: tuple[range, Seen], after: tuple[range, Seen], camera: Camera, usable: Bool[np.ndarray, "f h w"]
+    before: tuple[range, FeedforwardResult],
+    after: tuple[range, FeedforwardResult],
+    camera: Camera,
+    usable: Bool[np.ndarray, "f h w"],
+    source_index: Int[np.ndarray, " f"],
 ) -> tuple[Similarity, float]:
     """The similarity from the world of a chunk to that of the one before, and how far it misses.
 
@@ -92,9 +101,8 @@ def _onto(
     weights, stride = target_rank * source_rank, _stride(camera)
     counts = (weights > 0) & usable[shared.start : shared.stop, ::stride, ::stride]
     if not counts.any():
-        raise InputError(
-            f"frames {shared.start} to {shared.stop - 1}: two chunks see nothing in common there"
-        )
+        first, last = source_index[[shared.start, shared.stop - 1]]
+        raise InputError(f"frames {first} to {last}: two chunks see nothing in common there")
     ratio = np.log(target_depth[counts] / source_depth[counts])
     scale = float(np.exp(weighted_median(ratio, weights[counts])))
     turns = target[:, :3, :3] @ np.swapaxes(source[:, :3, :3], 1, 2)
@@ -107,7 +115,7 @@ def _onto(
 
 
 def _part(
-    part: tuple[range, Seen], shared: range, camera: Camera
+    part: tuple[range, FeedforwardResult], shared: range, camera: Camera
 ) -> tuple[Float[np.ndarray, "n 4 4"], Float[np.ndarray, "n h w"], Float[np.ndarray, "n h w"]]:
     """Poses of the shared frames, some of their depth, and the share of it trusted less; 0 without depth."""
     frames, seen = part

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from torch import nn
 
-from dreamdrive.device import chosen_device
-from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.errors import PIP, InputError
+from dreamdrive.geometry.backends.feedforward.load import StoredWeights, build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import (
     METRE_SPREAD,
+    FeedforwardResult,
     Network,
-    Seen,
     Views,
     standardise,
     world_from_camera,
@@ -30,7 +30,7 @@ EXPECTED = (
     "depth-anything/DA3-BASE"
 )
 INSTALL = (
-    "pip install --no-deps depth-anything-3==0.1.1, then pip install addict einops omegaconf "
+    f"{PIP} --no-deps depth-anything-3==0.1.1, then {PIP} addict einops omegaconf "
     "(without --no-deps it replaces numpy and torch)"
 )
 _METRIC = ("da3nested-giant-large",)
@@ -47,11 +47,11 @@ def load_da3(path: Path) -> Network:
     state = stored.keep("model.", tuple(f"{part}{each}." for part in ("", "da3.") for each in _GAUSSIANS))
     network = build(lambda: _make(config, name), stored, state)
     if name not in _METRIC:
-        return Network(partial(_look, network))
-    return Network(partial(_look, network), f"the metric network {name}", METRE_SPREAD)
+        return Network(partial(_predict, network))
+    return Network(partial(_predict, network), f"the metric network {name}", METRE_SPREAD)
 
 
-def _model_name(stored: Stored) -> str:
+def _model_name(stored: StoredWeights) -> str:
     name = str(stored.config.get("model_name"))
     if name in _ONE_PICTURE:
         raise InputError(
@@ -75,9 +75,9 @@ def _make(config: Any, name: str) -> nn.Module:
     return config.create_object(described)
 
 
-def _look(network: nn.Module, views: Views) -> Seen:
+def _predict(network: nn.Module, views: Views) -> FeedforwardResult:
     out = network(standardise(views.pictures).to(chosen_device())[None])
-    return Seen(
+    return FeedforwardResult(
         world_from_camera=world_from_camera(out["extrinsics"][0]),
         intrinsics=out["intrinsics"][0].cpu().numpy().astype(np.float64),
         depth=out["depth"][0].cpu().numpy(),

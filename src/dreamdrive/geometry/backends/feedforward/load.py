@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from torch import Tensor, nn
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
 from dreamdrive.models import as_state, check_sizes, fill, read_state, read_torch
@@ -19,7 +19,7 @@ _NAMES = ("model.safetensors", "model.pt", "model.pth")
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredWeights:
     """Weights as they lie on disk, with what ``config.json`` beside them says, if it is there.
 
     In messages ``source`` is where they come from, and ``expected`` which are expected.
@@ -36,7 +36,7 @@ class Stored:
         return {key: value for key, value in state.items() if not key.startswith(without or ("\0",))}
 
 
-def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Stored:
+def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> StoredWeights:
     """Read weights from a ``.safetensors``, ``.pt`` or ``.pth``, or a folder with ``model`` of that ending.
 
     Nothing in them is executed, nothing is fetched. ``config.json`` may lie beside them, or has to.
@@ -52,7 +52,7 @@ def read_stored(path: Path, expected: str, *, needs_config: bool = False) -> Sto
         raise InputError(f"{beside} does not exist; expected {expected}")
     config = read_json(beside, "--weights") if beside.is_file() else {}
     check_sizes(config, f"--weights {beside}")
-    return Stored(_read_state(file, expected), config, str(file), expected)
+    return StoredWeights(_read_state(file, expected), config, str(file), expected)
 
 
 def _read_state(file: Path, expected: str) -> dict[str, Tensor]:
@@ -73,7 +73,7 @@ def upstream(module: str, install: str) -> Any:
         raise InputError(f"{module} cannot be imported ({error}): {install}") from None
 
 
-def build(make: Callable[[], Upstream], stored: Stored, state: dict[str, Tensor]) -> Upstream:
+def build(make: Callable[[], Upstream], stored: StoredWeights, state: dict[str, Tensor]) -> Upstream:
     """Build a network and fill it with weights by its own keys, on the GPU where torch has one."""
     try:
         with warnings.catch_warnings():

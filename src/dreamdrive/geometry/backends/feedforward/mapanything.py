@@ -13,13 +13,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from dreamdrive.device import chosen_device
-from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.feedforward.load import Stored, build, read_stored, upstream
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.errors import PIP, InputError
+from dreamdrive.geometry.backends.feedforward.load import StoredWeights, build, read_stored, upstream
 from dreamdrive.geometry.backends.feedforward.network import (
     METRE_SPREAD,
+    FeedforwardResult,
     Network,
-    Seen,
     Views,
     nearest_rigid,
     standardise,
@@ -32,7 +32,7 @@ EXPECTED = (
     "facebook/map-anything-apache"
 )
 INSTALL = (
-    "pip install --no-deps git+https://github.com/facebookresearch/map-anything uniception==0.1.7, then what "
+    f"{PIP} --no-deps git+https://github.com/facebookresearch/map-anything uniception==0.1.7, then what "
     "its imports ask for; and git clone https://github.com/facebookresearch/dinov2 to torch hub's folder"
 )
 _NORMALISED = "dinov2"
@@ -47,10 +47,10 @@ def load_mapanything(path: Path) -> Network:
     network = build(lambda: model.MapAnything(**settings), stored, stored.state)
     if network.encoder.data_norm_type != _NORMALISED:
         raise InputError(f"{stored.source} takes pictures standardised for {network.encoder.data_norm_type}")
-    return Network(partial(_look, network), "the metric network MapAnything", METRE_SPREAD)
+    return Network(partial(_predict, network), "the metric network MapAnything", METRE_SPREAD)
 
 
-def _settings(stored: Stored) -> dict[str, Any]:
+def _settings(stored: StoredWeights) -> dict[str, Any]:
     """Arguments of the network, changed so that building it fetches nothing."""
     encoder = stored.config.get("encoder_config")
     if not isinstance(encoder, dict):
@@ -67,7 +67,7 @@ def _settings(stored: Stored) -> dict[str, Any]:
     return {**stored.config, "encoder_config": encoder, "torch_hub_force_reload": False}
 
 
-def _look(network: Any, views: Views) -> Seen:
+def _predict(network: Any, views: Views) -> FeedforwardResult:
     out = network.infer(_shown(views), use_amp=False, memory_efficient_inference=True, minibatch_size=1)
 
     def all_of(name: str) -> Tensor:
@@ -76,7 +76,7 @@ def _look(network: Any, views: Views) -> Seen:
     intrinsics = all_of("intrinsics").numpy().astype(np.float64)
     # It counts pixels from 0.
     intrinsics[:, :2, 2] += 0.5
-    return Seen(
+    return FeedforwardResult(
         world_from_camera=nearest_rigid(all_of("camera_poses")),
         intrinsics=intrinsics,
         # Masked pixels are 0 already.

@@ -1,4 +1,4 @@
-"""What a network that sees many frames at once takes and gives, whoever made it."""
+"""Input and output of a network that sees many frames at once, whoever made it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.fitting import Fitting, prepare
+from dreamdrive.geometry.resize import ResizeCrop, prepare
 from dreamdrive.scene.camera import Camera
 
 METRE_SPREAD = 0.15
@@ -31,7 +31,7 @@ class Views:
 
 
 @dataclass(frozen=True)
-class Seen:
+class FeedforwardResult:
     """What it sees in them, in a world and a unit of its own."""
 
     world_from_camera: Float[np.ndarray, "n 4 4"]  # rigid; x right, y down, z forward
@@ -44,12 +44,12 @@ class Seen:
 class Network:
     """A network with its weights."""
 
-    look: Callable[[Views], Seen]
+    predict: Callable[[Views], FeedforwardResult]
     unit: str | None = None  # what says that it is the metre, in words
     unit_spread: float = 0.0  # how far that metre may be off, as a fraction
 
 
-def fit_patches(width_px: int, height_px: int, long_side_px: int) -> Fitting:
+def fit_patches(width_px: int, height_px: int, long_side_px: int) -> ResizeCrop:
     """How frames are resized to whole patches: a little stretched, nothing cut off.
 
     The long side, a multiple of 14, is given; the other takes the nearest multiple.
@@ -59,10 +59,10 @@ def fit_patches(width_px: int, height_px: int, long_side_px: int) -> Fitting:
         max(_PATCH_PX, round(side * long_side_px / longest / _PATCH_PX) * _PATCH_PX)
         for side in (width_px, height_px)
     )
-    return Fitting((width_px, height_px), (width, height), 0, 0, (width, height), longest > long_side_px)
+    return ResizeCrop((width_px, height_px), (width, height), 0, 0, (width, height), longest > long_side_px)
 
 
-def show(frames: UInt8[np.ndarray, "n h w 3"], how: Fitting) -> Float[Tensor, "n 3 u v"]:
+def show(frames: UInt8[np.ndarray, "n h w 3"], how: ResizeCrop) -> Float[Tensor, "n 3 u v"]:
     """The pictures, in [0, 1], of frames."""
     pictures = np.stack([prepare(frame, how) for frame in frames])
     return torch.from_numpy(pictures).permute(0, 3, 1, 2).float().div(255)

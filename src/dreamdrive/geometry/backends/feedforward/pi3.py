@@ -12,16 +12,23 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.errors import PIP
 from dreamdrive.geometry.backends.dust3r.align import robust_px
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import METRE_SPREAD, Network, Seen, Views, nearest_rigid
+from dreamdrive.geometry.backends.feedforward.network import (
+    METRE_SPREAD,
+    FeedforwardResult,
+    Network,
+    Views,
+    nearest_rigid,
+)
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 from dreamdrive.scene.camera import Camera
 
 EXPECTED = "model.safetensors of Pi3 or Pi3X or its folder, such as yyfz233/Pi3X"
-INSTALL = "git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; pip install huggingface_hub"
+INSTALL = f"git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH; {PIP} huggingface_hub"
 
 
 def load_pi3(path: Path) -> Network:
@@ -30,22 +37,22 @@ def load_pi3(path: Path) -> Network:
     if "metric_token" in stored.state:
         model = upstream("pi3.models.pi3x", INSTALL)
         network = build(lambda: model.Pi3X(use_multimodal=True), stored, stored.state)
-        look = partial(_look, network, True)
-        return Network(look, "the network Pi3X, metric approximately", 2 * METRE_SPREAD)
+        predict = partial(_predict, network, True)
+        return Network(predict, "the network Pi3X, metric approximately", 2 * METRE_SPREAD)
     model = upstream("pi3.models.pi3", INSTALL)
     sizes = {name: stored.config[name] for name in ("pos_type", "decoder_size") if name in stored.config}
     network = build(lambda: model.Pi3(**sizes), stored, stored.state)
-    return Network(partial(_look, network, False))
+    return Network(partial(_predict, network, False))
 
 
-def _look(network: nn.Module, conditioned: bool, views: Views) -> Seen:
+def _predict(network: nn.Module, conditioned: bool, views: Views) -> FeedforwardResult:
     pictures = views.pictures.to(chosen_device())[None]
     out = network(pictures, **_conditions(views)) if conditioned else network(pictures)
     known = views.camera if conditioned else None
     points = out["local_points"][0].cpu().numpy()
     # The logit itself would do for ranks; the focal length asks for odds above one.
     odds = (1 + out["conf"][0, ..., 0].double().exp()).cpu().numpy()
-    return Seen(
+    return FeedforwardResult(
         world_from_camera=nearest_rigid(out["camera_poses"][0]),
         intrinsics=np.stack([_pinhole(*each, known) for each in zip(points, odds, strict=True)]),
         depth=points[..., 2],

@@ -1,4 +1,4 @@
-"""A clip through a network that sees many frames at once."""
+"""Reconstruction of a clip with a network that sees many frames at once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,13 +10,19 @@ from jaxtyping import Bool, Float
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.feedforward.chunks import Joined, chunks, join
-from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views, fit_patches, show
+from dreamdrive.geometry.backends.feedforward.network import (
+    FeedforwardResult,
+    Network,
+    Views,
+    fit_patches,
+    show,
+)
 from dreamdrive.geometry.cameras import unit_in
 from dreamdrive.geometry.evidence import free_pixels
 from dreamdrive.geometry.finish import begin, finish
-from dreamdrive.geometry.fitting import Fitting, in_frames, prepare_mask
 from dreamdrive.geometry.measured import Measured, trusted
 from dreamdrive.geometry.options import GeometryOptions
+from dreamdrive.geometry.resize import ResizeCrop, in_frames, prepare_mask
 from dreamdrive.progress import Progress, Work, silent
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
@@ -74,7 +80,7 @@ class FeedForward:
         with torch.random.fork_rng(range(torch.cuda.device_count())):
             torch.manual_seed(seed)
             network = self.load(weights)
-            parts: list[tuple[range, Seen]] = []
+            parts: list[tuple[range, FeedforwardResult]] = []
             cut = chunks(len(clip), self.chunk, self.overlap)
             for frames in cut:
                 parts.append((frames, _see(network, clip, frames, how)))
@@ -82,7 +88,7 @@ class FeedForward:
         own, spread = share(np.concatenate([seen.intrinsics for _, seen in parts]), how)
         camera = clip.rig[0] if clip.known.intrinsics else own
         usable = np.stack([prepare_mask(one, how) for one in free])
-        joined = join(parts, how.picture_camera(camera), usable)
+        joined = join(parts, how.picture_camera(camera), usable, clip.source_index)
         return _measured(clip, joined, camera, (own.fx_px, spread), free, how, network)
 
 
@@ -92,7 +98,7 @@ def _measured(
     camera: Camera,
     focal: tuple[float, float],
     free: Bool[np.ndarray, "f h w"],
-    how: Fitting,
+    how: ResizeCrop,
     network: Network,
 ) -> Measured:
     """What was seen, in pixels of the clip; confidence becomes the share of pixels that are trusted less.
@@ -132,7 +138,7 @@ def _measured(
     )
 
 
-def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
+def _see(network: Network, clip: Clip, frames: range, how: ResizeCrop) -> FeedforwardResult:
     """One chunk through the network."""
     own = slice(frames.start, frames.stop)
     poses = clip.known.world_from_camera
@@ -143,13 +149,13 @@ def _see(network: Network, clip: Clip, frames: range, how: Fitting) -> Seen:
         clip.known.metric,
     )
     with torch.inference_mode():
-        seen = network.look(views)
+        seen = network.predict(views)
     depth = np.where(np.isfinite(seen.depth) & (seen.depth > 0), seen.depth, 0).astype(np.float32)
     seen = replace(seen, depth=depth)
     return seen if views.camera is None else seen_through(seen, views.camera)
 
 
-def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> tuple[Camera, float]:
+def share(intrinsics: Float[np.ndarray, "n 3 3"], how: ResizeCrop) -> tuple[Camera, float]:
     """The pinhole of the frames that took all pictures, with square pixels, and how far they disagree.
 
     It is the median of all pinholes, and of both axes for the focal length; the disagreement is the robust
@@ -164,7 +170,7 @@ def share(intrinsics: Float[np.ndarray, "n 3 3"], how: Fitting) -> tuple[Camera,
     return Camera(focal_px, focal_px, float(cx_px), float(cy_px), *how.frame_size), spread
 
 
-def seen_through(seen: Seen, camera: Camera) -> Seen:
+def seen_through(seen: FeedforwardResult, camera: Camera) -> FeedforwardResult:
     """What a network saw through pinholes of its own, as it is through the known one of the pictures.
 
     Networks that cannot be told have the principal point in the middle. What they see is right for a camera

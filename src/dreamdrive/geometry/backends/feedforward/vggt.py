@@ -12,14 +12,20 @@ from typing import Any
 import numpy as np
 from torch import nn
 
-from dreamdrive.device import chosen_device
+from dreamdrive.compute.device import chosen_device
+from dreamdrive.errors import PIP
 from dreamdrive.geometry.backends.feedforward.load import build, read_stored, upstream
-from dreamdrive.geometry.backends.feedforward.network import Network, Seen, Views, world_from_camera
+from dreamdrive.geometry.backends.feedforward.network import (
+    FeedforwardResult,
+    Network,
+    Views,
+    world_from_camera,
+)
 from dreamdrive.geometry.backends.feedforward.reconstruct import FeedForward
 from dreamdrive.geometry.protocol import GeometryBackend
 
 EXPECTED = "VGGT's model.safetensors or model.pt or their folder, such as facebook/VGGT-1B"
-INSTALL = "pip install --no-deps git+https://github.com/facebookresearch/vggt, then pip install einops"
+INSTALL = f"{PIP} --no-deps git+https://github.com/facebookresearch/vggt, then {PIP} einops"
 _SIZES = ("img_size", "patch_size", "embed_dim")
 _UNUSED = ("point_head.", "track_head.")
 
@@ -34,14 +40,14 @@ def load_vggt(path: Path) -> Network:
         stored,
         stored.keep(without=_UNUSED),
     )
-    return Network(partial(_look, network, encoding))
+    return Network(partial(_predict, network, encoding))
 
 
-def _look(network: nn.Module, encoding: Any, views: Views) -> Seen:
+def _predict(network: nn.Module, encoding: Any, views: Views) -> FeedforwardResult:
     out = network(views.pictures.to(chosen_device())[None])
     size = tuple(views.pictures.shape[-2:])
     camera_from_world, intrinsics = encoding.pose_encoding_to_extri_intri(out["pose_enc"], size)
-    return Seen(
+    return FeedforwardResult(
         world_from_camera=world_from_camera(camera_from_world[0]),
         intrinsics=intrinsics[0].cpu().numpy().astype(np.float64),
         depth=out["depth"][0, ..., 0].cpu().numpy(),

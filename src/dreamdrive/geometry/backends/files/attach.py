@@ -1,4 +1,4 @@
-"""A clip with the geometry of files: checks, crops, units and the frame of the first camera."""
+"""Geometry of files attached to a clip: checks, crops, units and the frame of the first camera."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from dreamdrive.data.cameras.lens import SourceLens
+from dreamdrive.data.cameras.poses import to_first
 from dreamdrive.data.formats.cameras import different
-from dreamdrive.data.lens import Lens
-from dreamdrive.data.poses import to_first
-from dreamdrive.data.size import Sizing
+from dreamdrive.data.frames.size import Sizing
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.geometry.backends.files.formats import recognise
-from dreamdrive.geometry.backends.files.given import NAME, DepthFiles, Given
+from dreamdrive.geometry.backends.files.given import NAME, DepthFiles, FileGeometry
 from dreamdrive.geometry.backends.files.wanted import PosesMissingError, Wanted
 from dreamdrive.geometry.road import depth_ratios, factor_of
 from dreamdrive.scene.camera import Camera
@@ -38,7 +38,7 @@ class OntoClip:
     source: tuple[int, int]  # of the source's pictures
     scaled: tuple[int, int]  # to which these were scaled
     offset: tuple[int, int]  # columns and rows that were then cut away at the left and the top
-    lens: Lens | None  # that was taken out of the frames
+    lens: SourceLens | None  # that was taken out of the frames
 
     @staticmethod
     def of(clip: Clip) -> "OntoClip":
@@ -46,7 +46,7 @@ class OntoClip:
         taken = clip.recorded
         if taken is None:
             return OntoClip(clip.size, clip.size, clip.size, (0, 0), None)
-        lens = None if taken.lens is None else Lens.from_json(taken.lens)
+        lens = None if taken.lens is None else SourceLens.from_json(taken.lens)
         return OntoClip(clip.size, taken.size, taken.scaled, taken.offset, lens)
 
     def sizing(self, made_for: tuple[int, int], where: str) -> Sizing:
@@ -84,7 +84,7 @@ class OntoClip:
         return found
 
 
-def _bent(lens: Lens) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
+def _bent(lens: SourceLens) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
     """Where the distorted image has each pixel centre of the pinhole, in pixels of the clip's size."""
     camera = lens.camera
     rays = camera.rays()[..., :2].reshape(-1, 2)
@@ -153,7 +153,7 @@ def _with_poses(clip: Clip, missing: PosesMissingError) -> tuple[Clip, list[str]
 
 
 def _rig(
-    clip: Clip, given: Given, onto: OntoClip, where: str
+    clip: Clip, given: FileGeometry, onto: OntoClip, where: str
 ) -> tuple[tuple[Camera, ...], Int[np.ndarray, " f"]]:
     """The pinholes of the frames: those of the files, or the clip's own where its lens was taken out."""
     if not given.cameras:
@@ -204,11 +204,11 @@ def _depth(
         how = ", ".join(sorted(taken))
         notes.append(f"The unit of the depth files is not declared ({NAME}, depth_unit): {how} is taken.")
     if len(files.of) < count:
-        notes.append(f"{len(files.of)} of {count} frames have a depth file; the others have no depth.")
+        notes.append(f"{len(files.of)} of {count} frames have a depth file.")
     return depth, notes
 
 
-def _scaled_by_depth(clip: Clip, given: Given, where: str) -> tuple[Known, str]:
+def _scaled_by_depth(clip: Clip, given: FileGeometry, where: str) -> tuple[Known, str]:
     """Poses and points in metres, where the depth is and the poses are not: sparse points tell the factor."""
     poses, points = clip.known.world_from_camera, clip.known.points
     ratios = np.zeros(0)

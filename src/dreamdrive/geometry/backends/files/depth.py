@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from dreamdrive.data.array_file import read_npy, read_npz
-from dreamdrive.data.picture_file import read_picture
-from dreamdrive.errors import InputError
+from dreamdrive.data.pictures.picture_file import read_picture
+from dreamdrive.errors import InputError, installing
 from dreamdrive.files.paths import check_file, is_path
 from dreamdrive.files.tensor_file import briefly
 from dreamdrive.geometry.backends.files.given import NAME, Declared, DepthFiles
@@ -98,7 +98,7 @@ def _read_exr(path: Path) -> tuple[Shaped[np.ndarray, "*d"], bool]:
     except ImportError:
         raise InputError(
             f"{path}: EXR files are read by the package OpenEXR, which is not installed; "
-            "pip install 'dreamdrive[exr]', or give the depth as .npz"
+            f"{installing('exr')}, or give the depth as .npz"
         ) from None
     check_file(path)
     try:

@@ -1,15 +1,16 @@
-"""The one door: which format a path holds, by its content."""
+"""Formats of geometry files, told by their content."""
 
 from collections.abc import Callable
 from pathlib import Path
 
+from dreamdrive.data.cameras.intrinsics import model_cameras
 from dreamdrive.data.formats.colmap import find_colmap
 from dreamdrive.data.formats.nerfstudio import depth_file, transforms_frames
-from dreamdrive.data.intrinsics import model_cameras
 from dreamdrive.errors import InputError
+from dreamdrive.files.given import WANTED
 from dreamdrive.files.json_file import read_json
 from dreamdrive.files.paths import open_file
-from dreamdrive.geometry.backends.files.given import NAME, OPTION, Given
+from dreamdrive.geometry.backends.files.given import NAME, OPTION, FileGeometry
 from dreamdrive.geometry.backends.files.readers import (
     CALIBRATION,
     read_colmap_model,
@@ -20,13 +21,10 @@ from dreamdrive.geometry.backends.files.readers import (
 )
 from dreamdrive.geometry.backends.files.wanted import Wanted
 
-EXPECTED = (
-    "cameras.json (ours or PandaSet's), transforms.json (nerfstudio), a COLMAP model (cameras, images and "
-    "points3D as .bin or .txt) or poses.txt (KITTI or TUM)"
-)
+EXPECTED = WANTED["geometry-files"]
 _FILES = ("cameras.json", "transforms.json", "poses.txt")
 
-Reader = Callable[[Path, Wanted], Given]
+Reader = Callable[[Path, Wanted], FileGeometry]
 
 
 def recognise(path: Path) -> tuple[Reader, Path]:

@@ -1,4 +1,4 @@
-"""What the files of any format, and the user beside them, say about the selected frames of a clip."""
+"""Geometry that files of any format, and the user beside them, give for the frames of a clip."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -41,7 +41,7 @@ class SparsePoints:
 
 
 @dataclass(frozen=True)
-class Given:
+class FileGeometry:
     """Poses, cameras and depth of the selected frames, as a reader found them."""
 
     world_from_camera: Float[np.ndarray, "f 4 4"]  # rigid; x right, y down, z forward; any world

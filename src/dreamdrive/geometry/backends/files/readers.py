@@ -1,4 +1,4 @@
-"""Each format as ``Given``: the poses, cameras and depth of the frames that are wanted.
+"""Each format as ``FileGeometry``: the poses, cameras and depth of the frames that are wanted.
 
 What ``dreamdrive.data.formats`` parses is brought to the frames here, and refused where it does not fit them.
 Our own format, a folder, is
@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, Int
 
+from dreamdrive.data.cameras.poses import of_frames, read_pose_file
 from dreamdrive.data.formats.cameras import IndexedPinhole, LensCamera
 from dreamdrive.data.formats.colmap import colmap_camera, find_colmap, read_colmap
 from dreamdrive.data.formats.nerfstudio import (
@@ -34,7 +35,6 @@ from dreamdrive.data.formats.nerfstudio import (
 from dreamdrive.data.formats.pandaset import pandaset_camera
 from dreamdrive.data.formats.pose_lists import kitti_camera
 from dreamdrive.data.formats.rigid import clean_poses, numbers, pose_name
-from dreamdrive.data.poses import of_frames, read_pose_file
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import of_type, read_json
 from dreamdrive.geometry.backends.files.depth import ENDINGS, find_depth
@@ -43,7 +43,7 @@ from dreamdrive.geometry.backends.files.given import (
     OPTION,
     Declared,
     DepthFiles,
-    Given,
+    FileGeometry,
     SparsePoints,
     read_declared,
 )
@@ -60,7 +60,7 @@ class _NamedFrames(msgspec.Struct):
     frames: list[int] | None = None
 
 
-def read_colmap_model(path: Path, wanted: Wanted) -> Given:
+def read_colmap_model(path: Path, wanted: Wanted) -> FileGeometry:
     """Read a COLMAP model; pictures that were not registered count as missing.
 
     It lies in the folder that was given, or in its ``sparse/0``. Depth may lie in a folder ``depth`` in the
@@ -79,7 +79,7 @@ def read_colmap_model(path: Path, wanted: Wanted) -> Given:
     from_world = clean_poses(from_world, str(folder), lambda row: f"the pose of {chosen[row].name}")
     declared = read_declared(path)
     stems = [PurePosixPath(image.name).stem for image in chosen]
-    return Given(
+    return FileGeometry(
         np.linalg.inv(from_world),
         metric=declared.metric is True,
         cameras=[colmap_camera(model.cameras[image.camera_id], str(folder)) for image in chosen],
@@ -107,7 +107,7 @@ def _sparse(model: Any, image_ids: Int[np.ndarray, " f"]) -> SparsePoints | None
     return SparsePoints(np.array(kept), mask)
 
 
-def read_transforms(path: Path, wanted: Wanted) -> Given:
+def read_transforms(path: Path, wanted: Wanted) -> FileGeometry:
     """Read a ``transforms.json`` and the depth that it names."""
     record = read_json(path, OPTION)
     frames = transforms_frames(record, str(path))
@@ -116,7 +116,7 @@ def read_transforms(path: Path, wanted: Wanted) -> Given:
     declared = read_declared(path.parent)
     cameras = [frame_camera(frame, f"{path}: {frame['file_path']}") for frame in chosen]
     depth, said = _named_depth(record, chosen, declared, path)
-    return Given(
+    return FileGeometry(
         frame_poses(chosen, str(path)),
         metric=declared.metric is True,
         cameras=cameras,
@@ -150,7 +150,7 @@ def _named_depth(
     return DepthFiles(of, float(factor), metric=False), said
 
 
-def read_pandaset(path: Path, wanted: Wanted) -> Given:
+def read_pandaset(path: Path, wanted: Wanted) -> FileGeometry:
     """Read one camera: that of ``geometry.json``, the only one, or the one that is called like the input."""
     record = read_json(path, OPTION)
     declared = read_declared(path.parent)
@@ -166,7 +166,7 @@ def read_pandaset(path: Path, wanted: Wanted) -> Given:
     return _metres(path.parent, poses, found.pinhole(), wanted.labels, declared, notes)
 
 
-def read_plain(path: Path, wanted: Wanted) -> Given:
+def read_plain(path: Path, wanted: Wanted) -> FileGeometry:
     """Read our own ``cameras.json`` and the depth beside it."""
     record = read_json(path, OPTION)
     if any(key not in record for key in _NEEDED):
@@ -191,7 +191,7 @@ def read_plain(path: Path, wanted: Wanted) -> Given:
     return _metres(path.parent, chosen, camera, labels, read_declared(path.parent))
 
 
-def read_pose_list(path: Path, wanted: Wanted) -> Given:
+def read_pose_list(path: Path, wanted: Wanted) -> FileGeometry:
     """Read KITTI, TUM or Trajectory JSON, and KITTI's ``calib.txt`` beside it, for the source's pictures.
 
     KITTI's poses are those of camera 0: those of another camera, which ``geometry.json`` or an input folder
@@ -218,9 +218,9 @@ def _metres(
     labels: Sequence[str],
     declared: Declared,
     notes: tuple[str, ...] = (),
-) -> Given:
+) -> FileGeometry:
     """Poses of one camera, metric unless that is denied, and the depth in the folder beside them."""
-    return Given(
+    return FileGeometry(
         poses,
         metric=declared.metric is not False,
         cameras=() if camera is None else (LensCamera(camera, None),) * len(poses),

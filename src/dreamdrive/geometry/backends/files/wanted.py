@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from jaxtyping import Float, Int
 
-from dreamdrive.data.images import ImageFolder, natural_key
+from dreamdrive.data.pictures.images import ImageFolder, natural_key
 from dreamdrive.data.source import open_source
 from dreamdrive.errors import InputError
 from dreamdrive.scene.clip import Clip
@@ -17,9 +17,9 @@ from dreamdrive.scene.clip import Clip
 class PosesMissingError(InputError):
     """Some of the selected frames have no pose; ``kept`` are the others (K,), by their place among them."""
 
-    def __init__(self, message: str, kept: Int[np.ndarray, " k"]) -> None:
+    def __init__(self, message: object, kept: Int[np.ndarray, " k"] | None = None) -> None:
         super().__init__(message)
-        self.kept = kept
+        self.kept = np.zeros(0, dtype=np.int64) if kept is None else kept
 
 
 @dataclass(frozen=True)

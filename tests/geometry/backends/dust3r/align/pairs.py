@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from geometry.simulated_pairs import Truth
+from dreamdrive_bench.geometry.simulated_pairs import Truth
 
 
 def window(count: int, reach: int = 3) -> np.ndarray:

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tests.golden import reading
-from tests.golden.reading import Table
 
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from dreamdrive.geometry.backends.dust3r.reference import Raw
+from dreamdrive_bench.geometry.authors_alignment import Raw
+from tests.golden import reading
+from tests.golden.reading import Table
 
 PNP = 1e-3
 """Share of a path or a depth by which a pose from PnP may differ, which ends where its steps become small."""

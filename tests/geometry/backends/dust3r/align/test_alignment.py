@@ -4,17 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align, predicted_bytes
+from dreamdrive.geometry.backends.dust3r.align.alignment import (
+    AlignOptions,
+    KnownCameras,
+    align,
+    predicted_bytes,
+)
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import AlignmentStart, spanning_tree
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from dreamdrive.geometry.backends.dust3r.reference import Objective, descend, raw_parameters
-from dreamdrive.splat.torch_threads import one_torch_thread
-from geometry.simulated_pairs import Noise, Truth, pair_maps
+from dreamdrive_bench.geometry.authors_alignment import Objective, descend, raw_parameters
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps
+from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)
 ROBUST = AlignOptions(samples_per_image=300)
@@ -57,7 +62,7 @@ def test_exact_pairs_give_the_truth(drive: Truth, options: AlignOptions) -> None
     assert found.path_observed
 
 
-def authors_end(maps: PairMaps, steps: int = 300) -> tuple[float, Start]:
+def authors_end(maps: PairMaps, steps: int = 300) -> tuple[float, AlignmentStart]:
     """Loss and parameters after the authors' optimiser, from the start without their stale focal lengths."""
     objective = Objective(maps, graph_of(maps))
     raw = raw_parameters(spanning_tree(maps, upstream=True, stale_focals=False))
@@ -78,7 +83,7 @@ def test_the_loss_is_no_higher_than_after_300_steps_of_the_authors(drive: Truth,
 def test_the_loss_is_that_of_the_authors(noisy: PairMaps) -> None:
     found = align(noisy, EACH)
     objective = Objective(noisy, graph_of(noisy))
-    end = Start(found.world_from_camera, found.focals_px, found.depth, found.pairs)
+    end = AlignmentStart(found.world_from_camera, found.focals_px, found.depth, found.pairs)
     assert float(objective(raw_parameters(end)).detach()) == pytest.approx(found.loss, rel=1e-4)
 
 
@@ -132,7 +137,7 @@ def test_a_pair_in_another_unit_is_the_same_pair(noisy: PairMaps, paper: Aligned
 
 
 def test_known_focal_lengths_stay(drive: Truth, noisy: PairMaps) -> None:
-    found = align(noisy, ROBUST, Known(intrinsics=pinholes(drive)))
+    found = align(noisy, ROBUST, KnownCameras(intrinsics=pinholes(drive)))
     np.testing.assert_array_equal(found.focals_px, np.full(6, drive.focal_px))
     assert path_error(found.world_from_camera, drive.world_from_camera) < 0.01
 
@@ -160,7 +165,7 @@ def test_a_principal_point_beside_the_middle_is_kept(stretch: int) -> None:
     maps, depth = PairMaps(maps.edges, points, confidence), truth.depth[:, ::stretch]
     intrinsics = pinholes(truth)
     intrinsics[:, 1] /= stretch
-    knowing, guessing = (align(maps, ROBUST, Known(intrinsics=each)) for each in (intrinsics, None))
+    knowing, guessing = (align(maps, ROBUST, KnownCameras(intrinsics=each)) for each in (intrinsics, None))
     errors = [path_error(each.world_from_camera, truth.world_from_camera) for each in (knowing, guessing)]
     assert errors[0] < 1e-4
     assert errors[1] > 20 * errors[0]
@@ -174,7 +179,7 @@ def test_a_principal_point_beside_the_middle_is_kept(stretch: int) -> None:
 def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: PairMaps) -> None:
     given = drive.world_from_camera.copy()
     given[:, :3, 3] += [100.0, 0.0, -40.0]
-    found = align(noisy, ROBUST, Known(world_from_camera=given))
+    found = align(noisy, ROBUST, KnownCameras(world_from_camera=given))
     np.testing.assert_array_equal(found.world_from_camera, given)
     seen = drive.depth > 0
     ratio = np.median(np.stack(found.depth)[seen] / drive.depth[seen])
@@ -184,7 +189,7 @@ def test_known_poses_stay_and_give_depth_in_their_unit(drive: Truth, noisy: Pair
 
 def test_known_poses_that_stand_still_are_refused(noisy: PairMaps) -> None:
     with pytest.raises(InputError, match="the given poses stand still, but the clip does not"):
-        align(noisy, replace(ROBUST, steps=2), Known(world_from_camera=np.tile(np.eye(4), (6, 1, 1))))
+        align(noisy, replace(ROBUST, steps=2), KnownCameras(world_from_camera=np.tile(np.eye(4), (6, 1, 1))))
 
 
 def test_images_of_different_sizes(noisy: PairMaps) -> None:
@@ -235,12 +240,12 @@ def test_what_is_too_large_is_refused_before_it_starts(noisy: PairMaps) -> None:
 @pytest.mark.parametrize(
     ("known", "message"),
     [
-        (Known(intrinsics=np.eye(3)[None]), "6 images take 6 pinholes"),
-        (Known(intrinsics=-np.tile(np.eye(3), (6, 1, 1))), "6 images take 6 pinholes with positive"),
-        (Known(world_from_camera=np.eye(4)[None]), "6 images take 6 poses; got 1"),
-        (Known(world_from_camera=np.full((6, 4, 4), 2.0)), "known poses cannot be used"),
+        (KnownCameras(intrinsics=np.eye(3)[None]), "6 images take 6 pinholes"),
+        (KnownCameras(intrinsics=-np.tile(np.eye(3), (6, 1, 1))), "6 images take 6 pinholes with positive"),
+        (KnownCameras(world_from_camera=np.eye(4)[None]), "6 images take 6 poses; got 1"),
+        (KnownCameras(world_from_camera=np.full((6, 4, 4), 2.0)), "known poses cannot be used"),
     ],
 )
-def test_what_is_known_has_to_fit(noisy: PairMaps, known: Known, message: str) -> None:
+def test_what_is_known_has_to_fit(noisy: PairMaps, known: KnownCameras, message: str) -> None:
     with pytest.raises(InputError, match=message):
         align(noisy, ROBUST, known)

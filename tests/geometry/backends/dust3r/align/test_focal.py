@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import street, window
-from tests.golden.reading import arrays, cases, values
 
 from dreamdrive.geometry.backends.dust3r.align.focal import focal_votes, robust_px, weiszfeld_px
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.measured import weighted_median
-from geometry.simulated_pairs import Noise, pair_maps
+from dreamdrive_bench.geometry.simulated_pairs import Noise, pair_maps
+from tests.geometry.backends.dust3r.align.pairs import street, window
+from tests.golden.reading import arrays, cases, values
 
 LIMIT = 1e-5
 """Relative: ten steps of a weighted mean over all pixels, which the authors' program adds up in float32."""

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import street, window
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from geometry.simulated_pairs import Noise, pair_maps
+from dreamdrive_bench.geometry.simulated_pairs import Noise, pair_maps
+from tests.geometry.backends.dust3r.align.pairs import street, window
 
 
 @pytest.fixture(scope="module")

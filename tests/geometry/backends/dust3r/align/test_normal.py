@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.dust3r.align.pairs import street, window
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.normal import ImageSamples, normal_equations
 from dreamdrive.geometry.backends.dust3r.align.rays import Cauchy, Distance, Penalty, RayMisses
 from dreamdrive.geometry.backends.dust3r.align.samples import draw_samples
 from dreamdrive.geometry.backends.dust3r.align.spanning_tree import spanning_tree
 from dreamdrive.geometry.backends.dust3r.align.state import Freedom, State
-from dreamdrive.splat.torch_threads import one_torch_thread
-from geometry.simulated_pairs import Noise, pair_maps
+from dreamdrive_bench.geometry.simulated_pairs import Noise, pair_maps
+from tests.geometry.backends.dust3r.align.pairs import street, window
 
 _STEPS = 60
 

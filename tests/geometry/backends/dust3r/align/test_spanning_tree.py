@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from dreamdrive.geometry.backends.dust3r.align.spanning_tree import AlignmentStart, spanning_tree
+from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
+from dreamdrive_bench.geometry.simulated_pairs import Noise, pair_maps
 from tests.geometry.backends.dust3r.align.pairs import path_error, street, window
 from tests.geometry.backends.dust3r.align.scenes import PNP, extent, runs_with, scene
 from tests.golden.reading import close
-
-from dreamdrive.geometry.backends.dust3r.align.spanning_tree import Start, spanning_tree
-from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from geometry.simulated_pairs import Noise, pair_maps
 
 EXACT = Noise(0, 1 / 8, 0, 0, 0)
 
@@ -106,7 +106,7 @@ def test_what_is_masked_does_not_matter() -> None:
     np.testing.assert_array_equal(clean.focals_px, dirty.focals_px)
 
 
-def _matrices(start: Start) -> np.ndarray:
+def _matrices(start: AlignmentStart) -> np.ndarray:
     matrices = np.tile(np.eye(4), (len(start.pairs), 1, 1))
     for matrix, pair in zip(matrices, start.pairs, strict=True):
         matrix[:3, :3], matrix[:3, 3] = pair.scale * pair.rotation, pair.translation

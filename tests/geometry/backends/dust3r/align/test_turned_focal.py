@@ -5,14 +5,14 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
-from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, Known, align
+from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, KnownCameras, align
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
 from dreamdrive.geometry.backends.dust3r.align.graph import graph_of
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
-from geometry.simulated_pairs import Noise, Truth, pair_maps
+from dreamdrive_bench.geometry.simulated_pairs import Noise, Truth, pair_maps
+from tests.geometry.backends.dust3r.align.pairs import path_error, pinholes, street, window
 
 FRAMES = 8
 EXACT = Noise(0, 1 / 8, 0.1, 0, 0)
@@ -141,7 +141,7 @@ def test_three_images_are_too_few(corner: Truth) -> None:
 
 def test_pairs_are_brought_to_a_known_focal_length(corner: Truth) -> None:
     maps = pair_maps(corner, window(FRAMES), replace(EXACT, common_focal=0.05))
-    found = align(maps, OPTIONS, Known(intrinsics=pinholes(corner)))
+    found = align(maps, OPTIONS, KnownCameras(intrinsics=pinholes(corner)))
     assert path_error(found.world_from_camera, corner.world_from_camera) < 1e-4
     assert found.focal_error == 0
     assert found.focal_observed

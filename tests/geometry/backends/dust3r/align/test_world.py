@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.geometry.backends.dust3r.align.pairs import path_error, window
 
 from dreamdrive.geometry.backends.dust3r.align.alignment import AlignOptions, align
-from dreamdrive.world import make_street
-from geometry.simulated_pairs import Noise, pair_maps, truth_of
+from dreamdrive_bench.geometry.simulated_pairs import Noise, pair_maps, truth_of
+from streetworld import make_street
+from tests.geometry.backends.dust3r.align.pairs import path_error, window
 
 
 @pytest.mark.slow

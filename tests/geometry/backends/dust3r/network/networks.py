@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from tests.golden import reading
 from torch import Tensor
 
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import normalise
 from dreamdrive.geometry.backends.dust3r.network.config import DptSizes, NetworkConfig, config_from_keywords
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.models.weights import fill_network
+from tests.golden import reading
 
 TINY = NetworkConfig(
     enc_dim=32,

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 import torch
 from safetensors.torch import save_file
-from tests.geometry.backends.dust3r.network.networks import TINY, tiny
 from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
+from tests.geometry.backends.dust3r.network.networks import TINY, tiny
 
 ALIAS = ".scratch.layer_rn."
 

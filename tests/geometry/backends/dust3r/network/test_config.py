@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.networks import tiny
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.network.config import (
@@ -19,6 +18,7 @@ from dreamdrive.geometry.backends.dust3r.network.config import (
     config_from_shapes,
 )
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
+from tests.geometry.backends.dust3r.network.networks import tiny
 
 CALL = (
     "AsymmetricCroCo3DStereo(pos_embed='RoPE100', patch_embed_cls='ManyAR_PatchEmbed', img_size=(512, 512), "

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tests.golden.reading import arrays, cases, values
+from hypothesis import given, settings, strategies as st
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.network.images import any_fitting, as_input, fitting
-from dreamdrive.geometry.fitting import Fitting, prepare
+from dreamdrive.geometry.backends.dust3r.network.images import any_resize_crop, as_input, resize_crop
+from dreamdrive.geometry.resize import ResizeCrop, prepare
 from dreamdrive.scene.camera import Camera
+from tests.golden.reading import arrays, cases, values
 
 
 def test_golden_sizes() -> None:
@@ -18,16 +17,16 @@ def test_golden_sizes() -> None:
     for name, expected in sizes.items():
         shape, size, square = name.split("|")
         width, height = map(int, shape.split("x"))
-        got = any_fitting(width, height, int(size), square_ok=square == "square_ok").size
+        got = any_resize_crop(width, height, int(size), square_ok=square == "square_ok").size
         assert list(got) == expected, name
 
 
-def fittings(frame: np.ndarray, picture: np.ndarray) -> list[Fitting]:
+def fittings(frame: np.ndarray, picture: np.ndarray) -> list[ResizeCrop]:
     """How a frame can have become a picture: no file tells the long side before whole patches were cut."""
     height, width = picture.shape[:2]
     long_sides = range(max(width, height), max(width, height) + 16)
     found = [
-        any_fitting(frame.shape[1], frame.shape[0], size, square_ok=square_ok)
+        any_resize_crop(frame.shape[1], frame.shape[0], size, square_ok=square_ok)
         for size in long_sides
         for square_ok in (False, True)
     ]
@@ -54,7 +53,7 @@ def test_input_of_the_network() -> None:
 
 def test_a_frame_of_the_networks_size_stays_as_it_is() -> None:
     frame = np.random.default_rng(0).integers(0, 256, (288, 512, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(prepare(frame, fitting(512, 288)), frame)
+    np.testing.assert_array_equal(prepare(frame, resize_crop(512, 288)), frame)
 
 
 @pytest.mark.parametrize(
@@ -62,14 +61,14 @@ def test_a_frame_of_the_networks_size_stays_as_it_is() -> None:
 )
 def test_frames_that_do_not_fit_are_refused(width: int, height: int, size: int) -> None:
     with pytest.raises(InputError, match=f"frames of {width}x{height} px"):
-        fitting(width, height, size)
+        resize_crop(width, height, size)
 
 
 def test_another_size_than_announced_is_refused() -> None:
     with pytest.raises(ValueError, match="64x48"):
-        prepare(np.zeros((48, 64, 3), np.uint8), fitting(64, 32))
+        prepare(np.zeros((48, 64, 3), np.uint8), resize_crop(64, 32))
     with pytest.raises(ValueError, match="64x48"):
-        fitting(64, 32).picture_camera(Camera(50, 50, 32, 24, 64, 48))
+        resize_crop(64, 32).picture_camera(Camera(50, 50, 32, 24, 64, 48))
 
 
 frames = st.tuples(st.integers(40, 900), st.integers(40, 900)).filter(lambda s: max(s) < 4 * min(s))
@@ -78,7 +77,7 @@ frames = st.tuples(st.integers(40, 900), st.integers(40, 900)).filter(lambda s: 
 @settings(max_examples=40)
 @given(frames, st.sampled_from([512, 224, 128]))
 def test_pixels_and_cameras_there_and_back(shape: tuple[int, int], size: int) -> None:
-    how = fitting(*shape, size)
+    how = resize_crop(*shape, size)
     pixels = np.random.default_rng(0).uniform(0, 300, (5, 2))
     np.testing.assert_allclose(how.to_frame(how.to_picture(pixels)), pixels, rtol=1e-12)
     camera = Camera(300.0, 310.0, 200.5, 99.25, *how.frame_size)
@@ -93,7 +92,7 @@ def test_pixels_and_cameras_there_and_back(shape: tuple[int, int], size: int) ->
 
 @pytest.mark.parametrize("shape", [(640, 400), (150, 250)])
 def test_a_bright_spot_is_found_where_its_pixel_goes(shape: tuple[int, int]) -> None:
-    how: Fitting = fitting(*shape, 256)
+    how: ResizeCrop = resize_crop(*shape, 256)
     rows, columns = np.mgrid[: shape[1], : shape[0]] + 0.5
     centre = np.array([0.4 * shape[0], 0.6 * shape[1]])
     spot = 250 * np.exp(-((columns - centre[0]) ** 2 + (rows - centre[1]) ** 2) / 300)

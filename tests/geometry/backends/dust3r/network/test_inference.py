@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.networks import tiny
 
 from dreamdrive.errors import InputError
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig
@@ -15,6 +14,7 @@ from dreamdrive.geometry.backends.dust3r.network.images import as_input
 from dreamdrive.geometry.backends.dust3r.network.inference import infer
 from dreamdrive.geometry.backends.dust3r.network.memory import plan_memory
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps, make_pairs
+from tests.geometry.backends.dust3r.network.networks import tiny
 
 SHAPES = ((32, 48), (32, 48), (48, 32), (32, 48), (48, 32))
 

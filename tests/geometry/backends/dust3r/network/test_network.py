@@ -5,14 +5,14 @@ from functools import cache
 
 import pytest
 import torch
-from tests.geometry.backends.dust3r.network.networks import golden_network, tiny
-from tests.golden.reading import Table, cases, close, relative, tensors, values
 from torch import Tensor, nn
 
 from dreamdrive.geometry.backends.dust3r.network.blocks import Rotation, grid_positions, rotate, rotation
 from dreamdrive.geometry.backends.dust3r.network.config import NetworkConfig, config_from_shapes
 from dreamdrive.geometry.backends.dust3r.network.dust3r import Dust3r
 from dreamdrive.geometry.backends.dust3r.network.heads import Pointmap, pointmap
+from tests.geometry.backends.dust3r.network.networks import golden_network, tiny
+from tests.golden.reading import Table, cases, close, relative, tensors, values
 
 LIMIT = 1e-4
 """Share of the largest value of a tensor. Float32 rounds to 6e-8 of each number; through some tens of layers

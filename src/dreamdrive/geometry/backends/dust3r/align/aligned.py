@@ -49,7 +49,7 @@ class Aligned:
 
 
 @dataclass(frozen=True)
-class Found:
+class Solution:
     """What the solver leaves behind: depth along z and loss over all pixels, its losses over the samples."""
 
     state: State
@@ -62,7 +62,7 @@ class Found:
 def report(
     maps: PairMaps,
     graph: Graph,
-    found: Found,
+    found: Solution,
     votes: FocalVotes,
     turned: TurnedFocal | None,
     *,
@@ -102,7 +102,7 @@ def report(
     )
 
 
-def _frame(found: Found, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity:
+def _frame(found: Solution, known: Float[np.ndarray, "n 4 4"] | None) -> Similarity:
     """From the solver's world to that of the result."""
     state = found.state
     if known is None:
@@ -119,7 +119,7 @@ def _pair_spread(maps: PairMaps, state: State) -> float:
     return missed / apart if apart > 0 else float("inf")
 
 
-def _residuals(found: Found, edges: int) -> Float[np.ndarray, " e"]:
+def _residuals(found: Solution, edges: int) -> Float[np.ndarray, " e"]:
     parts: list[list[np.ndarray]] = [[] for _ in range(edges)]
     for samples in found.samples:
         here = found.depth[samples.image].ravel()[samples.index].astype(np.float64)

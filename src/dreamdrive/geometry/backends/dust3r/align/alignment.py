@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned, Found, report
+from dreamdrive.geometry.backends.dust3r.align.aligned import Aligned, Solution, report
 from dreamdrive.geometry.backends.dust3r.align.focal import FocalVotes, focal_votes
 from dreamdrive.geometry.backends.dust3r.align.graph import Graph, graph_of
 from dreamdrive.geometry.backends.dust3r.align.rays import Cauchy, Distance, Penalty
@@ -19,7 +20,6 @@ from dreamdrive.geometry.backends.dust3r.align.state import PER_EDGE, PER_IMAGE,
 from dreamdrive.geometry.backends.dust3r.align.turned_focal import TurnedFocal, turned_focal
 from dreamdrive.geometry.backends.dust3r.pairs import PairMaps
 from dreamdrive.scene.camera import check_rigid
-from dreamdrive.splat import one_torch_thread
 
 _FLOOR = 1e-4  # of the median depth: distances below it weigh no more
 _COARSE = 1e-3  # gain of a step at which the paper's loss is left for the robust one
@@ -59,7 +59,7 @@ class AlignOptions:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownCameras:
     """What need not be found.
 
     Without pinholes, whose pixels count from 0, the focal lengths are found and the principal points in the
@@ -73,7 +73,7 @@ class Known:
 def align(
     maps: PairMaps,
     options: AlignOptions | None = None,
-    known: Known | None = None,
+    known: KnownCameras | None = None,
     still: Sequence[Bool[np.ndarray, "_ _"]] | None = None,
 ) -> Aligned:
     """Bring pairwise pointmaps into one world.
@@ -85,7 +85,7 @@ def align(
     Raises:
         InputError: The pairs or what is known cannot be used, or memory would not do.
     """
-    options, known = options or AlignOptions(), known or Known()
+    options, known = options or AlignOptions(), known or KnownCameras()
     graph = graph_of(maps)
     _check_known(known, len(graph))
     if known.intrinsics is not None:
@@ -134,7 +134,9 @@ def check_memory(
         )
 
 
-def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: Known) -> Aligned:
+def _solved(
+    maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions, known: KnownCameras
+) -> Aligned:
     """Cameras and pairs from the pixels that weigh in ``sure``, depth from all."""
     votes = focal_votes(sure, graph)
     turned = None
@@ -165,7 +167,7 @@ def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions,
     return report(
         maps,
         graph,
-        Found(state, depth, loss, samples, losses),
+        Solution(state, depth, loss, samples, losses),
         votes,
         turned,
         focal_known=known.intrinsics is not None,
@@ -174,7 +176,7 @@ def _solved(maps: PairMaps, sure: PairMaps, graph: Graph, options: AlignOptions,
 
 
 def _first_focals(
-    votes: FocalVotes, turned: TurnedFocal | None, images: int, options: AlignOptions, known: Known
+    votes: FocalVotes, turned: TurnedFocal | None, images: int, options: AlignOptions, known: KnownCameras
 ) -> Float[np.ndarray, " n"] | None:
     """Known ones, or the shared one; None where each image has one of its own to be found."""
     if known.intrinsics is not None:
@@ -186,7 +188,7 @@ def _first_focals(
     return np.full(images, turned.focal_px)
 
 
-def _check_known(known: Known, images: int) -> None:
+def _check_known(known: KnownCameras, images: int) -> None:
     pinholes, poses = known.intrinsics, known.world_from_camera
     if pinholes is not None:
         focals = pinholes[:, [0, 1], [0, 1]]

@@ -1,4 +1,4 @@
-"""Depth of each pixel, given everything else: one unknown along its ray, solved in closed form.
+"""Depth of each pixel along its ray, solved in closed form given everything else.
 
 What a miss costs, of a pixel's point X against where an edge places it, Y, is told from its parts along the
 pixel's ray and across it: the paper's distance, or less for what misses by far.

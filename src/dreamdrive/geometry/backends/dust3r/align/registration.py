@@ -1,4 +1,4 @@
-"""Points onto their pixels, by a camera pose, and onto other points, by a similarity."""
+"""Registration of points: to pixels by a camera pose, to other points by a similarity."""
 
 import cv2
 import numpy as np

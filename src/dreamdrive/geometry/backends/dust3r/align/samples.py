@@ -1,4 +1,4 @@
-"""The pixels that the solver looks at, and the pass over all pixels at its end."""
+"""Sampled pixels for the solver, and the pass over all pixels at its end."""
 
 import numpy as np
 import torch

@@ -1,4 +1,4 @@
-"""A first guess of all cameras: pairs are joined along the tree of the most trusted ones."""
+"""First guess of all cameras, joined along the tree of the most trusted pairs."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ _NEAREST = 0.01  # quantile of the valid depths that replaces those behind the c
 
 
 @dataclass(frozen=True)
-class Start:
+class AlignmentStart:
     """Where an alignment begins. The world is any; the scales of the pairs have a geometric mean of 0.5."""
 
     world_from_camera: Float[np.ndarray, "n 4 4"]
@@ -39,7 +39,7 @@ def spanning_tree(
     *,
     upstream: bool = False,
     stale_focals: bool = True,
-) -> Start:
+) -> AlignmentStart:
     """Join pairs from the strongest on; then pose each image in what was joined.
 
     Pairs weigh by mean confidence of the first times that of the second image. Each next pair of the maximum
@@ -166,14 +166,14 @@ class _Tree:
         partner = next(int(i) for i, j in self.maps.edges if j == image)
         return self.poses.get(partner, np.eye(4)).copy()
 
-    def start(self) -> Start:
+    def start(self) -> AlignmentStart:
         """All of it in the scale in which the pairs' scales have a geometric mean of 0.5."""
         pairs = [self._register(edge, 0, self.points[int(i)]) for edge, (i, _) in enumerate(self.maps.edges)]
         scale = BASE_SCALE / np.exp(np.mean([np.log(pair.scale) for pair in pairs]))
         poses = np.stack([self.poses[image] for image in range(len(self.graph))])
         poses[:, :3, 3] *= scale
         points = [np.float32(scale) * self.points[image] for image in range(len(self.graph))]
-        return Start(
+        return AlignmentStart(
             world_from_camera=poses,
             focals_px=np.array([self.focals[image] for image in range(len(self.graph))]),
             depth=tuple(self._depth(xyz, pose) for xyz, pose in zip(points, poses, strict=True)),
@@ -197,8 +197,8 @@ def _rigid(similarity: Similarity) -> Float[np.ndarray, "4 4"]:
 
 
 def onto_known(
-    start: Start, world_from_camera: Float[np.ndarray, "n 4 4"]
-) -> tuple[Start, Float[np.ndarray, "n 4 4"]]:
+    start: AlignmentStart, world_from_camera: Float[np.ndarray, "n 4 4"]
+) -> tuple[AlignmentStart, Float[np.ndarray, "n 4 4"]]:
     """The start in the known world, and the known poses in the unit in which the pairs' scales average 0.5.
 
     The unit is not that of the known poses: were the scales of pairs free, the loss could fall while the

@@ -1,4 +1,4 @@
-"""What the solver moves: cameras and the similarity of each pair, as far as they are unknown."""
+"""The solver's unknowns: cameras and the similarity of each pair."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

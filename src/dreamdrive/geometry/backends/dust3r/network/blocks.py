@@ -73,7 +73,7 @@ class Attention(nn.Module):
         return self.proj(_attend(rotate(q, by), rotate(k, by), v))
 
 
-class CrossAttention(nn.Module):
+class _CrossAttention(nn.Module):
     """Attention from the tokens of one image to those of another."""
 
     def __init__(self, dim: int, heads: int) -> None:
@@ -117,7 +117,7 @@ class DecoderBlock(EncoderBlock):
     def __init__(self, dim: int, heads: int, hidden: int) -> None:
         super().__init__(dim, heads, hidden)
         self.norm_y = nn.LayerNorm(dim, eps=NORM_EPS)
-        self.cross_attn = CrossAttention(dim, heads)
+        self.cross_attn = _CrossAttention(dim, heads)
         self.norm3 = nn.LayerNorm(dim, eps=NORM_EPS)
 
     def forward(  # pyright: ignore[reportIncompatibleMethodOverride]

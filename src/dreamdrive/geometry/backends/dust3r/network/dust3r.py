@@ -1,4 +1,4 @@
-"""The network of DUSt3R: a shared encoder, two decoders that look at each other, two heads."""
+"""The network of DUSt3R: a shared encoder, two decoders that attend to each other, two heads."""
 
 from collections import OrderedDict
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From tokens to points and confidences: linear head, DPT head (Ranftl et al. 2021), last activations."""
+"""Heads that make points and confidences of tokens: linear, DPT (Ranftl et al. 2021)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Which pictures the network takes.
+"""Sizes of the pictures that the network takes.
 
 It knows a few shapes only: the long side is brought to a fixed length, then the middle is cut out so that
 both sides are multiples of 16.
@@ -12,14 +12,14 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.geometry.fitting import Fitting
+from dreamdrive.geometry.resize import ResizeCrop
 
 SQUARE_SIZE = 224
 """At this size the network takes squares; at all others the long side has the given length."""
 _MULTIPLE = 16
 
 
-def fitting(width_px: int, height_px: int, size: int = 512) -> Fitting:
+def resize_crop(width_px: int, height_px: int, size: int = 512) -> ResizeCrop:
     """How frames are brought to the size of the network: the length of the long side, or 224 for squares.
 
     Raises:
@@ -27,7 +27,7 @@ def fitting(width_px: int, height_px: int, size: int = 512) -> Fitting:
     """
     if min(width_px, height_px) < 1 or size < _MULTIPLE:
         raise InputError(f"frames of {width_px}x{height_px} px cannot be brought to {size} px")
-    found = any_fitting(width_px, height_px, size)
+    found = any_resize_crop(width_px, height_px, size)
     picture = found.size
     if min(picture) < _MULTIPLE or picture[0] % _MULTIPLE or picture[1] % _MULTIPLE:
         raise InputError(
@@ -37,7 +37,7 @@ def fitting(width_px: int, height_px: int, size: int = 512) -> Fitting:
     return found
 
 
-def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = False) -> Fitting:
+def any_resize_crop(width_px: int, height_px: int, size: int, *, square_ok: bool = False) -> ResizeCrop:
     """The same rule, whether or not the network takes the picture.
 
     Square frames stay square if that is asked for; otherwise they are cut to 4:3, as in training.
@@ -51,7 +51,7 @@ def any_fitting(width_px: int, height_px: int, size: int, *, square_ok: bool = F
         half = [side // 2 * 2 // _MULTIPLE * (_MULTIPLE // 2) for side in resized]
         if resized[0] == resized[1] and not square_ok:
             half[1] = 3 * half[0] // 4
-    return Fitting(
+    return ResizeCrop(
         (width_px, height_px),
         resized,
         middle[0] - half[0],

@@ -1,4 +1,4 @@
-"""What memory the network will take, told before it is taken."""
+"""Memory that the network will take, told before it is taken."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,1 +1,0 @@
-"""Hybrid with one thing changed: the parts of ``ablation.py``."""

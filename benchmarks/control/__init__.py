@@ -1,1 +1,0 @@
-"""Layouts with one thing changed, and how scenes follow: the parts of ``control.py``."""

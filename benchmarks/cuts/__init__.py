@@ -1,1 +1,0 @@
-"""Recordings with and without cuts: the parts of ``cuts.py``."""

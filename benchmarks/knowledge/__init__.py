@@ -1,1 +1,0 @@
-"""The street network against lidar, known cameras and drawn streets: the parts of ``knowledge.py``."""

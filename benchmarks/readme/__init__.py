@@ -1,1 +1,0 @@
-"""The figures of the README: the parts of ``readme.py``."""

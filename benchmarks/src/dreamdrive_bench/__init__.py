@@ -1,0 +1,1 @@
+"""The program behind every published figure: ``python -m dreamdrive_bench NAME``, one command a figure."""

@@ -1,0 +1,1 @@
+"""Hybrid with one thing changed: the parts of ``ablation``."""

@@ -1,0 +1,1 @@
+"""Layouts with one thing changed, and how scenes follow: the parts of ``control``."""

@@ -1,0 +1,1 @@
+"""Recordings with and without cuts: the parts of ``cuts``."""

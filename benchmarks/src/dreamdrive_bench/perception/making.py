@@ -1,0 +1,117 @@
+"""Streets, scenes and sets of samples of the experiment; what is there already is kept."""
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.datasets.nuscenes import read_nuscenes
+from dreamdrive.export import take, taken_of_world, write_nuscenes
+from dreamdrive.generate import generate
+from dreamdrive.options import QUALITIES
+from dreamdrive.scene.control import Control
+from dreamdrive.scene.street.log import Log
+from dreamdrive.scene.street.truth import MOUNTS
+from dreamdrive.stored import load_scene
+from dreamdrive.tasks.perception import (
+    BevSample,
+    CvtOptions,
+    PathOptions,
+    SampleNote,
+    draw_places,
+    samples_of_log,
+    samples_of_scene,
+    span_of,
+    write_bev_set,
+)
+from dreamdrive_bench.common.twin import TWIN
+from dreamdrive_bench.perception.protocol import Places, Protocol
+from dreamdrive_bench.perception.warped import warped_samples
+from streetworld import StreetOptions, World, draw_street, drive
+
+
+def make_street(seed: int, protocol: Protocol, places: Places) -> None:
+    """Draw a street, record it with six noisy cameras, and label every half second."""
+    folder, s = places.street(seed), protocol.streets
+    if folder.is_dir():
+        return
+    layout = draw_street(seed, StreetOptions(s.seconds, edition=s.edition))
+    world, frames = World(layout), round(s.seconds * s.rate_hz) + 1
+    size, rng = (s.width_px, s.height_px), np.random.default_rng(seed)
+    drives = {}
+    for mount in MOUNTS:
+        made = drive(layout, frames, s.rate_hz, size, world=world, mount=mount)
+        noisy = made.frames + rng.normal(scale=s.noise_levels, size=made.frames.shape)
+        drives[mount] = replace(made, frames=np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+    with tempfile.TemporaryDirectory() as scratch:
+        log = take(taken_of_world(drives, folder.name), Path(scratch))
+        write_nuscenes([log], folder, read_points)
+
+
+def make_scene(seed: int, protocol: Protocol, places: Places) -> None:
+    """A 4D scene of all recorded pictures of a street; of its stages nothing is kept."""
+    out = places.scene(seed)
+    if (out / "report.json").is_file():
+        return
+    size = protocol.streets.width_px, protocol.streets.height_px
+    control = Control(path=places.street(seed), cameras="all", size=size)
+    options = replace(QUALITIES[protocol.generated.quality], knowledge=TWIN)
+    generate(control, out, options=options)
+    shutil.rmtree(out / "stages", ignore_errors=True)
+    shutil.rmtree(out / "video", ignore_errors=True)
+
+
+def make_sets(protocol: Protocol, places: Places, network: CvtOptions) -> None:
+    """All sets that arms are made of, and those that networks are tested on."""
+    s, real = protocol.streets, protocol.real
+    training, validation = s.seeds("training"), s.seeds("validation")
+    few = training[: real.streets]
+    path = PathOptions(aside_m=protocol.generated.aside_m, turned_deg=protocol.generated.turned_deg)
+    tested = validation[: protocol.generated.validation_streets]
+    sources: dict[str, Iterable[tuple[SampleNote, BevSample]]] = {
+        "validation": _recorded(validation, None, places, network),
+        "real-all": _recorded(training, None, places, network),
+        "real": _recorded(few, real.key_frames, places, network),
+        "warped": _warped(few, protocol, places, network, path),
+        "generated-of-real": _rendered(few, protocol, places, network, path),
+        "generated-of-all": _rendered(training, protocol, places, network, path),
+        "generated-validation": _rendered(tested, protocol, places, network, path),
+    }
+    for name, samples in sources.items():
+        if not places.set(name).is_dir():
+            write_bev_set(samples, places.set(name), network.image, network.grid, count=1)
+            print(f"set {name} is made", flush=True)
+
+
+def log_of(seed: int, places: Places) -> Log:
+    """A street as it was recorded."""
+    return read_nuscenes(places.street(seed), places.street(seed).name)
+
+
+def _recorded(
+    seeds: Iterable[int], most: int | None, places: Places, network: CvtOptions
+) -> Iterator[tuple[SampleNote, BevSample]]:
+    for seed in seeds:
+        yield from samples_of_log(log_of(seed, places), network.image, network.grid, most)
+
+
+def _rendered(
+    seeds: Iterable[int], protocol: Protocol, places: Places, network: CvtOptions, path: PathOptions
+) -> Iterator[tuple[SampleNote, BevSample]]:
+    for seed in seeds:
+        log, scene = log_of(seed, places), load_scene(places.scene(seed) / "scene")
+        drawn, _ = draw_places(log, span_of(scene, log), protocol.generated.per_street, path, seed)
+        made = samples_of_scene(scene, log, drawn, network.image, network.grid, path)
+        yield from (each for each in made if each is not None)
+
+
+def _warped(
+    seeds: Iterable[int], protocol: Protocol, places: Places, network: CvtOptions, path: PathOptions
+) -> Iterator[tuple[SampleNote, BevSample]]:
+    count = protocol.generated.per_street
+    for seed in seeds:
+        yield from warped_samples(log_of(seed, places), count, network.image, network.grid, path, seed)

@@ -1,0 +1,1 @@
+"""What is known of recorded clips: paths, labelled boxes, lidar points."""

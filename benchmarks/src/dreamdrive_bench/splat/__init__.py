@@ -1,0 +1,1 @@
+"""Splatting and training steps: the parts of ``splat``, ``scale``, ``train_step`` and ``gpu``."""

@@ -1,0 +1,1 @@
+"""Drawn streets with a truth, five representations of motion: the parts of ``street``."""

@@ -1,1 +1,0 @@
-"""Drawn streets with a truth, five representations of motion: the parts of ``street.py``."""

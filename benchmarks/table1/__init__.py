@@ -1,1 +1,0 @@
-"""The paper's Table I on recorded drives: the parts of ``table1.py``."""

@@ -1,7 +1,0 @@
-// Bindings of the kernels of a training step.
-#pragma once
-#include <nanobind/nanobind.h>
-
-void bind_fit(nanobind::module_& m);
-void bind_geometry(nanobind::module_& m);
-void bind_motion(nanobind::module_& m);

@@ -1,0 +1,1 @@
+"""Layouts of edition 2: what a street consists of, and where it lies."""

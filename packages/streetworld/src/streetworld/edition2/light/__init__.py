@@ -1,0 +1,1 @@
+"""Light, weather and glass of edition 2."""

@@ -1,0 +1,1 @@
+"""Ground and markings of edition 2."""

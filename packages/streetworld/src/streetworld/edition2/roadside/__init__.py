@@ -1,0 +1,1 @@
+"""Houses, plants and furniture beside the roads."""

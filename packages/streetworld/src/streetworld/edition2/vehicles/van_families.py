@@ -1,0 +1,106 @@
+"""Families of vans, with their shares of the traffic."""
+
+from dataclasses import replace
+
+from streetworld.edition2.vehicles.family import Families, Family
+
+_PANEL = Family(
+    "panel van",
+    (5.0, 6.9),
+    (1.93, 2.08),
+    (2.2, 2.75),
+    cowl=0.12,
+    screen=0.25,
+    roof=0.985,
+    deck=0.993,
+    axles=(0.165, 0.79),
+    nose_z=0.42,
+    cowl_z=0.48,
+    deck_z=0.48,
+    tail_z=0.47,
+    panes=((0.015, 0.23),),
+    doors=((0.01, 0.23, False), (0.27, 0.5, True)),
+    wheel_m=(0.33, 0.37),
+    clearance_m=(0.2, 0.28),
+    tumble=0.9,
+    round_plan=11.0,
+    round_roof_m=0.12,
+    roof_drop_m=0.02,
+    bulge=0.03,
+    clad=0.5,
+    tails=(1, 5),
+)
+_SMALL_VAN = replace(
+    _PANEL,
+    name="small van",
+    length_m=(4.15, 4.75),
+    width_m=(1.75, 1.9),
+    height_m=(1.78, 1.95),
+    cowl=0.22,
+    screen=0.37,
+    axles=(0.195, 0.8),
+    nose_z=0.48,
+    cowl_z=0.57,
+    deck_z=0.57,
+    tail_z=0.55,
+    panes=((0.03, 0.36),),
+    doors=((0.0, 0.36, False), (0.4, 0.7, True)),
+    wheel_m=(0.3, 0.33),
+    tumble=0.87,
+    tails=(1, 2, 5),
+)
+_WINDOWED = ((0.015, 0.23), (0.26, 0.48), (0.51, 0.73), (0.76, 0.96))
+VANS: Families = (
+    (0.3, _PANEL),
+    (0.25, _SMALL_VAN),
+    (0.15, replace(_SMALL_VAN, name="family van", panes=((0.03, 0.36), (0.39, 0.67), (0.7, 0.94)))),
+    (0.12, replace(_PANEL, name="minibus", panes=_WINDOWED)),
+    (
+        0.18,
+        replace(
+            _PANEL,
+            name="people carrier",
+            length_m=(4.85, 5.35),
+            width_m=(1.88, 2.0),
+            height_m=(1.88, 2.02),
+            cowl=0.185,
+            screen=0.3,
+            roof=0.965,
+            deck=0.985,
+            axles=(0.185, 0.79),
+            nose_z=0.48,
+            cowl_z=0.56,
+            deck_z=0.56,
+            tail_z=0.54,
+            panes=((0.02, 0.3), (0.33, 0.62), (0.65, 0.94)),
+            doors=((0.0, 0.3, False), (0.34, 0.62, True)),
+            tumble=0.86,
+            tails=(1, 2),
+        ),
+    ),
+)
+VANS_KEPT_OUT: Families = (
+    (
+        1.0,
+        replace(
+            _PANEL,
+            name="step van",
+            length_m=(5.6, 7.2),
+            width_m=(2.05, 2.2),
+            height_m=(2.6, 3.0),
+            cowl=0.07,
+            screen=0.12,
+            nose_z=0.36,
+            cowl_z=0.42,
+            deck_z=0.42,
+            tail_z=0.41,
+            panes=((0.02, 0.14),),
+            doors=((0.02, 0.15, True),),
+            tumble=0.97,
+            round_plan=18.0,
+            round_roof_m=0.07,
+            tails=(3, 5),
+        ),
+    ),
+)
+"""That of looks kept out."""

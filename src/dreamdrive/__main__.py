@@ -1,0 +1,5 @@
+"""``python -m dreamdrive``."""
+
+from dreamdrive.cli.main import main
+
+main()

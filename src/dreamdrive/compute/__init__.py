@@ -1,0 +1,1 @@
+"""Devices, threads and functions of the compiled core."""

@@ -1,3 +1,0 @@
-"""Argoverse 2: sensor logs with boxes on tracks and a vector map, without their pictures."""
-
-from dreamdrive.data.argoverse.log import is_argoverse, read_argoverse

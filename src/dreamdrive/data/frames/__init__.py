@@ -1,0 +1,1 @@
+"""Frames of a source: their choice, their times, and remarks on them."""

@@ -1,0 +1,1 @@
+"""Actors made of moving clusters: paths, bodies, life spans."""

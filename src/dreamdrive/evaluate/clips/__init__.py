@@ -1,0 +1,1 @@
+"""Figures of how real sets of clips look."""

@@ -1,0 +1,1 @@
+"""The truth about a scene's frames, drawn or recorded."""

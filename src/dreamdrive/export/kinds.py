@@ -1,0 +1,112 @@
+"""What every export offers, and those of dreamdrive; what writes them is loaded when one is taken."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from dreamdrive.files.kinds import COLMAP_KIND, NCORE_KIND, NERFSTUDIO_KIND, NUSCENES_KIND, PLY_KIND
+from dreamdrive.files.output import check_ending, check_free, check_new_file
+from dreamdrive.registry import loaded
+
+Place = str | Callable[..., Any]
+"""A function, or where it is as ``module:name``, so that it is loaded when it is called."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """A format of other programs, by its name for ``--to``.
+
+    Attributes:
+        name: For the command line.
+        about: What it is, for people.
+        scene: Writes a scene; of it, a path, and by name ``replace``, ``progress`` and what is in ``takes``.
+        world: Likewise of the drives of a drawn street; None where that is not written.
+        takes: ``clip`` and ``geometry``, of which a scene was made, and ``name``, that of a drawn street.
+        ending: Of the file that it is; None of a folder.
+        folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
+        need: Raises ``InputError`` where a package is missing.
+        left_out: Says what of a scene has no place in it, of the scene and the path.
+    """
+
+    name: str
+    about: str
+    scene: Place
+    world: Place | None = None
+    takes: frozenset[str] = frozenset()
+    ending: str | None = None
+    folder: str | None = None
+    need: Place | None = None
+    left_out: Place | None = None
+
+    def check(self, path: Path, replace: bool) -> None:
+        """Fail before anything is loaded where the path cannot be written, or a package is missing."""
+        if self.ending is not None and self.folder is None:
+            check_ending(path, self.ending)
+        if self.folder is None or path.suffix.lower() == self.ending:
+            check_new_file(path, replace)
+        else:
+            check_free(path, replace, self.folder)
+        if self.need is not None:
+            function(self.need)()
+
+
+def function(place: Place) -> Callable[..., Any]:
+    """The function at a place."""
+    return cast("Callable[..., Any]", loaded(place)) if isinstance(place, str) else place
+
+
+PLY = Export(
+    name="ply",
+    about="what viewers of 3D Gaussians read",
+    scene="dreamdrive.export.ply:export_ply",
+    ending=".ply",
+    folder=PLY_KIND,
+    left_out="dreamdrive.export.ply:left_out_of_ply",
+)
+NUSCENES = Export(
+    name="nuscenes",
+    about="a data set in the format of nuScenes, with pictures, labels and lidar",
+    scene="dreamdrive.export.nuscenes.nuscenes:export_scene",
+    world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
+    takes=frozenset({"name"}),
+    folder=NUSCENES_KIND,
+)
+NCORE = Export(
+    name="ncore",
+    about="the clip with its poses for NuRec, 3dgrut and gsplat",
+    scene="dreamdrive.export.ncore.ncore:scene_to_ncore",
+    world="dreamdrive.export.ncore.ncore:world_to_ncore",
+    takes=frozenset({"clip", "geometry"}),
+    folder=NCORE_KIND,
+    need="dreamdrive.export.ncore.words:need_ncore",
+)
+MCAP = Export(
+    name="mcap",
+    about="the drive for Foxglove",
+    scene="dreamdrive.export.mcap.mcap:scene_to_mcap",
+    world="dreamdrive.export.mcap.mcap:world_to_mcap",
+    takes=frozenset({"clip"}),
+    ending=".mcap",
+    need="dreamdrive.export.mcap.file:need_foxglove",
+)
+COLMAP = Export(
+    name="colmap",
+    about="frames, cameras and points as a COLMAP model",
+    scene="dreamdrive.export.cameras.colmap:scene_to_colmap",
+    takes=frozenset({"clip"}),
+    folder=COLMAP_KIND,
+)
+NERFSTUDIO = Export(
+    name="nerfstudio",
+    about="frames, cameras and points with transforms.json",
+    scene="dreamdrive.export.cameras.nerfstudio:scene_to_nerfstudio",
+    takes=frozenset({"clip"}),
+    folder=NERFSTUDIO_KIND,
+)
+TUM = Export(
+    name="tum",
+    about="the path of the first camera, a pose a line",
+    scene="dreamdrive.export.cameras.tum:scene_to_tum",
+    ending=".txt",
+)

@@ -1,0 +1,1 @@
+"""Drives in NVIDIA NCore V4."""

@@ -1,0 +1,1 @@
+"""Drives as data sets in the format of nuScenes."""

@@ -1,0 +1,12 @@
+"""Kinds of folders that are written whole, as their marks and messages call them (``files.output``)."""
+
+WORLD_KIND = "drawn street"
+LOOK_KIND = "look"
+SAMPLES_KIND = "set of samples"
+RECORDING_KIND = "recording"
+NUSCENES_KIND = "nuScenes data set"
+NCORE_KIND = "NCore sequence"
+COLMAP_KIND = "COLMAP model with pictures"
+NERFSTUDIO_KIND = "nerfstudio data set"
+PLY_KIND = "folder of PLY files"
+EDITED_KIND = "edited scene"

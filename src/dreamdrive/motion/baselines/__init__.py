@@ -1,0 +1,1 @@
+"""Representations that the hybrid one is compared with (Table I)."""

@@ -1,0 +1,1 @@
+"""Reports of a run: its cost before, its results after."""

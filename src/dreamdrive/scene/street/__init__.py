@@ -1,0 +1,1 @@
+"""Streets: layouts, logs, the truth of drawn drives, and what is seen of them."""

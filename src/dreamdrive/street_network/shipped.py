@@ -1,0 +1,45 @@
+"""The network by the name of the weights that ship, or by a file of others."""
+
+from functools import cache
+from pathlib import Path
+
+from dreamdrive.errors import InputError
+from dreamdrive.street_network.network import StreetNetwork
+from dreamdrive.street_network.weights import EXPECTED, read_network
+
+SHIPPED = "street"
+"""The name of the weights that ship."""
+NO_KNOWLEDGE = "none"
+"""In place of weights: the street network is not asked."""
+_FILE = Path(__file__).with_name("street.safetensors")
+
+
+def load_knowledge(given: str | Path = SHIPPED) -> StreetNetwork:
+    """The network with the weights that ship, or those in a file, ready to look.
+
+    Raises:
+        InputError: There are none, or the file is of something else.
+    """
+    path = weights_of(given)
+    return _shipped(path) if given == SHIPPED else read_network(path)[0].folded()
+
+
+@cache
+def _shipped(path: Path) -> StreetNetwork:
+    """Read once: a run asks for it twice, and it takes 0.2 s."""
+    return read_network(path)[0].folded()
+
+
+def weights_of(given: str | Path = SHIPPED) -> Path:
+    """The file of weights.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = _FILE if given == SHIPPED else Path(given)
+    if not path.is_file():
+        wrong = "there is no such file; expected street, or"
+        if given == SHIPPED:
+            wrong = "this installation has no weights; give"
+        raise InputError(f"--knowledge {given}: {wrong} a file of {EXPECTED}")
+    return path

@@ -1,0 +1,1 @@
+"""Uses of scenes: perception, planning, driving in a closed loop. The stages import none of it."""

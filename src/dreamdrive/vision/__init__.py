@@ -1,0 +1,1 @@
+"""Image processing without a scene: flow, likeness, windows, linked pixels."""

@@ -1,0 +1,91 @@
+"""Behind what is taken away stands the street: nothing that no frame saw, and no hole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from dreamdrive.edit import Recolour, Remove, edited
+from dreamdrive.edit.behind import filled_behind
+from dreamdrive.scene.actor import Actor, Track
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import SH_C0, Gaussians
+from dreamdrive.scene.scene import Scene
+from dreamdrive.splat import render_scene
+
+CAMERA = Camera(40.0, 40.0, 24.0, 16.0, 48, 32)
+GREEN, RED, WHITE = (0.2, 0.6, 0.2), (0.8, 0.1, 0.1), (1.0, 1.0, 1.0)
+
+
+def board(z_m: float, half_m: tuple[float, float], colour: tuple[float, ...], step_m: float) -> Gaussians:
+    """A board that faces the camera."""
+    x, y = (np.arange(-half, half + 1e-6, step_m) for half in half_m)
+    places = np.stack([*np.meshgrid(x, y)], axis=-1).reshape(-1, 2)
+    count = len(places)
+    return Gaussians(
+        means=torch.from_numpy(np.column_stack([places, np.full(count, z_m)])).float(),
+        quaternions=torch.tensor([[1.0, 0, 0, 0]]).repeat(count, 1),
+        log_scales=torch.full((count, 3), float(np.log(0.6 * step_m))),
+        logit_opacities=torch.full((count,), 5.0),
+        sh=((torch.tensor(colour) - 0.5) / SH_C0).repeat(count, 1)[:, None],
+        source_frame=torch.zeros(count, dtype=torch.int64),
+        actor=None,
+    )
+
+
+def scene(static: Gaussians) -> Scene:
+    """A red board stands before the street in both views."""
+    car = board(5.0, (0.5, 0.5), RED, 0.1)
+    car = replace(car, actor=torch.zeros(len(car), dtype=torch.int64))
+    track = Track(np.array([0.0, 0.1]), np.array([[0.0, 0, 5.0]] * 2), np.zeros(2))
+    return Scene(
+        static=static,
+        dynamic=car,
+        deformation=None,
+        actors=(Actor(0, "actor 0", "vehicle", len(car), track),),
+        sky=None,
+        exposure=None,
+        cameras=(CAMERA, CAMERA),
+        times_s=np.array([0.0, 0.1]),
+        held_out=np.zeros(2, bool),
+    )
+
+
+@pytest.fixture(scope="module")
+def wall() -> Gaussians:
+    return board(10.0, (7.0, 5.0), GREEN, 0.2)
+
+
+def middle(shown: Scene) -> np.ndarray:
+    """The colour in the middle of the picture."""
+    return render_scene(shown, CAMERA, 0.0).colour[12:20, 20:28].mean((0, 1)).numpy()
+
+
+def test_what_no_frame_saw_goes_with_what_hid_it(wall: Gaussians) -> None:
+    hidden = board(8.0, (0.2, 0.2), WHITE, 0.2)
+    before = scene(Gaussians.concatenate(wall, hidden))
+    assert middle(before)[0] > 0.7
+    assert middle(before.without(0)).min() > 0.3  # white
+    after = edited(before, [Remove(0)])
+    np.testing.assert_allclose(middle(after), GREEN, atol=0.05)
+
+
+def test_a_hole_is_filled_from_around_it_where_it_is(wall: Gaussians) -> None:
+    off = wall.means[:, :2].abs().amax(dim=1) > 0.9
+    before = scene(wall.select(off))
+    assert middle(before.without(0)).max() < 0.35
+    after = edited(before, [Remove(0)])
+    np.testing.assert_allclose(middle(after), GREEN, atol=0.1)
+    added = after.static.means[after.static.means[:, :2].abs().amax(dim=1) < 0.8]
+    assert len(added)
+    assert (added[:, 2] - 10).abs().max() < 1
+    edge = render_scene(after, CAMERA, 0.0).colour[:, :8] - render_scene(before, CAMERA, 0.0).colour[:, :8]
+    assert edge.abs().max() < 1 / 255
+
+
+def test_where_nobody_leaves_a_place_nothing_is_filled(wall: Gaussians) -> None:
+    before = scene(wall)
+    assert edited(before, [Recolour(0, GREEN)]).static is before.static
+    kept = filled_behind(before, before)
+    assert torch.equal(kept.static.means, before.static.means)
