@@ -18,12 +18,13 @@ OUT ?= $(if $(INPUT),demo/clip,demo/street)
 INPUT ?=
 OPTIONS ?=
 
-.PHONY: help install demo test ci check sanitize snapshots wheels format clean
+.PHONY: help install demo test ci check site sanitize snapshots wheels format clean
 
 help:
 	@echo "make demo [INPUT=clip.mp4] [OUT=demo/street] [OPTIONS='--quality draft']   a scene and its videos"
 	@echo "make test      the quick tests"
-	@echo "make ci        lint, types, sanitizers, slow tests, examples"
+	@echo "make ci        lint, types, sanitizers, slow tests, examples, the site"
+	@echo "make site      the documentation as a site, into build/site"
 	@echo "make snapshots the texts that tests keep, anew"
 	@echo "make wheels    wheels for Linux into dist/ [PYTHONS='python3.11 python3.12']"
 	@echo "make install   only the set-up, into $(VENV)"
@@ -54,17 +55,22 @@ check: install
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 
+# Warnings, of links to nowhere and of pages outside the navigation, are errors.
+site: install
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -c docs/site -d build/site/.doctrees . build/site
+
 # The tests of splatting on a core compiled with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize: install
 	.ci/sanitize
 
-ci: check sanitize
+ci: check sanitize site
 	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
 	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)" || exit 1; done
 
 # Public names, messages and pages that tests compare with: look at the difference before it is committed.
 snapshots: install
-	DREAMDRIVE_SNAPSHOTS=renew $(PYTEST) --quiet tests/test_public_names.py tests/cli/test_messages.py tests/test_examples.py
+	DREAMDRIVE_SNAPSHOTS=renew $(PYTEST) --quiet tests/test_public_names.py tests/cli/test_messages.py \
+		tests/cli/test_commands_document.py tests/run/test_options_page.py tests/test_examples.py
 
 wheels:
 	packaging/wheels $(PYTHONS)

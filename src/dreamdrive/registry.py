@@ -11,7 +11,7 @@ from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from dreamdrive.errors import InputError
 
@@ -41,6 +41,14 @@ MOVED = {
 }
 GOES_WITH = "0.2"
 """The version without these names: the minor version after the one that moved them."""
+FRAMES = "dreamdrive.show.rendering:frames"
+"""What ``Scene.render`` is."""
+SHOWN = {
+    "Look": "dreamdrive.show.notebook:of_look",
+    "Scene": "dreamdrive.show.notebook:of_scene",
+    "Trajectory": "dreamdrive.show.notebook:of_trajectory",
+}
+"""What nouns look like in notebooks, by their classes: they lie below all that draws."""
 
 
 class _Offering(ModuleType):
@@ -179,11 +187,16 @@ def _entry_points(group: str, path: tuple[str, ...]) -> "EntryPoints":
     return entry_points(group=group)
 
 
-def loaded(place: str) -> object:
+def loaded(place: str) -> Any:
     """What ``module:name`` stands for."""
     from importlib.metadata import EntryPoint
 
     return EntryPoint("", place, "").load()
+
+
+def shown(noun: object) -> str:
+    """A noun as notebooks show it: HTML."""
+    return loaded(SHOWN[type(noun).__name__])(noun)
 
 
 def _package(entry: "EntryPoint") -> str:

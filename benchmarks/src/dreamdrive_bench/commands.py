@@ -20,10 +20,12 @@ COMMANDS = {
     "environment": "environment",
     "evaluate": "evaluate",
     "filling": "photo.filling",
+    "film": "film",
     "fusion": "fusion.main",
     "geometry": "geometry.main",
     "gpu": "splat.gpu",
     "headline": "headline",
+    "illustrations": "illustrations",
     "kill": "kill",
     "knowledge": "knowledge.main",
     "occupancy": "occupancy",
@@ -57,7 +59,7 @@ def main(arguments: Sequence[str]) -> int | None:
         return 2
     print(f"usage: {PROGRAM} NAME ...\n\nOne command for each published figure; each has --help.\n")
     for name in COMMANDS:
-        print(f"  {name:<12}{said_of(name)}")
+        print(f"  {name:<14}{said_of(name)}")
     return 0
 
 

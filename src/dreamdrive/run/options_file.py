@@ -15,13 +15,14 @@ from dreamdrive.files.paths import read_text
 from dreamdrive.options import Options
 
 T = TypeVar("T")
-_ELSEWHERE = {
+ELSEWHERE = {
     "quality": "--quality",
     "seed": "--seed",
     "geometry.weights": "--weights or --geometry-weights",
     "knowledge": "--knowledge",
     "method": "--method",
 }
+"""Fields that no file sets, and the flags that do."""
 _NONE = "none"
 """What stands for no value, which TOML has no word for."""
 
@@ -47,7 +48,7 @@ def _names(options: Any, before: str) -> Iterator[str]:
         name, value = f"{before}{field.name}", getattr(options, field.name)
         if is_dataclass(value):
             yield from _names(value, f"{name}.")
-        elif name not in _ELSEWHERE:
+        elif name not in ELSEWHERE:
             yield name
 
 
@@ -71,8 +72,8 @@ def _changed(options: T, values: dict[str, Any], before: str, where: str, known:
 
 
 def _unknown(name: str, is_table: bool, known: list[str]) -> str:
-    if name in _ELSEWHERE:
-        return f"{name} is set by {_ELSEWHERE[name]}"
+    if name in ELSEWHERE:
+        return f"{name} is set by {ELSEWHERE[name]}"
     if is_table:
         return f"{name} is a table of options: write [{name}] and one name = value a line"
     last = name.rsplit(".", 1)[-1]

@@ -17,7 +17,7 @@ from dreamdrive.run.report.cost import announcement, check_memory
 from dreamdrive.run.report.document import describe, facts_about
 from dreamdrive.run.report.held_out import score_baselines, score_scene
 from dreamdrive.run.report.in_motion import found_again
-from dreamdrive.run.report.outcome import Outcome, outcome_of
+from dreamdrive.run.report.outcome import PICTURE, Outcome, outcome_of
 from dreamdrive.run.report.shift import shift_of
 from dreamdrive.run.request import Request
 from dreamdrive.run.stages import Stages
@@ -73,7 +73,7 @@ class Production(Stages):
             videos = staging / "video"
             write_videos(videos, scene, recorded, self._scored(built), progress, shift_m=shift.right_m)
             write_held_out(staging / "held_out", scene, clip.source_index.tolist())
-            write_png(staging / "report.png", draw_geometry(clip, geometry, scene))
+            write_png(staging / PICTURE, draw_geometry(clip, geometry, scene))
             if (drives := draw_drives(scene)) is not None:
                 write_png(videos / "drives.png", drives)
 
@@ -96,7 +96,8 @@ class Production(Stages):
             self.whole_s,
         )
         self.workspace.publish(report)
-        return outcome_of(report, REPORT, already_finished=False)
+        done = outcome_of(report, REPORT, already_finished=False)
+        return replace(done, picture=self.workspace.out / PICTURE)
 
     def _scored(self, built: Built) -> Scored | None:
         """What the panel of the dynamic scores shows, where the representation has them."""

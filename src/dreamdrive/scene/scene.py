@@ -5,10 +5,11 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.errors import InputError
+from dreamdrive.registry import FRAMES, loaded, shown
 from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.exposure import Exposure
@@ -279,6 +280,19 @@ class Scene:
             [first_s + (centre_s - first_s) * slower + later_s, deviation_s * slower], dim=1
         )
         return replace(steered, actors=kept, dynamic=replace(self.dynamic, lifespan=lifespan))
+
+    def render(
+        self, trajectory: Trajectory, size: tuple[int, int] | None = None
+    ) -> UInt8[np.ndarray, "t h w 3"]:
+        """Frames (T, H, W, 3) along a path, by the first recorded camera: RGB as bytes, a frame a pose.
+
+        ``size`` is width and height in pixels, that of the recording without it; the horizontal field of view
+        stays. ``dreamdrive.render_scene`` gives depth and more of one view.
+        """
+        return loaded(FRAMES)(self, trajectory, size)
+
+    def _repr_html_(self) -> str:
+        return shown(self)
 
     @torch.no_grad()
     def static_at(self, t_s: float) -> Gaussians:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
+from dreamdrive.registry import shown
 from dreamdrive.scene.camera import check_rigid
 
 LATEST_S = 1e12
@@ -33,6 +34,9 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.times_s)
+
+    def _repr_html_(self) -> str:
+        return shown(self)
 
     @property
     def positions_m(self) -> Float[np.ndarray, "t 3"]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from dreamdrive.show.layout import draw_layout as draw_layout
     from dreamdrive.show.log import draw_log as draw_log
     from dreamdrive.show.look import draw_look as draw_look
+    from dreamdrive.show.notebook import card as card, small_picture as small_picture
     from dreamdrive.show.panels import (
         Image as Image,
         depth_colours as depth_colours,
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     )
     from dreamdrive.show.rendering import (
         RenderOptions as RenderOptions,
+        frames as frames,
         places as places,
         video_rate as video_rate,
         write_drive as write_drive,

@@ -74,6 +74,15 @@ def write_drive(
         (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, options), allow_nan=False) + "\n")
 
 
+def frames(
+    scene: Scene, trajectory: Trajectory, size: tuple[int, int] | None = None
+) -> UInt8[np.ndarray, "t h w 3"]:
+    """What the first recorded camera sees along a path, see ``Scene.render``."""
+    camera = view_camera(scene.cameras[0], size)
+    views = zip(trajectory.world_from_camera, trajectory.times_s, strict=True)
+    return np.stack([render_scene(scene, camera.at(pose), float(t_s)).picture for pose, t_s in views])
+
+
 def video_rate(drive: Drive, options: RenderOptions) -> float:
     """Frames a second of a video of a drive, within ``RATES_HZ``."""
     rate = frame_rate(drive.path) if options.fps is None else options.fps

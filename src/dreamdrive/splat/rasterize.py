@@ -68,7 +68,7 @@ def rasterize(
         channels: Further values per Gaussian (N, C), composited like colour.
         screen_offsets_px: Added to the projected centres (N, 2): zeros whose gradient densification reads.
         screen_absolute_px: Any numbers (N, 2), which change nothing: their gradient is the sum over the
-            pixels of |dL/du| and |dL/dv|, which do not cancel where a Gaussian is too large (AbsGS).
+            pixels of ``|dL/du|`` and ``|dL/dv|``, which do not cancel where a Gaussian is too large (AbsGS).
         sh_degree: Degree to evaluate, at most the stored one (default); higher ones get zero gradients.
         antialiased: Multiply each opacity by sqrt(det / det') of the projected covariance before and after
             the 0.3 px^2 are added, so that small Gaussians do not gain weight from afar (Mip-Splatting).

@@ -1,6 +1,6 @@
 """The outcome of a run, from its report, and the lines that say it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +16,8 @@ _NAMED = 3
 _IDS = 40
 _LIMITS = "metres", "aside", "drive", "shift"
 _BLEND = "flow_interpolation"
+PICTURE = "report.png"
+"""What lies beside the report."""
 
 
 class _Frames(msgspec.Struct):
@@ -80,6 +82,7 @@ class Outcome:
             what video shows it from aside.
         program: Digest of the program that made it; empty where the report is older than these.
         whole_s: What all of it took; None where the report does not tell, and the stages alone do.
+        picture: ``report.png`` beside the report; None where it was not read from a folder.
     """
 
     already_finished: bool
@@ -97,11 +100,20 @@ class Outcome:
     program: str = ""
     ids: dict[str, tuple[int, ...]] = field(default_factory=dict)
     whole_s: float | None = None
+    picture: Path | None = None
+
+    def _repr_html_(self) -> str:
+        from dreamdrive.show import card, small_picture
+
+        rows = dict(line.split(maxsplit=1) for line in lines_of(self))
+        there = self.picture is not None and self.picture.is_file()
+        return card("Outcome", rows, small_picture(self.picture) if self.picture and there else None)
 
 
 def read_outcome(report: Path, *, already_finished: bool) -> Outcome:
     """The outcome that ``report.json`` tells of."""
-    return outcome_of(read_json(report), str(report), already_finished=already_finished)
+    told = outcome_of(read_json(report), str(report), already_finished=already_finished)
+    return replace(told, picture=report.parent / PICTURE)
 
 
 def outcome_of(document: dict[str, Any], where: str, *, already_finished: bool) -> Outcome:

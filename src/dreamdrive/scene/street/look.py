@@ -6,6 +6,7 @@ from math import atan, cos, tan
 import numpy as np
 from jaxtyping import Bool, Float, UInt8, UInt16
 
+from dreamdrive.registry import shown
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.street.street_class import ROAD_USERS, StreetClass
 
@@ -123,6 +124,9 @@ class Look:
 
     def __len__(self) -> int:
         return len(self.depth)
+
+    def _repr_html_(self) -> str:
+        return shown(self)
 
     @property
     def depth_m(self) -> Float[np.ndarray, "f h w"]:
