@@ -1,4 +1,21 @@
-"""From a dashcam clip to a 4D Gaussian scene and a new drive through it, on a laptop CPU."""
+"""From a dashcam clip to a 4D Gaussian scene and a new drive through it, on a laptop CPU.
+
+Most need no more than::
+
+    outcome = generate("drive.mp4", "out", quality="draft", camera_height_m=1.4)
+    scene = load_scene("out/scene")
+    frames = scene.render(scene.trajectory)  # uint8 (frames, height, width, 3)
+    view = render_scene(scene, scene.cameras[0], t_s=0.5)  # colour, alpha, depth_m, dynamic_share
+    seen = look(frames)  # depth, classes, road users and the camera, of each picture by itself
+
+``Control`` says how an input is read, ``Options`` how a scene is built; ``build_scene`` goes from a ``Clip``
+to a ``Scene`` without a folder. In notebooks scenes, trajectories, looks and outcomes show themselves. More is
+in packages: ``drive`` (new paths), ``edit``, ``export``, ``evaluate``, ``splat``, ``show``, ``tasks``;
+``prior``, ``geometry`` and ``data`` hold what others add to.
+
+World: the first camera, x right, y down, z forward, metres. Pictures are NumPy, Gaussians torch. A user's
+mistake is an ``InputError``.
+"""
 
 import sys
 from typing import TYPE_CHECKING

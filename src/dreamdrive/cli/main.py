@@ -122,7 +122,7 @@ def _run(errors: Console) -> None:
     tyro.extras.subcommand_cli_from_dict(
         {**COMMANDS, **_others(sys.argv[1:2])},
         prog="dreamdrive",
-        description=dreamdrive.__doc__,
+        description=(dreamdrive.__doc__ or "").partition("\n")[0],
         config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
         registry=REGISTRY,
     )
