@@ -9,8 +9,8 @@ Most need no more than::
     seen = look(frames)  # depth, classes, road users and the camera, of each picture by itself
 
 ``Control`` says how an input is read, ``Options`` how a scene is built; ``build_scene`` goes from a ``Clip``
-to a ``Scene`` without a folder. In notebooks scenes, trajectories, looks and outcomes show themselves. More is
-in packages: ``drive`` (new paths), ``edit``, ``export``, ``evaluate``, ``splat``, ``show``, ``tasks``;
+to a ``Scene`` without a folder. In notebooks scenes, trajectories, looks and outcomes show themselves. More
+is in packages: ``drive`` (new paths), ``edit``, ``export``, ``evaluate``, ``splat``, ``show``, ``tasks``;
 ``prior``, ``geometry`` and ``data`` hold what others add to.
 
 World: the first camera, x right, y down, z forward, metres. Pictures are NumPy, Gaussians torch. A user's
