@@ -55,9 +55,10 @@ check: install
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 
-# Warnings, of links to nowhere and of pages outside the navigation, are errors.
+# Warnings, of links to nowhere and of pages outside the navigation, are errors; so is what a page would fetch.
 site: install
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -c docs/site -d build/site/.doctrees . build/site
+	@! grep -rlE '(src|href)="(https?:)?//[^"]+\.(js|css|woff2?)"' build/site --include='*.html'
 
 # The tests of splatting on a core compiled with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize: install
