@@ -12,6 +12,8 @@ from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, Trial, initialise
 from dreamdrive.progress import Work, call
 from dreamdrive.scene.clip import Known
+from dreamdrive.scene.residual import residual_of
+from dreamdrive.splat import render_scene
 from tests.streets import small_street, street_clip, true_geometry
 
 DRAFT = options.QUALITIES["draft"]
@@ -34,6 +36,9 @@ def test_what_is_given_takes_the_place_of_its_stage_and_each_stage_goes_through_
         return made[name]
 
     scene = build_scene(clip, TINY, given=Given(geometry=geometry), run=noted).scene
+    assert scene.residual is not None
+    shown = render_scene(scene, scene.cameras[1], float(scene.times_s[1])).colour.numpy()
+    np.testing.assert_array_equal(scene.residual[1], residual_of(shown, clip.frames[1]))
     assert list(made) == ["look", "geometry", "initialise", "static", "score", "group", "fit"]
     assert made["geometry"] is geometry
     assert scene is made["fit"]

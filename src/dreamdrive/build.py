@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float16
 
 from dreamdrive.decompose import (
     Actors,
@@ -30,8 +30,10 @@ from dreamdrive.progress import Run, Work, call
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.scene.residual import residual_of
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.street.look import Look
+from dreamdrive.splat import render_scene
 from dreamdrive.stored import check
 from dreamdrive.street_network import NO_KNOWLEDGE, look_at, weights_of, with_looks
 
@@ -158,10 +160,21 @@ def _fitted(
 
 
 def _completed(clip: Clip, scene: Scene) -> Scene:
-    """The scene with what the prior knows to stand where no frame looks."""
+    """The scene with how far it is off its frames, and what the prior knows to stand where none looks."""
+    compared = replace(scene, residual=_residual(clip, scene))
     if clip.known.unseen is None or scene.moves_per_frame or not len(scene.static):
-        return scene
-    return scene.with_standing(clip.known.unseen)
+        return compared
+    return compared.with_standing(clip.known.unseen)
+
+
+def _residual(clip: Clip, scene: Scene) -> Float16[np.ndarray, "f bh bw"]:
+    """Of each recorded view."""
+    views = zip(scene.cameras, scene.times_s.tolist(), clip.frames, strict=True)
+    shown = [
+        residual_of(render_scene(scene, camera, t_s, of_rig=scene.of_rig(i)).colour.numpy(), frame)
+        for i, (camera, t_s, frame) in enumerate(views)
+    ]
+    return np.stack(shown)
 
 
 def decompose(

@@ -218,6 +218,23 @@ def test_round_trip_of_a_rig(tmp_path: Path) -> None:
     assert len(loaded.trajectory) == 2
 
 
+def test_round_trip_of_residuals_and_those_of_other_views_are_refused(tmp_path: Path) -> None:
+    scene = make_scene()
+    shape = len(scene.cameras), scene.cameras[0].height_px // 8, scene.cameras[0].width_px // 8
+    residual = np.random.default_rng(0).uniform(size=shape).astype(np.float16)
+    save_scene(replace(scene, residual=residual), tmp_path / "s")
+    loaded = load_scene(tmp_path / "s")
+    assert loaded.residual is not None
+    assert loaded.residual.dtype == np.float16
+    np.testing.assert_array_equal(loaded.residual, residual)
+    save_scene(scene, tmp_path / "none")
+    assert load_scene(tmp_path / "none").residual is None
+    for number, wrong in enumerate((residual[:, :-1], residual - 2, residual + 2)):
+        save_scene(replace(scene, residual=wrong), tmp_path / f"{number}")
+        with pytest.raises(InputError, match="residuals are none of these views"):
+            load_scene(tmp_path / f"{number}")
+
+
 ROWS = ((0.0, 0.0, 1.0, 1 / 3), (-1.0, 0.0, 0.0, 5.25e6), (0.0, -1.0, 0.0, 1.4), (0.0, 0.0, 0.0, 1.0))
 
 

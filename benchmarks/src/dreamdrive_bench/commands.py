@@ -45,6 +45,7 @@ COMMANDS = {
     "surround": "surround",
     "table1": "table1.main",
     "train_step": "splat.train_step",
+    "trust": "trust.main",
     "wild": "wild.main",
 }
 """Where the ``main`` of each is; the docstring of its module is its help."""

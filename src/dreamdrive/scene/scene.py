@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Float16, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.errors import InputError
@@ -95,6 +95,8 @@ class Scene:
         provenance: What the scene was made from.
         camera: Which camera of a rig each view is of (F,), the first one's being the drive; None where there
             is one camera only.
+        residual: How far each view is off its frame, see ``scene.residual`` (F, H // 8, W // 8); None where
+            no frames were compared.
     """
 
     static: Gaussians
@@ -108,6 +110,7 @@ class Scene:
     held_out: Bool[np.ndarray, " f"]
     provenance: Provenance = field(default_factory=Provenance)
     camera: Int[np.ndarray, " f"] | None = None
+    residual: Float16[np.ndarray, "f bh bw"] | None = None
 
     def __post_init__(self) -> None:
         counts = [len(self.cameras), len(self.times_s), len(self.held_out)]

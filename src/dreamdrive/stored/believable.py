@@ -2,8 +2,10 @@
 
 import numpy as np
 import torch
+from jaxtyping import Float16
 
-from dreamdrive.scene.camera import FARTHEST_M, check_rigid
+from dreamdrive.scene.camera import FARTHEST_M, Camera, check_rigid
+from dreamdrive.scene.residual import BLOCK_PX
 from dreamdrive.scene.scene import Provenance, Scene
 
 MAX_PIXELS = 64_000_000
@@ -31,6 +33,14 @@ def _check_views(scene: Scene) -> None:
             raise ValueError("times of the views do not increase")
     if max(camera.width_px * camera.height_px for camera in scene.cameras) > MAX_PIXELS:
         raise ValueError(f"a view has more than {MAX_PIXELS:.0e} pixels")
+    if scene.residual is not None:
+        _check_residual(scene.residual, scene.cameras)
+
+
+def _check_residual(residual: Float16[np.ndarray, "f bh bw"], cameras: tuple[Camera, ...]) -> None:
+    shapes = {(len(cameras), c.height_px // BLOCK_PX, c.width_px // BLOCK_PX) for c in cameras}
+    if shapes != {residual.shape} or not 0 <= residual.min() <= residual.max() <= 1:
+        raise ValueError("residuals are none of these views")
 
 
 def _check_gaussians(scene: Scene) -> None:

@@ -197,6 +197,8 @@ def _tensors(scene: Scene) -> dict[str, dict[str, Tensor]]:
         }
         if scene.exposure.camera is not None:
             tensors["exposure"]["camera"] = torch.from_numpy(scene.exposure.camera)
+    if scene.residual is not None:
+        tensors["residual"] = {"rms": torch.from_numpy(scene.residual)}
     return tensors
 
 
@@ -286,6 +288,7 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
         raise KeyError("no static or no dynamic Gaussians")
     ranges = {} if stored.sky is None else msgspec.structs.asdict(stored.sky)
     sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
+    residual = part("residual")
     return Scene(
         static=build(Gaussians, static),
         dynamic=build(Gaussians, dynamic),
@@ -298,6 +301,7 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
         held_out=np.array(stored.held_out, dtype=bool),
         camera=None if stored.camera is None else np.array(stored.camera, dtype=np.int64),
         provenance=stored.provenance,
+        residual=None if residual is None else residual["rms"].numpy(),
     )
 
 

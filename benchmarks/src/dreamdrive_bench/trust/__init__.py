@@ -1,0 +1,1 @@
+"""How well trust in a view goes with its true error."""

@@ -1,0 +1,143 @@
+"""Views of drawn streets and of recorded drives: what is known of them, and how far off they are."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from dreamdrive.build import build_scene
+from dreamdrive.files.digest import digest, file_digest
+from dreamdrive.files.output import new_file
+from dreamdrive.options import QUALITIES
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
+from dreamdrive.scene.residual import residual_of
+from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.similarity import fit_similarity
+from dreamdrive.stored import load_scene, save_scene
+from dreamdrive.street_network import weights_of
+from dreamdrive.trust import SHIFTS_M, SceneTrust, aside, features_of, seen_with
+from dreamdrive_bench.common.machine import COMMIT
+from dreamdrive_bench.drives.drive import Drive
+from dreamdrive_bench.street.case import FRAMES, Case, case_digest, clip_of, world_of
+from dreamdrive_bench.street.measure import to_scene
+from dreamdrive_bench.street.views import NEAR_M, clearance_m
+
+_STEP = 4
+"""Every which frame is looked at from aside."""
+_FARTHEST_M = 4.0
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Views (V,) of one scene.
+
+    Attributes:
+        features: What is known of their blocks (V, bh, bw, F).
+        squared_error: What their blocks are off (V, bh, bw).
+        shift_m: How far they are to the right of the recorded path (V,).
+        frame: The frame at whose time they are (V,).
+        held_out: Whether they are recorded views that no fit has seen (V,).
+        off: See ``SceneTrust.off``; what counts for each view, without its own (V,).
+    """
+
+    features: Float[np.ndarray, "v bh bw c"]
+    squared_error: Float[np.ndarray, "v bh bw"]
+    shift_m: Float[np.ndarray, " v"]
+    frame: Float[np.ndarray, " v"]
+    held_out: Float[np.ndarray, " v"]
+    off: Float[np.ndarray, " v"]
+
+
+def of_world(seed: int, knowledge: str, runs: Path) -> Looks:
+    """Of a drawn street: the recorded views, and views to both sides that come not too near to a box."""
+    case = Case(seed, "estimated", "clean")
+    key = digest([COMMIT, file_digest(weights_of(knowledge)), case_digest(case), SHIFTS_M])
+    return _kept(runs / f"looks-{seed}.npz", key, lambda: _look_at_world(case, knowledge, runs))
+
+
+def of_drive(drive: Drive, knowledge: str, runs: Path) -> Looks:
+    """Of a recorded drive: the views that no fit has seen."""
+    key = digest([COMMIT, file_digest(weights_of(knowledge)), drive])
+    return _kept(runs / f"looks-{drive.name}.npz", key, lambda: _look_at_drive(drive, knowledge, runs))
+
+
+def _look_at_world(case: Case, knowledge: str, runs: Path) -> Looks:
+    made = world_of(case.seed)
+    scene = _scene_of(clip_of(case), knowledge, runs / f"scene-{case.seed}")
+    similarity = fit_similarity(scene.cameras, made.cameras)
+    seen = _Seen(SceneTrust.of(scene))
+    for k, camera in enumerate(scene.cameras):
+        seen.add(camera, k, 0.0, made.frames[k])
+    frames = list(range(_STEP // 2, FRAMES, _STEP))
+    for shift_m in (side * metres for metres in SHIFTS_M if metres <= _FARTHEST_M for side in (-1, 1)):
+        cameras = [aside(made.cameras[k], shift_m) for k in range(FRAMES)]
+        clear = clearance_m(made.boxes, cameras) >= NEAR_M
+        counted = [k for k in frames if clear[k]]
+        times_s = [float(made.times_s[k]) for k in counted]
+        for k, true in zip(counted, made.views([cameras[k] for k in counted], times_s), strict=True):
+            # The focal length is the scene's own: with another one the same pixels would show other things.
+            own = scene.cameras[k].at(to_scene(cameras[k], similarity).world_from_camera)
+            seen.add(own, k, shift_m, true.frame)
+    return seen.looks()
+
+
+def _look_at_drive(drive: Drive, knowledge: str, runs: Path) -> Looks:
+    clip = drive.clip()
+    scene = _scene_of(clip, knowledge, runs / f"scene-{drive.name}")
+    seen = _Seen(SceneTrust.of(scene))
+    for k in np.flatnonzero(scene.held_out).tolist():
+        seen.add(scene.cameras[k], k, 0.0, clip.frames[k])
+    return seen.looks()
+
+
+class _Seen:
+    """Views of a scene as they are looked at."""
+
+    def __init__(self, trust: SceneTrust) -> None:
+        self._trust, self._rows = trust, list[dict[str, object]]()
+
+    def add(self, camera: Camera, frame: int, shift_m: float, true: np.ndarray) -> None:
+        """A view at the time of a frame, and what is truly to be seen there."""
+        trust, t_s = self._trust, float(self._trust.scene.times_s[frame])
+        view, told = seen_with(trust.evidence, trust.scene, camera, t_s)
+        hidden = trust.free_space.hidden(camera, view.depth_m)
+        held_out = shift_m == 0 and bool(trust.scene.held_out[frame])
+        others = [off for index, off in trust.off.items() if not (held_out and index == frame)]
+        off = residual_of(view.colour.numpy(), true).astype(np.float32) ** 2
+        features = features_of(view, told.numpy(), hidden.numpy()).astype(np.float32)
+        row = features, off, shift_m, frame, held_out, float(np.mean(others)) if others else 0.0
+        self._rows.append(dict(zip((f.name for f in fields(Looks)), row, strict=True)))
+
+    def looks(self) -> Looks:
+        """All of them."""
+        return Looks(**{f.name: np.array([row[f.name] for row in self._rows]) for f in fields(Looks)})
+
+
+def _scene_of(clip: Clip, knowledge: str, folder: Path) -> Scene:
+    if not folder.exists():
+        built = build_scene(clip, replace(QUALITIES["draft"], knowledge=knowledge))
+        save_scene(built.scene, folder)
+    return load_scene(folder)
+
+
+def _kept(path: Path, key: str, make: Callable[[], Looks]) -> Looks:
+    """What is in the file if it is of this key, else anew."""
+    if path.exists():
+        with np.load(path) as stored:
+            if str(stored["key"]) == key:
+                return Looks(**{f.name: stored[f.name] for f in fields(Looks)})
+    looks = make()
+    with new_file(path) as partial:
+        np.savez_compressed(
+            partial, key=np.array(key), **{f.name: getattr(looks, f.name) for f in fields(Looks)}
+        )
+    return looks
+
+
+def psnr_db(squared_error: Float[np.ndarray, "v bh bw"]) -> Float[np.ndarray, " v"]:
+    """Of each view."""
+    return -10 / math.log(10) * np.log(np.maximum(squared_error.mean(axis=(1, 2)), 1e-7))

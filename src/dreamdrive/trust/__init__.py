@@ -1,0 +1,25 @@
+"""How far a view of a scene can be believed."""
+
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.trust.evidence import seen_with as seen_with
+    from dreamdrive.trust.network import (
+        CALIBRATED as CALIBRATED,
+        MOST as MOST,
+        RISING as RISING,
+        ErrorNetwork as ErrorNetwork,
+        error_network as error_network,
+        features_of as features_of,
+    )
+    from dreamdrive.trust.reach import (
+        SHIFTS_M as SHIFTS_M,
+        aside as aside,
+        fall_m as fall_m,
+        reach_m as reach_m,
+    )
+    from dreamdrive.trust.trust import SceneTrust as SceneTrust, TrustedView as TrustedView
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,0 +1,53 @@
+"""How far beside the recorded path a scene can be looked at."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dreamdrive.scene.camera import Camera
+from dreamdrive.trust.trust import SceneTrust
+
+FALL_DB = 3.0
+"""Expected PSNR this much below that of the recorded path is no longer good."""
+SHIFTS_M = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+_PLACES = 4
+
+
+def reach_m(trust: SceneTrust, side: int) -> float:
+    """The first distance aside at which a drive is ``FALL_DB`` worse than the recorded one, in metres.
+
+    The mean over some of the recorded views, evenly between the distances tried; at most the last of them.
+
+    Args:
+        trust: Of a scene.
+        side: 1 for to the right, -1 for to the left.
+    """
+    front = trust.scene.front
+    views = front[np.linspace(0, len(front) - 1, _PLACES + 2).round().astype(int)[1:-1]].tolist()
+    told: list[float] = []
+    for metres in (0.0, *SHIFTS_M):
+        told.append(float(np.mean([_expected_db(trust, view, side * metres) for view in views])))
+        if told[-1] < told[0] - FALL_DB:
+            break
+    return fall_m((0.0, *SHIFTS_M), told) or SHIFTS_M[-1]
+
+
+def fall_m(metres: Sequence[float], psnr_db: Sequence[float]) -> float | None:
+    """Where PSNR first is ``FALL_DB`` below its first value, evenly between two distances; None: nowhere."""
+    low = psnr_db[0] - FALL_DB
+    for k in range(1, len(psnr_db)):
+        if psnr_db[k] < low:
+            share = (psnr_db[k - 1] - low) / (psnr_db[k - 1] - psnr_db[k])
+            return metres[k - 1] + share * (metres[k] - metres[k - 1])
+    return None
+
+
+def _expected_db(trust: SceneTrust, view: int, right_m: float) -> float:
+    return trust.view(aside(trust.scene.cameras[view], right_m), float(trust.scene.times_s[view])).psnr_db
+
+
+def aside(camera: Camera, right_m: float) -> Camera:
+    """A camera so far to the right."""
+    pose = camera.world_from_camera.copy()
+    pose[:3, 3] += right_m * pose[:3, 0]
+    return camera.at(pose)
