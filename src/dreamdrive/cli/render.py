@@ -3,12 +3,12 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.scene import less, open_scene
 from dreamdrive.cli.terminal.arguments import parse_size
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
@@ -16,9 +16,6 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.names import Format, Show
 from dreamdrive.scene.control import check_numbers, check_render_size
-
-if TYPE_CHECKING:
-    from dreamdrive.scene.scene import Scene
 
 
 def render(
@@ -61,7 +58,7 @@ def render(
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
 
     options = RenderOptions(show, format, wanted, fps)
-    scene = _less(open_scene(out), without)
+    scene = less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":
         for drive in drives:
@@ -74,13 +71,3 @@ def render(
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
         console.print(f"{place}: {rate}", soft_wrap=True, markup=False)
-
-
-def _less(scene: "Scene", ids: tuple[int, ...]) -> "Scene":
-    """The scene less some of its actors."""
-    for id in dict.fromkeys(ids):
-        try:
-            scene = scene.without(id)
-        except ValueError as error:
-            raise InputError(f"--without: {error}") from error
-    return scene

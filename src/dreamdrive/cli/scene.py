@@ -1,4 +1,4 @@
-"""Finding what ``generate`` wrote."""
+"""Finding what ``generate`` wrote, and what is asked of it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,3 +24,13 @@ def open_scene(out: Path) -> "Scene":
         )
         raise InputError(f"{out} holds no scene{unfinished}; expected {SCENE}")
     return load_scene(inside(out, "scene"))
+
+
+def less(scene: "Scene", ids: tuple[int, ...]) -> "Scene":
+    """The scene less some of its actors."""
+    for id in dict.fromkeys(ids):
+        try:
+            scene = scene.without(id)
+        except ValueError as error:
+            raise InputError(f"--without: {error}") from error
+    return scene

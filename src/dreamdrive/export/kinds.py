@@ -22,7 +22,10 @@ class Export:
         about: What it is, for people.
         scene: Writes a scene; of it, a path, and by name ``replace``, ``progress`` and what is in ``takes``.
         world: Likewise of the drives of a drawn street; None where that is not written.
-        takes: ``clip`` and ``geometry``, of which a scene was made, and ``name``, that of a drawn street.
+        takes: ``clip`` and ``geometry``, of which a scene was made; ``name``, that of a drawn street; and
+            what a user may ask for: ``times``, moments, which come as ``times_s``; ``trajectory``, a new
+            drive, whose views the scene then has, with no clip; ``blur``, a function that changes each
+            picture before it is written. These come only where they are asked for.
         ending: Of the file that it is; None of a folder.
         folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
         need: Raises ``InputError`` where a package is missing.
@@ -63,13 +66,14 @@ PLY = Export(
     ending=".ply",
     folder=PLY_KIND,
     left_out="dreamdrive.export.ply:left_out_of_ply",
+    takes=frozenset({"times"}),
 )
 NUSCENES = Export(
     name="nuscenes",
     about="a data set in the format of nuScenes, with pictures, labels and lidar",
     scene="dreamdrive.export.nuscenes.nuscenes:export_scene",
     world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
-    takes=frozenset({"name"}),
+    takes=frozenset({"name", "trajectory"}),
     folder=NUSCENES_KIND,
 )
 NCORE = Export(
@@ -77,7 +81,7 @@ NCORE = Export(
     about="the clip with its poses for NuRec, 3dgrut and gsplat",
     scene="dreamdrive.export.ncore.ncore:scene_to_ncore",
     world="dreamdrive.export.ncore.ncore:world_to_ncore",
-    takes=frozenset({"clip", "geometry"}),
+    takes=frozenset({"clip", "geometry", "trajectory"}),
     folder=NCORE_KIND,
     need="dreamdrive.export.ncore.words:need_ncore",
 )
@@ -86,7 +90,7 @@ MCAP = Export(
     about="the drive for Foxglove",
     scene="dreamdrive.export.mcap.mcap:scene_to_mcap",
     world="dreamdrive.export.mcap.mcap:world_to_mcap",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory"}),
     ending=".mcap",
     need="dreamdrive.export.mcap.file:need_foxglove",
 )
@@ -94,19 +98,20 @@ COLMAP = Export(
     name="colmap",
     about="frames, cameras and points as a COLMAP model",
     scene="dreamdrive.export.cameras.colmap:scene_to_colmap",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory"}),
     folder=COLMAP_KIND,
 )
 NERFSTUDIO = Export(
     name="nerfstudio",
     about="frames, cameras and points with transforms.json",
     scene="dreamdrive.export.cameras.nerfstudio:scene_to_nerfstudio",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory"}),
     folder=NERFSTUDIO_KIND,
 )
 TUM = Export(
     name="tum",
     about="the path of the first camera, a pose a line",
     scene="dreamdrive.export.cameras.tum:scene_to_tum",
+    takes=frozenset({"trajectory"}),
     ending=".txt",
 )
