@@ -66,6 +66,11 @@ WRITERS = {
     "export colmap": Writer("export IN/run --to colmap -o OUT", "", _FORCE),
     "export nerfstudio": Writer("export IN/run --to nerfstudio -o OUT", "", _FORCE),
     "export tum": Writer("export IN/scene --to tum -o OUT", ".txt", _FORCE),
+    "export tum along a new drive": Writer(
+        "export IN/scene --to tum --trajectory stop --fps 5 --without 0 -o OUT", ".txt", _FORCE
+    ),
+    "export depth": Writer("export IN/run --to depth -o OUT", "", _FORCE),
+    "export flow": Writer("export IN/run --to flow -o OUT", "", _FORCE),
     "export mcap": Writer("export IN/run --to mcap -o OUT", ".mcap", _FORCE),
     "evaluate video": Writer("evaluate video IN/real IN/real --window 0 --resamples 0 --json OUT", ".json"),
     "evaluate consistency": Writer(

@@ -65,7 +65,8 @@ def export(
         out: The folder that generate wrote; for nuscenes, ncore and mcap also one of world make.
         to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
             ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove; colmap
-            and nerfstudio the frames with cameras and points; tum the path of the first camera.
+            and nerfstudio the frames with cameras and points; tum the path of the first camera; depth and
+            flow metres and motion of every pixel as KITTI writes them.
         output: For ply NAME.ply for everything at one moment, the first recorded one; else a folder for
             static.ply and, with everything at each moment, frames/NNNN.ply. For mcap NAME.mcap, for tum
             NAME.txt; for the others a folder.

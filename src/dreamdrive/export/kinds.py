@@ -5,7 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from dreamdrive.files.kinds import COLMAP_KIND, NCORE_KIND, NERFSTUDIO_KIND, NUSCENES_KIND, PLY_KIND
+from dreamdrive.files.kinds import (
+    COLMAP_KIND,
+    DEPTH_KIND,
+    FLOW_KIND,
+    NCORE_KIND,
+    NERFSTUDIO_KIND,
+    NUSCENES_KIND,
+    PLY_KIND,
+)
 from dreamdrive.files.output import check_ending, check_free, check_new_file
 from dreamdrive.registry import loaded
 
@@ -114,4 +122,20 @@ TUM = Export(
     scene="dreamdrive.export.cameras.tum:scene_to_tum",
     takes=frozenset({"trajectory"}),
     ending=".txt",
+)
+DEPTH = Export(
+    name="depth",
+    about="metres of every pixel in 16 bits, as KITTI has them, with pictures and cameras",
+    scene="dreamdrive.export.surfaces.depth:scene_to_depth",
+    takes=frozenset({"clip", "trajectory"}),
+    folder=DEPTH_KIND,
+    left_out="dreamdrive.export.surfaces.depth:left_out_of_depth",
+)
+FLOW = Export(
+    name="flow",
+    about="optical flow from frame to frame, as KITTI has it",
+    scene="dreamdrive.export.surfaces.flow:scene_to_flow",
+    takes=frozenset({"clip", "trajectory"}),
+    folder=FLOW_KIND,
+    left_out="dreamdrive.export.surfaces.flow:left_out_of_flow",
 )

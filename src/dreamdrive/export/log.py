@@ -33,6 +33,9 @@ _PARKED = "vehicle.parked"
 Look = Callable[[int, int], tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]]
 """The picture of a camera at a step and depth along z in metres, 0 where there is none."""
 
+Retouch = Callable[[UInt8[np.ndarray, "h w 3"]], UInt8[np.ndarray, "h w 3"]]
+"""What changes a picture before it is written."""
+
 
 @dataclass(frozen=True)
 class RigCamera:

@@ -2,6 +2,7 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,20 +34,6 @@ def scene_to_nerfstudio(
     """
     with new_folder(folder, replace=replace, kind=NERFSTUDIO_KIND) as made:
         names = [f"images/{name}" for name in write_views(scene, clip, made / "images", progress)]
-        frames = [
-            {
-                "file_path": name,
-                "transform_matrix": camera.world_from_camera @ _FLIPPED,
-                "time": time_s,
-                "fl_x": camera.fx_px,
-                "fl_y": camera.fy_px,
-                "cx": camera.cx_px,
-                "cy": camera.cy_px,
-                "w": camera.width_px,
-                "h": camera.height_px,
-            }
-            for name, camera, time_s in zip(names, scene.cameras, scene.times_s.tolist(), strict=True)
-        ]
         withheld = scene.held_out.tolist()
         write_json(
             made / "transforms.json",
@@ -55,10 +42,28 @@ def scene_to_nerfstudio(
                 "ply_file_path": _POINTS,
                 "train_filenames": [name for name, held in zip(names, withheld, strict=True) if not held],
                 "test_filenames": [name for name, held in zip(names, withheld, strict=True) if held],
-                "frames": frames,
+                "frames": frames_of(scene, names),
             },
         )
         (made / _POINTS).write_bytes(_points(scene))
+
+
+def frames_of(scene: Scene, names: list[str]) -> list[dict[str, Any]]:
+    """The views of a scene as ``transforms.json`` lists them, by the names of their pictures."""
+    return [
+        {
+            "file_path": name,
+            "transform_matrix": camera.world_from_camera @ _FLIPPED,
+            "time": time_s,
+            "fl_x": camera.fx_px,
+            "fl_y": camera.fy_px,
+            "cx": camera.cx_px,
+            "cy": camera.cy_px,
+            "w": camera.width_px,
+            "h": camera.height_px,
+        }
+        for name, camera, time_s in zip(names, scene.cameras, scene.times_s.tolist(), strict=True)
+    ]
 
 
 def _points(scene: Scene) -> bytes:
