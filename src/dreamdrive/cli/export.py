@@ -66,10 +66,11 @@ def export(
         to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
             ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove; colmap
             and nerfstudio the frames with cameras and points; tum the path of the first camera; depth and
-            flow metres and motion of every pixel as KITTI writes them.
+            flow metres and motion of every pixel as KITTI writes them; mesh road and standing surfaces as
+            triangles.
         output: For ply NAME.ply for everything at one moment, the first recorded one; else a folder for
             static.ply and, with everything at each moment, frames/NNNN.ply. For mcap NAME.mcap, for tum
-            NAME.txt; for the others a folder.
+            NAME.txt, for mesh NAME.ply or NAME.glb; for the others a folder.
         trajectory: Along a new drive in place of the recorded one, rendered: forward, left, right, stop,
             lane-left, lane-right, shift, or a file with a trajectory. For formats with cameras.
         shift_m: How far shift goes to the right in metres; negative is to the left.

@@ -36,7 +36,13 @@ if TYPE_CHECKING:
         left_out_of_ply as left_out_of_ply,
         write_ply as write_ply,
     )
-    from dreamdrive.export.surfaces import scene_to_depth as scene_to_depth, scene_to_flow as scene_to_flow
+    from dreamdrive.export.surfaces import (
+        SurfaceMesh as SurfaceMesh,
+        mesh_of as mesh_of,
+        scene_to_depth as scene_to_depth,
+        scene_to_flow as scene_to_flow,
+        scene_to_mesh as scene_to_mesh,
+    )
     from dreamdrive.export.table import EXPORTS as EXPORTS, export as export
     from dreamdrive.export.world_log import taken_of_world as taken_of_world
 

@@ -34,7 +34,7 @@ class Export:
             what a user may ask for: ``times``, moments, which come as ``times_s``; ``trajectory``, a new
             drive, whose views the scene then has, with no clip; ``blur``, a function that changes each
             picture before it is written. These come only where they are asked for.
-        ending: Of the file that it is; None of a folder.
+        ending: Of the file that it is, or several; None of a folder.
         folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
         need: Raises ``InputError`` where a package is missing.
         left_out: Says what of a scene has no place in it, of the scene and the path.
@@ -45,16 +45,17 @@ class Export:
     scene: Place
     world: Place | None = None
     takes: frozenset[str] = frozenset()
-    ending: str | None = None
+    ending: str | tuple[str, ...] | None = None
     folder: str | None = None
     need: Place | None = None
     left_out: Place | None = None
 
     def check(self, path: Path, replace: bool) -> None:
         """Fail before anything is loaded where the path cannot be written, or a package is missing."""
-        if self.ending is not None and self.folder is None:
-            check_ending(path, self.ending)
-        if self.folder is None or path.suffix.lower() == self.ending:
+        endings = (self.ending,) if isinstance(self.ending, str) else self.ending or ()
+        if endings and self.folder is None:
+            check_ending(path, *endings)
+        if self.folder is None or path.suffix.lower() in endings:
             check_new_file(path, replace)
         else:
             check_free(path, replace, self.folder)
@@ -138,4 +139,12 @@ FLOW = Export(
     takes=frozenset({"clip", "trajectory"}),
     folder=FLOW_KIND,
     left_out="dreamdrive.export.surfaces.flow:left_out_of_flow",
+)
+MESH = Export(
+    name="mesh",
+    about="road and standing surfaces as coloured triangles, PLY or GLB",
+    scene="dreamdrive.export.surfaces.mesh:scene_to_mesh",
+    ending=(".ply", ".glb"),
+    need="dreamdrive.export.surfaces.mesh:need_scikit_image",
+    left_out="dreamdrive.export.surfaces.mesh:left_out_of_mesh",
 )

@@ -23,6 +23,7 @@ EXPORTS: "Table[Export]" = Table(
         "tum": "dreamdrive.export.kinds:TUM",
         "depth": "dreamdrive.export.kinds:DEPTH",
         "flow": "dreamdrive.export.kinds:FLOW",
+        "mesh": "dreamdrive.export.kinds:MESH",
     },
 )
 """From a scene to a file or a folder that other programs read."""

@@ -33,7 +33,7 @@ def scene_to_depth(
     """Write ``depth``, ``images`` and ``transforms.json``, a picture of each for every view.
 
     Depth is along z, in 16 bits as KITTI has it: the value over 256 in metres; 0 where there is none: in the
-    sky, in holes, and from 256 m on. It is that of the surface at which a pixel becomes half covered. Cameras
+    sky, in holes, and from 256 m on. At outlines it is that of one side. Cameras
     and axes are those of nerfstudio, which takes ``depth_unit_scale_factor`` for the scale.
 
     Args:
