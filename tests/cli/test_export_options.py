@@ -9,6 +9,7 @@ import pytest
 from dreamdrive import InputError, load_scene
 from dreamdrive.cli.terminal.arguments import parse_times
 from dreamdrive.data import read_trajectory, write_trajectory
+from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.drive import drives_of
 from dreamdrive.export import EXPORTS
 from dreamdrive.scene.trajectory import Trajectory
@@ -17,6 +18,8 @@ from tests.cli.conftest import Run
 from tests.cli.test_commands import driving
 from tests.export.ply_file import columns, count
 from tests.scene.scenes import make_scene
+
+EXTRAS = {"ncore": "ncore.data.v4", "mcap": "foxglove"}
 
 
 @pytest.fixture
@@ -124,3 +127,60 @@ def test_a_file_with_one_pose_is_a_drive(run: Run, finished: Path, tmp_path: Pat
     words = ("--trajectory", tmp_path / "one.json", "-o", tmp_path / "path.txt")
     assert run("export", finished, "--to", "tum", *words).code == 0
     assert len(read_trajectory(tmp_path / "path.txt")) == 1
+
+
+BLURRED = [name for name in EXPORTS if "blur" in EXPORTS[name].takes]
+GREY = 77
+"""Of all that is written in place of what the network would make."""
+
+
+@pytest.fixture
+def written(monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
+    """All pictures of bytes on their way to the disk, where blurring makes them grey."""
+    found: list[np.ndarray] = []
+
+    def note(path: Path, picture: np.ndarray, **how: int) -> None:
+        if picture.dtype == np.uint8:
+            found.append(picture)
+        write_picture(path, picture, **how)
+
+    monkeypatch.setattr("dreamdrive.cli.export.blurring", lambda: lambda frame: np.full_like(frame, GREY))
+    for module in ("log", "shots", "cameras.views", "surfaces.flow"):
+        monkeypatch.setattr(f"dreamdrive.export.{module}.write_picture", note)
+    return found
+
+
+def test_all_formats_with_pictures_can_be_blurred() -> None:
+    pictures = {name for name in EXPORTS if "clip" in EXPORTS[name].takes} | {"nuscenes"}
+    assert set(BLURRED) == pictures
+
+
+@pytest.mark.parametrize("kind", BLURRED)
+def test_every_picture_of_a_scene_is_blurred(
+    run: Run, finished: Path, tmp_path: Path, written: list[np.ndarray], kind: str
+) -> None:
+    if kind in EXTRAS:
+        pytest.importorskip(EXTRAS[kind])
+    ending = ".mcap" if kind == "mcap" else ""
+    done = run("export", finished, "--to", kind, "--blur", "-o", tmp_path / f"recorded{ending}")
+    assert done.code == 0, done
+    count = len(written)
+    words = ("--trajectory", "stop", "--fps", 4)
+    done = run("export", finished, "--to", kind, "--blur", *words, "-o", tmp_path / f"rendered{ending}")
+    assert done.code == 0, done
+    assert len(written) > count >= 4
+    assert all((picture == GREY).all() for picture in written)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in BLURRED if EXPORTS[kind].world is not None])
+def test_every_picture_of_a_drawn_street_is_blurred(
+    run: Run, tmp_path: Path, written: list[np.ndarray], kind: str
+) -> None:
+    if kind in EXTRAS:
+        pytest.importorskip(EXTRAS[kind])
+    run("world", "make", "--frames", 2, "--size", "64x40", "--one-ray", "-o", tmp_path / "world")
+    file = tmp_path / f"set{'.mcap' if kind == 'mcap' else ''}"
+    done = run("export", tmp_path / "world", "--to", kind, "--blur", "-o", file)
+    assert done.code == 0, done
+    assert len(written) == 2
+    assert all((picture == GREY).all() for picture in written)

@@ -132,3 +132,18 @@ def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:
         assert any(not np.array_equal(whole[key], less[key]) for key in whole.files)
     result = run(*wanted, "--without", "7", "-o", out.parent / "none")
     assert (result.code, "--without: no actor 7; there are 0" in result.err) == (2, True), result
+
+
+def test_pictures_of_colours_are_blurred(
+    run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dreamdrive.cli.render.blurring", lambda: lambda frame: np.full_like(frame, 77))
+    words = ("--trajectory", "stop", "--fps", "5", "--blur", "-o", tmp_path / "blurred")
+    assert run("render", out, *words, "--format", "png").code == 0
+    picture = cv2.imread(str(tmp_path / "blurred" / "0000.png"))
+    assert picture is not None
+    assert (picture == 77).all()
+    for wrong in (("--format", "npz"), ("--show", "depth", "--format", "png")):
+        done = run("render", out, *words, *wrong)
+        assert done.code == 2
+        assert "--blur changes colours in pictures" in done.err

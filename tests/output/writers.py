@@ -71,6 +71,7 @@ WRITERS = {
     ),
     "export depth": Writer("export IN/run --to depth -o OUT", "", _FORCE),
     "export flow": Writer("export IN/run --to flow -o OUT", "", _FORCE),
+    "export nerfstudio blurred": Writer("export IN/run --to nerfstudio --blur -o OUT", "", _FORCE),
     "export mesh": Writer("export IN/run --to mesh -o OUT", ".glb", _FORCE),
     "export mcap": Writer("export IN/run --to mcap -o OUT", ".mcap", _FORCE),
     "evaluate video": Writer("evaluate video IN/real IN/real --window 0 --resamples 0 --json OUT", ".json"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.cli.scene import less, open_scene
+from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import ExportName, parse_times
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
@@ -35,6 +35,7 @@ class _Asked:
     fps: float | None
     without: tuple[int, ...]
     times_s: tuple[float, ...] | None
+    blur: bool
 
     @property
     def changed(self) -> bool:
@@ -44,7 +45,11 @@ class _Asked:
     @property
     def options(self) -> dict[str, bool]:
         """Which of those are asked for that not every format takes."""
-        return {"trajectory": self.trajectory is not None, "times": self.times_s is not None}
+        return {
+            "trajectory": self.trajectory is not None,
+            "times": self.times_s is not None,
+            "blur": self.blur,
+        }
 
 
 def export(
@@ -57,6 +62,7 @@ def export(
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
     times: Annotated[str | None, arg(metavar="S|FIRST:LAST:STEP", help_behavior_hint="")] = None,
+    blur: bool = False,
     force: bool = False,
 ) -> None:
     """Write a scene or a drawn street in a format that other programs read.
@@ -78,11 +84,14 @@ def export(
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
         times: Moments of the scene, for formats of Gaussians: seconds, several with commas, or the first, the
             last and the step; without it the recorded ones.
+        blur: Make heads of people and plates of vehicles coarse in all pictures, as far as the street network
+            finds them.
         force: Replace what is there already, if dreamdrive wrote it.
     """
     check_there(out, SCENE)
     chosen = EXPORTS.choose(to)
-    asked = _Asked(trajectory, shift_m, fps, without, None if times is None else parse_times(times))
+    moments_s = None if times is None else parse_times(times)
+    asked = _Asked(trajectory, shift_m, fps, without, moments_s, blur)
     _check_asked(chosen, asked)
     chosen.check(output, force)
     said = _written(chosen, to, out, output, force, asked)
@@ -107,6 +116,8 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, aske
     pictures = "clip" in chosen.takes
     with Bars(Console()) as bars:
         how: dict[str, Any] = {"replace": force, "progress": partial(bars, to)}
+        if asked.blur:
+            how["blur"] = blurring()
         if chosen.world is not None and is_world(out):
             _check_world(out, asked)
             named = {"name": out.resolve().name} if "name" in chosen.takes else {}

@@ -8,7 +8,7 @@ from typing import Annotated
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.cli.scene import less, open_scene
+from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import parse_size
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
@@ -30,6 +30,7 @@ def render(
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
+    blur: bool = False,
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
     """Drive through a scene and write videos, pictures or arrays.
@@ -44,6 +45,7 @@ def render(
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         fps: Frames a second; without it a file's own, and for the others 20 at least.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
+        blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:
@@ -52,12 +54,14 @@ def render(
     if wanted is not None:
         check_render_size(wanted, video=format == "mp4")
     check_numbers(shift_m, fps)
+    if blur and (format == "npz" or show == "depth"):
+        raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
     check_there(out, SCENE)
     use_all_cores()
     from dreamdrive.drive import drives_of
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
 
-    options = RenderOptions(show, format, wanted, fps)
+    options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
     scene = less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":

@@ -82,7 +82,7 @@ NUSCENES = Export(
     about="a data set in the format of nuScenes, with pictures, labels and lidar",
     scene="dreamdrive.export.nuscenes.nuscenes:export_scene",
     world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
-    takes=frozenset({"name", "trajectory"}),
+    takes=frozenset({"name", "trajectory", "blur"}),
     folder=NUSCENES_KIND,
 )
 NCORE = Export(
@@ -90,7 +90,7 @@ NCORE = Export(
     about="the clip with its poses for NuRec, 3dgrut and gsplat",
     scene="dreamdrive.export.ncore.ncore:scene_to_ncore",
     world="dreamdrive.export.ncore.ncore:world_to_ncore",
-    takes=frozenset({"clip", "geometry", "trajectory"}),
+    takes=frozenset({"clip", "geometry", "trajectory", "blur"}),
     folder=NCORE_KIND,
     need="dreamdrive.export.ncore.words:need_ncore",
 )
@@ -99,7 +99,7 @@ MCAP = Export(
     about="the drive for Foxglove",
     scene="dreamdrive.export.mcap.mcap:scene_to_mcap",
     world="dreamdrive.export.mcap.mcap:world_to_mcap",
-    takes=frozenset({"clip", "trajectory"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     ending=".mcap",
     need="dreamdrive.export.mcap.file:need_foxglove",
 )
@@ -107,14 +107,14 @@ COLMAP = Export(
     name="colmap",
     about="frames, cameras and points as a COLMAP model",
     scene="dreamdrive.export.cameras.colmap:scene_to_colmap",
-    takes=frozenset({"clip", "trajectory"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=COLMAP_KIND,
 )
 NERFSTUDIO = Export(
     name="nerfstudio",
     about="frames, cameras and points with transforms.json",
     scene="dreamdrive.export.cameras.nerfstudio:scene_to_nerfstudio",
-    takes=frozenset({"clip", "trajectory"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=NERFSTUDIO_KIND,
 )
 TUM = Export(
@@ -128,7 +128,7 @@ DEPTH = Export(
     name="depth",
     about="metres of every pixel in 16 bits, as KITTI has them, with pictures and cameras",
     scene="dreamdrive.export.surfaces.depth:scene_to_depth",
-    takes=frozenset({"clip", "trajectory"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=DEPTH_KIND,
     left_out="dreamdrive.export.surfaces.depth:left_out_of_depth",
 )
@@ -136,7 +136,7 @@ FLOW = Export(
     name="flow",
     about="optical flow from frame to frame, as KITTI has it",
     scene="dreamdrive.export.surfaces.flow:scene_to_flow",
-    takes=frozenset({"clip", "trajectory"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=FLOW_KIND,
     left_out="dreamdrive.export.surfaces.flow:left_out_of_flow",
 )

@@ -73,7 +73,7 @@ class Taken:
     lidar: bool = True
 
 
-def take(drive: Taken, folder: Path, progress: Progress = silent) -> Log:
+def take(drive: Taken, folder: Path, progress: Progress = silent, *, blur: Retouch | None = None) -> Log:
     """Write pictures and lidar of a drive into a folder, and tell what they are of.
 
     Every ``KEY_S`` seconds a time is labelled: it has lidar points and boxes within 80 m of the car. How much
@@ -87,7 +87,8 @@ def take(drive: Taken, folder: Path, progress: Progress = silent) -> Log:
         views: list[View] = []
         for index, camera in enumerate(drive.cameras):
             picture, depth_m = drive.look(index, step)
-            files[camera.name].append(_write_picture(folder, camera.name, step, picture))
+            shown = picture if blur is None else blur(picture)
+            files[camera.name].append(_write_picture(folder, camera.name, step, shown))
             pose = drive.world_from_ego[step] @ camera.ego_from_camera
             views.append((camera.pinhole.at(pose), depth_m))
         if step in keys:

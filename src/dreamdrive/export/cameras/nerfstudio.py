@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dreamdrive.export.cameras.views import street_points, write_views
+from dreamdrive.export.log import Retouch
 from dreamdrive.files.json_file import write_json
 from dreamdrive.files.kinds import NERFSTUDIO_KIND
 from dreamdrive.files.output import new_folder
@@ -24,6 +25,7 @@ def scene_to_nerfstudio(
     folder: Path,
     *,
     clip: Clip | None = None,
+    blur: Retouch | None = None,
     replace: bool = False,
     progress: Progress = silent,
 ) -> None:
@@ -33,7 +35,7 @@ def scene_to_nerfstudio(
     has seen are those of ``test_filenames``.
     """
     with new_folder(folder, replace=replace, kind=NERFSTUDIO_KIND) as made:
-        names = [f"images/{name}" for name in write_views(scene, clip, made / "images", progress)]
+        names = [f"images/{name}" for name in write_views(scene, clip, made / "images", progress, blur=blur)]
         withheld = scene.held_out.tolist()
         write_json(
             made / "transforms.json",
