@@ -10,13 +10,16 @@ from dreamdrive import InputError, load_scene
 from dreamdrive.cli.terminal.arguments import parse_times
 from dreamdrive.data import read_trajectory, write_trajectory
 from dreamdrive.data.pictures.picture_file import write_picture
+from dreamdrive.datasets.nuscenes import read_nuscenes
 from dreamdrive.drive import drives_of
+from dreamdrive.edit import EDITS
 from dreamdrive.export import EXPORTS
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.stored import save_scene
 from tests.cli.conftest import Run
 from tests.cli.test_commands import driving
 from tests.export.ply_file import columns, count
+from tests.export.scenes_of_drives import upright_scene_of
 from tests.scene.scenes import make_scene
 
 EXTRAS = {"ncore": "ncore.data.v4", "mcap": "foxglove"}
@@ -104,7 +107,7 @@ def test_a_drawn_street_is_written_as_it_was_drawn(run: Run, tmp_path: Path) -> 
 
 def test_every_option_is_taken_by_some_format() -> None:
     taken = {option for name in EXPORTS for option in EXPORTS[name].takes}
-    assert taken >= {"trajectory", "times"}
+    assert taken >= {"trajectory", "times", "blur", "labels"}
 
 
 @pytest.mark.parametrize(
@@ -184,3 +187,27 @@ def test_every_picture_of_a_drawn_street_is_blurred(
     assert done.code == 0, done
     assert len(written) == 2
     assert all((picture == GREY).all() for picture in written)
+
+
+def test_labels_are_those_of_the_drive(run: Run, out: Path, one_drive: Path, tmp_path: Path) -> None:
+    words = ("--to", "nuscenes", "--labels", one_drive, "-o", tmp_path / "set")
+    done = run("export", out, *words)
+    assert done.code == 2
+    assert "was made of no drive of a data set" in done.err
+    done = run("export", out, "--to", "nuscenes", "--labels", tmp_path / "none", "-o", tmp_path / "set")
+    assert done.code == 2
+    assert "does not exist; expected a folder of a data set" in done.err
+
+
+@pytest.mark.parametrize(("edited", "place"), [(False, "."), (True, "."), (True, "scene")])
+def test_labels_are_carried_along(
+    run: Run, one_drive: Path, tmp_path: Path, edited: bool, place: str
+) -> None:
+    save_scene(upright_scene_of(read_nuscenes(one_drive, "scene-0001")), tmp_path / "out" / "scene")
+    if edited:
+        (tmp_path / "out" / EDITS).write_text("{}")
+    words = ("--to", "nuscenes", "--labels", one_drive, "-o", tmp_path / "set")
+    done = run("export", tmp_path / "out" / place, *words)
+    assert done.code == 0, done
+    found = {box.id for box in read_nuscenes(tmp_path / "set", "set").boxes}
+    assert found == ({"parked", "cone"} if edited else {"car", "parked", "cone"})

@@ -13,11 +13,12 @@ from dreamdrive.cli.terminal.arguments import ExportName, parse_times
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, Export, function
-from dreamdrive.files.given import SCENE, check_there
+from dreamdrive.files.given import DATASET, SCENE, check_there
 from dreamdrive.files.paths import inside
 from dreamdrive.scene.control import check_numbers
 
 if TYPE_CHECKING:
+    from dreamdrive.export import Labels
     from dreamdrive.scene.clip import Clip
     from dreamdrive.scene.geometry import Geometry
     from dreamdrive.scene.scene import Scene
@@ -36,6 +37,7 @@ class _Asked:
     without: tuple[int, ...]
     times_s: tuple[float, ...] | None
     blur: bool
+    labels: Path | None
 
     @property
     def changed(self) -> bool:
@@ -49,6 +51,7 @@ class _Asked:
             "trajectory": self.trajectory is not None,
             "times": self.times_s is not None,
             "blur": self.blur,
+            "labels": self.labels is not None,
         }
 
 
@@ -63,6 +66,7 @@ def export(
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
     times: Annotated[str | None, arg(metavar="S|FIRST:LAST:STEP", help_behavior_hint="")] = None,
     blur: bool = False,
+    labels: Annotated[Path | None, arg(metavar="DATASET", help_behavior_hint="")] = None,
     force: bool = False,
 ) -> None:
     """Write a scene or a drawn street in a format that other programs read.
@@ -86,13 +90,16 @@ def export(
             last and the step; without it the recorded ones.
         blur: Make heads of people and plates of vehicles coarse in all pictures, as far as the street network
             finds them.
+        labels: The data set of the drive that a scene was made of: for nuscenes, boxes and map of what the
+            scene does not hold as actors are those of the drive.
         force: Replace what is there already, if dreamdrive wrote it.
     """
     check_there(out, SCENE)
     chosen = EXPORTS.choose(to)
     moments_s = None if times is None else parse_times(times)
-    asked = _Asked(trajectory, shift_m, fps, without, moments_s, blur)
+    asked = _Asked(trajectory, shift_m, fps, without, moments_s, blur, labels)
     _check_asked(chosen, asked)
+    check_there(labels, DATASET, "--labels")
     chosen.check(output, force)
     said = _written(chosen, to, out, output, force, asked)
     Console(highlight=False, markup=False, soft_wrap=True).print("\n".join([str(output), *said]))
@@ -125,6 +132,8 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, aske
             return [_OF_WORLD] if pictures else []
         scene, stages = open_scene(out), _stages(out)
         clip, geometry = _kept(stages, scene) if pictures and not asked.changed else (None, None)
+        if asked.labels is not None:
+            how["labels"] = _labels(out, scene, asked.labels)
         scene = _changed(scene, asked)
         kept: dict[str, object] = {"clip": clip, "geometry": geometry}
         how |= {name: kept[name] for name in chosen.takes & set(kept)}
@@ -135,12 +144,26 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, aske
     return [*said, _of_pictures(clip, stages, asked)] if pictures else said
 
 
+def _labels(out: Path, scene: "Scene", path: Path) -> "Labels":
+    """The labels of the drive that the scene in a folder was made of."""
+    from dreamdrive.data.input import dataset_of
+    from dreamdrive.edit import EDITS
+    from dreamdrive.export import labels_of
+
+    logs, link = dataset_of(None, path).logs, scene.provenance.log
+    if logs is None:
+        raise InputError(f"--labels {path} is no data set with labels")
+    if link is None:
+        raise InputError(f"{out} was made of no drive of a data set; leave --labels out")
+    return labels_of(scene, logs.read(path, link.name), edited=(_home(out) / EDITS).is_file())
+
+
 def _check_world(out: Path, asked: _Asked) -> None:
     """Fail where something is asked of a drawn street that only scenes have."""
-    if asked.changed or asked.times_s is not None:
+    if asked.changed or asked.times_s is not None or asked.labels is not None:
         raise InputError(
-            f"{out} is a drawn street, of which frames are written as they were drawn; --trajectory, "
-            "--without and --times are for scenes of dreamdrive generate"
+            f"{out} is a drawn street, of which frames and labels are written as they were drawn; "
+            "--trajectory, --without, --times and --labels are for scenes of dreamdrive generate"
         )
 
 
@@ -162,9 +185,14 @@ def _changed(scene: "Scene", asked: _Asked) -> "Scene":
     return along(scene, drive.path)
 
 
+def _home(out: Path) -> Path:
+    """What lies around the scene."""
+    return out.parent if (out / "scene.json").is_file() else out
+
+
 def _stages(out: Path) -> Path:
     """Where the run of a scene keeps its results."""
-    return (out.parent if (out / "scene.json").is_file() else out) / "stages"
+    return _home(out) / "stages"
 
 
 def _of_pictures(clip: "Clip | None", stages: Path, asked: _Asked) -> str:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         scene_to_tum as scene_to_tum,
     )
     from dreamdrive.export.kinds import Export as Export, function as function
+    from dreamdrive.export.labels import Labels as Labels, labels_of as labels_of
     from dreamdrive.export.log import take as take
     from dreamdrive.export.mcap.file import need_foxglove as need_foxglove
     from dreamdrive.export.mcap.mcap import (

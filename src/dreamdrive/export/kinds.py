@@ -33,7 +33,8 @@ class Export:
         takes: ``clip`` and ``geometry``, of which a scene was made; ``name``, that of a drawn street; and
             what a user may ask for: ``times``, moments, which come as ``times_s``; ``trajectory``, a new
             drive, whose views the scene then has, with no clip; ``blur``, a function that changes each
-            picture before it is written. These come only where they are asked for.
+            picture before it is written; ``labels``, those of the drive that a scene was made of. These come
+            only where they are asked for.
         ending: Of the file that it is, or several; None of a folder.
         folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
         need: Raises ``InputError`` where a package is missing.
@@ -82,7 +83,7 @@ NUSCENES = Export(
     about="a data set in the format of nuScenes, with pictures, labels and lidar",
     scene="dreamdrive.export.nuscenes.nuscenes:export_scene",
     world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
-    takes=frozenset({"name", "trajectory", "blur"}),
+    takes=frozenset({"name", "trajectory", "blur", "labels"}),
     folder=NUSCENES_KIND,
 )
 NCORE = Export(

@@ -23,7 +23,9 @@ AXLE_M = 1.7
 START_US = 1_500_000_000_000_000
 """A clock has to begin somewhere."""
 _NEAR_M = 80.0
-_MOVING_M_S, _JPEG = 0.5, 95
+_JPEG = 95
+MOVING_M_S = 0.5
+"""What is faster moves."""
 _WORDS = {
     "vehicle": ("vehicle.moving", "vehicle.stopped"),
     "human": ("pedestrian.moving", "pedestrian.standing"),
@@ -48,13 +50,17 @@ class RigCamera:
 
 @dataclass(frozen=True)
 class Moved:
-    """A thing with a box at every step, in the words of ``BoxTrack``; ``there`` tells when it is."""
+    """A thing with a box at every step, in the words of ``BoxTrack``; ``there`` tells when it is.
+
+    Without ``attributes`` they are those of its motion.
+    """
 
     id: str
     category: str
     size_lwh_m: Float[np.ndarray, "3"]
     world_from_box: Float[np.ndarray, "t 4 4"]
     there: Bool[np.ndarray, " t"]
+    attributes: tuple[tuple[str, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -158,8 +164,8 @@ def _track(
     if not steps:
         return None
     speed = _speed_m_s(drive.times_s, box)
-    ever = bool(speed.max() > _MOVING_M_S)
-    moves = [int(speed[step] > _MOVING_M_S) for step in steps]
+    ever = bool(speed.max() > MOVING_M_S)
+    moves = [int(speed[step] > MOVING_M_S) for step in steps]
     return BoxTrack(
         id=box.id,
         category=box.category,
@@ -169,7 +175,9 @@ def _track(
         visibility=np.array([labels[step][box.id][0] for step in steps]),
         moves=np.array(moves),
         lidar_points=np.array([labels[step][box.id][1] for step in steps]),
-        attributes=tuple(_words(box.category, bool(each), ever) for each in moves),
+        attributes=tuple(_words(box.category, bool(each), ever) for each in moves)
+        if box.attributes is None
+        else tuple(box.attributes[step] for step in steps),
     )
 
 

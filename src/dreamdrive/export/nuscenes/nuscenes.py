@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.export.labels import Labels
 from dreamdrive.export.log import Retouch, Taken, take
 from dreamdrive.export.nuscenes.writer import write_nuscenes
 from dreamdrive.export.scene_log import taken_of_scene
@@ -18,6 +19,7 @@ def export_scene(
     scene: Scene,
     folder: Path,
     *,
+    labels: Labels | None = None,
     blur: Retouch | None = None,
     replace: bool = False,
     progress: Progress = silent,
@@ -25,10 +27,12 @@ def export_scene(
     """Write a scene as its own cameras would have recorded it, as a data set of one drive.
 
     Every half second a time is labelled. Boxes are those of actors of which the scene knows kind and size, as
-    it believes them to be: nobody has labelled them, and what never moved has none. There is no map. Raises
-    ``InputError`` where the scene does not know the height of its camera.
+    it believes them to be: nobody has labelled them, and what never moved has none. There is no map. With
+    ``labels``, of the drive that the scene was made of, other things have their boxes and attributes from
+    there, the map is there, and places are those of the drive. Raises ``InputError`` where the scene does not
+    know the height of its camera.
     """
-    _write(taken_of_scene(scene, folder.stem), folder, replace, progress, blur)
+    _write(taken_of_scene(scene, folder.stem, labels), folder, replace, progress, blur)
 
 
 def export_world(
