@@ -53,9 +53,13 @@ def test_what_the_scene_holds_as_an_actor_is_not_there_twice(drive: Log) -> None
         assert [box.id for box in kept] == [box.id for i, box in enumerate(drive.boxes) if i != k]
 
 
-def test_an_actor_in_the_next_lane_is_another(drive: Log) -> None:
-    kept = labels_of(with_actor(drive, drive.boxes[0], aside_m=3.5), drive).boxes
-    assert "car" in [box.id for box in kept]
+def test_what_moves_may_be_metres_off_and_what_stands_may_not(drive: Log) -> None:
+    def kept(label: int, aside_m: float) -> list[str]:
+        return [box.id for box in labels_of(with_actor(drive, drive.boxes[label], aside_m), drive).boxes]
+
+    assert "car" not in kept(0, 3.5)
+    assert "car" in kept(0, 6.5)
+    assert "parked" in kept(1, 3.5)
 
 
 def test_of_an_edited_scene_only_what_stands_is_taken(drive: Log) -> None:

@@ -12,7 +12,10 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.street.log import BoxTrack, Log, LogMap, OfLog
 
 _LEAST_M = 1.0
-"""So far from a labelled thing, or half its length where that is more, an actor is still the same."""
+"""So far from a labelled thing, or half its length where that is more, an actor is still the same ..."""
+_OF_DEPTH = 0.15
+"""... and by this share of its distance from the camera farther from one that moves: along the view, depth of
+actors is off by metres."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +67,8 @@ def labels_of(scene: Scene, drive: Log, *, edited: bool = False) -> Labels:
         raise InputError(
             f"the scene was made of {of}, the labels are of {drive.name}; give those of its drive"
         )
-    kept = [
-        box
-        for box in drive.boxes
-        if not (edited and _moves(box)) and not any(_same(box, actor, link) for actor in scene.actors)
-    ]
+    held = {id for actor in scene.actors for id in _held(actor, scene, drive, link)}
+    kept = [box for box in drive.boxes if box.id not in held and not (edited and _moves(box))]
     return Labels(link, drive.location, drive.map, tuple(kept))
 
 
@@ -77,8 +77,18 @@ def _moves(box: BoxTrack) -> bool:
     return bool((way_m > MOVING_M_S * np.diff(box.times_s)).any()) or bool((box.moves > 0).any())
 
 
-def _same(box: BoxTrack, actor: Actor, link: OfLog) -> bool:
-    """Whether an actor is where a thing is labelled, in the median of the times that both have."""
+def _held(actor: Actor, scene: Scene, drive: Log, link: OfLog) -> set[str]:
+    """What an actor stands for: the nearest label that moves, and whatever is labelled at its very place."""
+    camera_m = scene.trajectory.at(actor.track.times_s)[:, :3, 3]
+    slack_m = _OF_DEPTH * float(np.median(np.linalg.norm(actor.track.positions_m - camera_m, axis=1)))
+    beyond_m = {box.id: _beyond_m(box, actor, link) for box in drive.boxes}
+    found = {id for id, away_m in beyond_m.items() if away_m < 0}
+    moving = [box.id for box in drive.boxes if _moves(box) and beyond_m[box.id] < slack_m]
+    return found | set(sorted(moving, key=lambda id: beyond_m[id])[:1])
+
+
+def _beyond_m(box: BoxTrack, actor: Actor, link: OfLog) -> float:
+    """How much farther an actor is from a labelled thing than the same may be; median of common times."""
     log_from_world = np.array(link.log_from_world)
     places_m = actor.track.positions_m @ log_from_world[:3, :3].T + log_from_world[:3, 3]
     away_m = [
@@ -86,7 +96,8 @@ def _same(box: BoxTrack, actor: Actor, link: OfLog) -> bool:
         for place, time_s in zip(places_m, actor.track.times_s, strict=True)
         if (pose := box.pose_at(float(time_s) + link.start_s)) is not None
     ]
-    return bool(away_m) and float(np.median(away_m)) < max(_LEAST_M, float(box.size_lwh_m[:, 0].max()) / 2)
+    same_m = max(_LEAST_M, float(box.size_lwh_m[:, 0].max()) / 2)
+    return float(np.median(away_m)) - same_m if away_m else np.inf
 
 
 def _standing(poses: Float[np.ndarray, "t 4 4"], z_m: float) -> Float[np.ndarray, "t 4 4"]:

@@ -62,6 +62,7 @@ def scene_to_flow(
         for place in places.values():
             place.mkdir(parents=True)
         now: Surface | None = None
+        one = places["image_2"]
         for pair, view in enumerate(views):
             one, before = places["image_2"] / f"{pair:06d}_10.png", f"{pair - 1:06d}"
             write_picture(one, picture_of_view(scene, clip, view, blur)[..., ::-1])
@@ -92,7 +93,7 @@ def flow_between(
     world = np.where(seen[..., None], world, rays @ camera.world_from_camera[:3, :3].T)
     local = world @ then.camera.world_from_camera[:3, :3]
     z = local[..., 2]
-    ahead = z > NEAR_M
+    ahead = np.asarray(z > NEAR_M)
     focal, centre = np.array([camera.fx_px, camera.fy_px]), np.array([camera.cx_px, camera.cy_px])
     at_px = local[..., :2] / np.where(ahead, z, 1.0)[..., None] * focal + centre
     flow_px = at_px - (rays[..., :2] * focal + centre)
@@ -105,7 +106,7 @@ def _shown(
 ) -> Bool[np.ndarray, "h w"]:
     """Which points lie in the picture, and not behind all four pixels around them."""
     height, width = then.depth_m.shape
-    inside = ((at_px >= 0) & (at_px < (width, height))).all(axis=-1)
+    inside = np.asarray(((at_px >= 0) & (at_px < (width, height))).all(axis=-1))
     depth_m = np.where(then.depth_m > 0, then.depth_m, np.inf)
     low = np.floor(np.where(inside[..., None], at_px, 0.5) - 0.5).astype(int)
     farthest_m = np.zeros(z_m.shape)
