@@ -110,16 +110,17 @@ def test_nothing_is_written_where_the_scene_shows_nothing(run: Run, out: Path) -
 def test_export_says_what_is_left_out(run: Run, out: Path, tmp_path: Path) -> None:
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").out
     assert said == (
-        f"{tmp_path}/all.ply PLY holds the scene at 0.333 s: no sky, no exposure of the recording, no motion."
+        f"{tmp_path}/all.ply PLY holds one moment of the scene: no sky, no exposure of the recording, no "
+        "motion."
     )
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all").out
     assert said.endswith(
-        f"{tmp_path}/all PLY holds the scene at its recorded times: no sky, no exposure of the recording, no "
+        f"{tmp_path}/all PLY holds moments of the scene: no sky, no exposure of the recording, no "
         "motion in between."
     )
     save_scene(driving(make_scene(dynamic=0, full=False)), tmp_path / "bare")
     said = run("export", tmp_path / "bare", "--to", "ply", "-o", tmp_path / "bare.ply").out
-    assert said == f"{tmp_path}/bare.ply PLY holds the scene at 0.333 s."
+    assert said == f"{tmp_path}/bare.ply PLY holds one moment of the scene."
 
 
 def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:
@@ -131,3 +132,18 @@ def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:
         assert any(not np.array_equal(whole[key], less[key]) for key in whole.files)
     result = run(*wanted, "--without", "7", "-o", out.parent / "none")
     assert (result.code, "--without: no actor 7; there are 0" in result.err) == (2, True), result
+
+
+def test_pictures_of_colours_are_blurred(
+    run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dreamdrive.cli.render.blurring", lambda: lambda frame: np.full_like(frame, 77))
+    words = ("--trajectory", "stop", "--fps", "5", "--blur", "-o", tmp_path / "blurred")
+    assert run("render", out, *words, "--format", "png").code == 0
+    picture = cv2.imread(str(tmp_path / "blurred" / "0000.png"))
+    assert picture is not None
+    assert (picture == 77).all()
+    for wrong in (("--format", "npz"), ("--show", "depth", "--format", "png")):
+        done = run("render", out, *words, *wrong)
+        assert done.code == 2
+        assert "--blur changes colours in pictures" in done.err

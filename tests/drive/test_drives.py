@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from dreamdrive.data import write_trajectory
-from dreamdrive.drive.drives import distance_m, drives_of, share_seen
+from dreamdrive.drive.drives import along, distance_m, drives_of, share_seen
 from dreamdrive.errors import InputError
 from dreamdrive.scene.control import check_numbers
 from dreamdrive.scene.gaussians import Gaussians
@@ -157,3 +157,45 @@ def test_a_file_that_looks_elsewhere_is_refused(wall: Scene, tmp_path: Path) -> 
     with pytest.raises(InputError) as error:
         drives_of(wall, [str(file)], 2.0, None)
     assert str(error.value) == f"--trajectory {file} goes 0 m {NOTHING_SEEN}"
+
+
+def test_the_cameras_of_a_rig_are_carried_along(wall: Scene) -> None:
+    aside = np.eye(4)
+    aside[0, 3] = 0.5
+    front = wall.cameras[:2]
+    rig = replace(
+        wall,
+        cameras=(front[0], front[0].at(front[0].world_from_camera @ aside), front[1]),
+        times_s=wall.times_s[[0, 0, 1]],
+        held_out=np.zeros(3, bool),
+        camera=np.array([2, 5, 2]),
+        provenance=replace(wall.provenance, up=(0.0, -1.0, 0.0), camera_height_m=1.5),
+    )
+    path = Trajectory(ahead(3) @ _up(0.25), np.array([0.0, 0.4, 0.8]))
+    found = along(rig, path)
+    assert found.camera is not None
+    assert found.camera.tolist() == [2, 5] * 3
+    np.testing.assert_allclose(found.trajectory.world_from_camera, path.world_from_camera)
+    np.testing.assert_array_equal(found.trajectory.times_s, path.times_s)
+    others = np.stack([found.cameras[view].world_from_camera for view in (1, 3, 5)])
+    np.testing.assert_allclose(others, path.world_from_camera @ aside)
+    assert found.provenance.camera_height_m == pytest.approx(1.75)
+
+
+def test_drives_that_begin_as_the_first_are_no_cameras(wall: Scene) -> None:
+    """A photo with several actions has a drive for each."""
+    count = len(wall.cameras)
+    two = replace(
+        wall,
+        cameras=wall.cameras * 2,
+        times_s=np.tile(wall.times_s, 2),
+        held_out=np.zeros(2 * count, bool),
+        camera=np.repeat([0, 1], count),
+    )
+    assert len(along(two, wall.trajectory).cameras) == count
+
+
+def _up(metres: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[1, 3] = -metres
+    return pose

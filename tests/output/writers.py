@@ -14,6 +14,7 @@ from dreamdrive.street_network.network import StreetNetwork
 from dreamdrive.street_network.weights import Training, write_network
 from tests.cli.test_commands import driving
 from tests.evaluate.sets import write_set
+from tests.export.scenes_of_drives import upright_scene_of
 from tests.logs import log
 from tests.output.server import Came
 from tests.prior.vista.photos import save_photo
@@ -61,11 +62,21 @@ WRITERS = {
     "export ply file": Writer("export IN/scene --to ply -o OUT", ".ply", _FORCE),
     "export ply": Writer("export IN/scene --to ply -o OUT", "", _FORCE),
     "export nuscenes": Writer("export IN/run --to nuscenes -o OUT", "", _FORCE),
+    "export nuscenes with labels": Writer(
+        "export IN/of-drive --to nuscenes --labels IN/set -o OUT", "", _FORCE
+    ),
     "export nuscenes of a world": Writer("export IN/world --to nuscenes -o OUT", "", _FORCE),
     "export ncore": Writer("export IN/run --to ncore -o OUT", "", _FORCE),
     "export colmap": Writer("export IN/run --to colmap -o OUT", "", _FORCE),
     "export nerfstudio": Writer("export IN/run --to nerfstudio -o OUT", "", _FORCE),
     "export tum": Writer("export IN/scene --to tum -o OUT", ".txt", _FORCE),
+    "export tum along a new drive": Writer(
+        "export IN/scene --to tum --trajectory stop --fps 5 --without 0 -o OUT", ".txt", _FORCE
+    ),
+    "export depth": Writer("export IN/run --to depth -o OUT", "", _FORCE),
+    "export flow": Writer("export IN/run --to flow -o OUT", "", _FORCE),
+    "export nerfstudio blurred": Writer("export IN/run --to nerfstudio --blur -o OUT", "", _FORCE),
+    "export mesh": Writer("export IN/run --to mesh -o OUT", ".glb", _FORCE),
     "export mcap": Writer("export IN/run --to mcap -o OUT", ".mcap", _FORCE),
     "evaluate video": Writer("evaluate video IN/real IN/real --window 0 --resamples 0 --json OUT", ".json"),
     "evaluate consistency": Writer(
@@ -109,6 +120,7 @@ def make_inputs(folder: Path, run: Callable[[list[str]], Came]) -> None:
     save_scene(driving(make_scene()), folder / "scene")
     logs = [log(folder / "pictures of a log" / name, name) for name in ("scene-0001", "scene-0002")]
     write_nuscenes(logs, folder / "set", read_points)
+    save_scene(upright_scene_of(logs[0]), folder / "of-drive")
     torch.manual_seed(0)
     learned = Training(0, 0, "none", {}, {}, "none")
     write_network(StreetNetwork(), learned, folder / "street.safetensors")

@@ -3,12 +3,12 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
-from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import parse_size
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
@@ -16,9 +16,6 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.names import Format, Show
 from dreamdrive.scene.control import check_numbers, check_render_size
-
-if TYPE_CHECKING:
-    from dreamdrive.scene.scene import Scene
 
 
 def render(
@@ -33,6 +30,7 @@ def render(
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
+    blur: bool = False,
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
     """Drive through a scene and write videos, pictures or arrays.
@@ -47,6 +45,7 @@ def render(
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         fps: Frames a second; without it a file's own, and for the others 20 at least.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
+        blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:
@@ -55,13 +54,15 @@ def render(
     if wanted is not None:
         check_render_size(wanted, video=format == "mp4")
     check_numbers(shift_m, fps)
+    if blur and (format == "npz" or show == "depth"):
+        raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
     check_there(out, SCENE)
     use_all_cores()
     from dreamdrive.drive import drives_of
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
 
-    options = RenderOptions(show, format, wanted, fps)
-    scene = _less(open_scene(out), without)
+    options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
+    scene = less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
     if format == "mp4":
         for drive in drives:
@@ -74,13 +75,3 @@ def render(
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
         console.print(f"{place}: {rate}", soft_wrap=True, markup=False)
-
-
-def _less(scene: "Scene", ids: tuple[int, ...]) -> "Scene":
-    """The scene less some of its actors."""
-    for id in dict.fromkeys(ids):
-        try:
-            scene = scene.without(id)
-        except ValueError as error:
-            raise InputError(f"--without: {error}") from error
-    return scene

@@ -3,7 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from jaxtyping import Float
 from dreamdrive.data import read_trajectory
 from dreamdrive.drive.manoeuvres import LANE_M, MANOEUVRES, manoeuvre, resampled, smooth
 from dreamdrive.errors import InputError
+from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.splat import render_scene
@@ -25,6 +26,7 @@ Moved to the right, a drawn street between houses has 0.77 at 5 m, 0.43 at 10 m,
 30 m; a recorded highway 0.84 at 5 m, 0.65 at 10 m, 0.39 at 20 m, 0.18 at 50 m and 0.06 at 100 m.
 """
 _ASIDE_M = 1.1 * LANE_M
+_SAME = 1e-6
 _PROBES, _PROBE_WIDTH_PX = 8, 96
 
 _log = logging.getLogger("dreamdrive")
@@ -56,6 +58,36 @@ def drives_of(scene: Scene, wanted: Sequence[str], shift_m: float, fps: float | 
             option = f"--shift-m {shift_m:g}" if each == "shift" else f"--trajectory {each}"
             _check_seen(share_seen(scene, drive.path), away_m, option)
     return drives
+
+
+def along(scene: Scene, path: Trajectory) -> Scene:
+    """The scene with the views that its cameras have on another drive in place of the recorded ones.
+
+    The path is that of the first camera. The others of a rig are carried along as they were mounted at their
+    first view; those that saw the street from where the first one did, on drives of their own, are left out.
+    """
+    front = scene.trajectory
+    rig: dict[int, tuple[Camera, Float[np.ndarray, "4 4"]]] = {}
+    for view, camera in enumerate(scene.cameras):
+        if scene.of_rig(view) not in rig:
+            first_from_world = np.linalg.inv(front.at(scene.times_s[view : view + 1])[0])
+            rig[scene.of_rig(view)] = camera, first_from_world @ camera.world_from_camera
+    same = [k for k, (_, mounted) in rig.items() if np.allclose(mounted, np.eye(4), atol=_SAME)]
+    rig = {k: each for k, each in rig.items() if k not in same[1:]}
+    about = scene.provenance
+    height_m = about.camera_height_m
+    if height_m is not None:
+        height_m += float((path.positions_m[0] - front.positions_m[0]) @ scene.up)
+    return replace(
+        scene,
+        cameras=tuple(
+            camera.at(pose @ mounted) for pose in path.world_from_camera for camera, mounted in rig.values()
+        ),
+        times_s=np.repeat(path.times_s, len(rig)),
+        held_out=np.zeros(len(path) * len(rig), bool),
+        provenance=replace(about, source_index=None, camera_height_m=height_m),
+        camera=None if scene.camera is None else np.tile(list(rig), len(path)),
+    )
 
 
 def _drive(scene: Scene, wanted: str, shift_m: float, fps: float | None) -> Drive:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         scene_to_tum as scene_to_tum,
     )
     from dreamdrive.export.kinds import Export as Export, function as function
+    from dreamdrive.export.labels import Labels as Labels, labels_of as labels_of
     from dreamdrive.export.log import take as take
     from dreamdrive.export.mcap.file import need_foxglove as need_foxglove
     from dreamdrive.export.mcap.mcap import (
@@ -35,6 +36,13 @@ if TYPE_CHECKING:
         export_ply as export_ply,
         left_out_of_ply as left_out_of_ply,
         write_ply as write_ply,
+    )
+    from dreamdrive.export.surfaces import (
+        SurfaceMesh as SurfaceMesh,
+        mesh_of as mesh_of,
+        scene_to_depth as scene_to_depth,
+        scene_to_flow as scene_to_flow,
+        scene_to_mesh as scene_to_mesh,
     )
     from dreamdrive.export.table import EXPORTS as EXPORTS, export as export
     from dreamdrive.export.world_log import taken_of_world as taken_of_world

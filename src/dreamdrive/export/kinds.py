@@ -5,7 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from dreamdrive.files.kinds import COLMAP_KIND, NCORE_KIND, NERFSTUDIO_KIND, NUSCENES_KIND, PLY_KIND
+from dreamdrive.files.kinds import (
+    COLMAP_KIND,
+    DEPTH_KIND,
+    FLOW_KIND,
+    NCORE_KIND,
+    NERFSTUDIO_KIND,
+    NUSCENES_KIND,
+    PLY_KIND,
+)
 from dreamdrive.files.output import check_ending, check_free, check_new_file
 from dreamdrive.registry import loaded
 
@@ -22,8 +30,12 @@ class Export:
         about: What it is, for people.
         scene: Writes a scene; of it, a path, and by name ``replace``, ``progress`` and what is in ``takes``.
         world: Likewise of the drives of a drawn street; None where that is not written.
-        takes: ``clip`` and ``geometry``, of which a scene was made, and ``name``, that of a drawn street.
-        ending: Of the file that it is; None of a folder.
+        takes: ``clip`` and ``geometry``, of which a scene was made; ``name``, that of a drawn street; and
+            what a user may ask for: ``times``, moments, which come as ``times_s``; ``trajectory``, a new
+            drive, whose views the scene then has, with no clip; ``blur``, a function that changes each
+            picture before it is written; ``labels``, those of the drive that a scene was made of. These come
+            only where they are asked for.
+        ending: Of the file that it is, or several; None of a folder.
         folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
         need: Raises ``InputError`` where a package is missing.
         left_out: Says what of a scene has no place in it, of the scene and the path.
@@ -34,16 +46,17 @@ class Export:
     scene: Place
     world: Place | None = None
     takes: frozenset[str] = frozenset()
-    ending: str | None = None
+    ending: str | tuple[str, ...] | None = None
     folder: str | None = None
     need: Place | None = None
     left_out: Place | None = None
 
     def check(self, path: Path, replace: bool) -> None:
         """Fail before anything is loaded where the path cannot be written, or a package is missing."""
-        if self.ending is not None and self.folder is None:
-            check_ending(path, self.ending)
-        if self.folder is None or path.suffix.lower() == self.ending:
+        endings = (self.ending,) if isinstance(self.ending, str) else self.ending or ()
+        if endings and self.folder is None:
+            check_ending(path, *endings)
+        if self.folder is None or path.suffix.lower() in endings:
             check_new_file(path, replace)
         else:
             check_free(path, replace, self.folder)
@@ -63,13 +76,14 @@ PLY = Export(
     ending=".ply",
     folder=PLY_KIND,
     left_out="dreamdrive.export.ply:left_out_of_ply",
+    takes=frozenset({"times"}),
 )
 NUSCENES = Export(
     name="nuscenes",
     about="a data set in the format of nuScenes, with pictures, labels and lidar",
     scene="dreamdrive.export.nuscenes.nuscenes:export_scene",
     world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
-    takes=frozenset({"name"}),
+    takes=frozenset({"name", "trajectory", "blur", "labels"}),
     folder=NUSCENES_KIND,
 )
 NCORE = Export(
@@ -77,7 +91,7 @@ NCORE = Export(
     about="the clip with its poses for NuRec, 3dgrut and gsplat",
     scene="dreamdrive.export.ncore.ncore:scene_to_ncore",
     world="dreamdrive.export.ncore.ncore:world_to_ncore",
-    takes=frozenset({"clip", "geometry"}),
+    takes=frozenset({"clip", "geometry", "trajectory", "blur"}),
     folder=NCORE_KIND,
     need="dreamdrive.export.ncore.words:need_ncore",
 )
@@ -86,7 +100,7 @@ MCAP = Export(
     about="the drive for Foxglove",
     scene="dreamdrive.export.mcap.mcap:scene_to_mcap",
     world="dreamdrive.export.mcap.mcap:world_to_mcap",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     ending=".mcap",
     need="dreamdrive.export.mcap.file:need_foxglove",
 )
@@ -94,19 +108,44 @@ COLMAP = Export(
     name="colmap",
     about="frames, cameras and points as a COLMAP model",
     scene="dreamdrive.export.cameras.colmap:scene_to_colmap",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=COLMAP_KIND,
 )
 NERFSTUDIO = Export(
     name="nerfstudio",
     about="frames, cameras and points with transforms.json",
     scene="dreamdrive.export.cameras.nerfstudio:scene_to_nerfstudio",
-    takes=frozenset({"clip"}),
+    takes=frozenset({"clip", "trajectory", "blur"}),
     folder=NERFSTUDIO_KIND,
 )
 TUM = Export(
     name="tum",
     about="the path of the first camera, a pose a line",
     scene="dreamdrive.export.cameras.tum:scene_to_tum",
+    takes=frozenset({"trajectory"}),
     ending=".txt",
+)
+DEPTH = Export(
+    name="depth",
+    about="metres of every pixel in 16 bits, as KITTI has them, with pictures and cameras",
+    scene="dreamdrive.export.surfaces.depth:scene_to_depth",
+    takes=frozenset({"clip", "trajectory", "blur"}),
+    folder=DEPTH_KIND,
+    left_out="dreamdrive.export.surfaces.depth:left_out_of_depth",
+)
+FLOW = Export(
+    name="flow",
+    about="optical flow from frame to frame, as KITTI has it",
+    scene="dreamdrive.export.surfaces.flow:scene_to_flow",
+    takes=frozenset({"clip", "trajectory", "blur"}),
+    folder=FLOW_KIND,
+    left_out="dreamdrive.export.surfaces.flow:left_out_of_flow",
+)
+MESH = Export(
+    name="mesh",
+    about="road and standing surfaces as coloured triangles, PLY or GLB",
+    scene="dreamdrive.export.surfaces.mesh:scene_to_mesh",
+    ending=(".ply", ".glb"),
+    need="dreamdrive.export.surfaces.mesh:need_scikit_image",
+    left_out="dreamdrive.export.surfaces.mesh:left_out_of_mesh",
 )

@@ -23,7 +23,9 @@ AXLE_M = 1.7
 START_US = 1_500_000_000_000_000
 """A clock has to begin somewhere."""
 _NEAR_M = 80.0
-_MOVING_M_S, _JPEG = 0.5, 95
+_JPEG = 95
+MOVING_M_S = 0.5
+"""What is faster moves."""
 _WORDS = {
     "vehicle": ("vehicle.moving", "vehicle.stopped"),
     "human": ("pedestrian.moving", "pedestrian.standing"),
@@ -32,6 +34,9 @@ _PARKED = "vehicle.parked"
 
 Look = Callable[[int, int], tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]]
 """The picture of a camera at a step and depth along z in metres, 0 where there is none."""
+
+Retouch = Callable[[UInt8[np.ndarray, "h w 3"]], UInt8[np.ndarray, "h w 3"]]
+"""What changes a picture before it is written."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +50,17 @@ class RigCamera:
 
 @dataclass(frozen=True)
 class Moved:
-    """A thing with a box at every step, in the words of ``BoxTrack``; ``there`` tells when it is."""
+    """A thing with a box at every step, in the words of ``BoxTrack``; ``there`` tells when it is.
+
+    Without ``attributes`` they are those of its motion.
+    """
 
     id: str
     category: str
     size_lwh_m: Float[np.ndarray, "3"]
     world_from_box: Float[np.ndarray, "t 4 4"]
     there: Bool[np.ndarray, " t"]
+    attributes: tuple[tuple[str, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +79,7 @@ class Taken:
     lidar: bool = True
 
 
-def take(drive: Taken, folder: Path, progress: Progress = silent) -> Log:
+def take(drive: Taken, folder: Path, progress: Progress = silent, *, blur: Retouch | None = None) -> Log:
     """Write pictures and lidar of a drive into a folder, and tell what they are of.
 
     Every ``KEY_S`` seconds a time is labelled: it has lidar points and boxes within 80 m of the car. How much
@@ -84,7 +93,8 @@ def take(drive: Taken, folder: Path, progress: Progress = silent) -> Log:
         views: list[View] = []
         for index, camera in enumerate(drive.cameras):
             picture, depth_m = drive.look(index, step)
-            files[camera.name].append(_write_picture(folder, camera.name, step, picture))
+            shown = picture if blur is None else blur(picture)
+            files[camera.name].append(_write_picture(folder, camera.name, step, shown))
             pose = drive.world_from_ego[step] @ camera.ego_from_camera
             views.append((camera.pinhole.at(pose), depth_m))
         if step in keys:
@@ -154,8 +164,8 @@ def _track(
     if not steps:
         return None
     speed = _speed_m_s(drive.times_s, box)
-    ever = bool(speed.max() > _MOVING_M_S)
-    moves = [int(speed[step] > _MOVING_M_S) for step in steps]
+    ever = bool(speed.max() > MOVING_M_S)
+    moves = [int(speed[step] > MOVING_M_S) for step in steps]
     return BoxTrack(
         id=box.id,
         category=box.category,
@@ -165,7 +175,9 @@ def _track(
         visibility=np.array([labels[step][box.id][0] for step in steps]),
         moves=np.array(moves),
         lidar_points=np.array([labels[step][box.id][1] for step in steps]),
-        attributes=tuple(_words(box.category, bool(each), ever) for each in moves),
+        attributes=tuple(_words(box.category, bool(each), ever) for each in moves)
+        if box.attributes is None
+        else tuple(box.attributes[step] for step in steps),
     )
 
 

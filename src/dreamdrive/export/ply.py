@@ -1,9 +1,11 @@
 """Gaussians as PLY, in the layout that 3DGS viewers read."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import torch
 
+from dreamdrive.errors import InputError
 from dreamdrive.files.kinds import PLY_KIND
 from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
 from dreamdrive.progress import Progress, silent
@@ -23,24 +25,37 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
         partial.write_bytes(data)
 
 
-def export_ply(scene: Scene, path: Path, *, replace: bool = False, progress: Progress = silent) -> None:
+def export_ply(
+    scene: Scene,
+    path: Path,
+    *,
+    times_s: Sequence[float] | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
+) -> None:
     """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
 
-    The single file holds everything as it is at the first recorded time. The folder holds ``static.ply``
-    (what never moves) and ``frames/NNNN.ply``, everything as it is at each recorded time: a numbered sequence
-    that viewers play. PLY has no place for sky and exposure. One Gaussian takes 68 bytes, with spherical
-    harmonics of degree 1 104. What is there already is replaced only if that is asked for.
+    The single file holds everything as it is at one moment, the first recorded time where no other is given.
+    The folder holds ``static.ply`` (what never moves) and ``frames/NNNN.ply``, everything as it is at each
+    moment, without others at each recorded time: a numbered sequence that viewers play. PLY has no place for
+    sky and exposure. One Gaussian takes 68 bytes, with spherical harmonics of degree 1 104. What is there
+    already is replaced only if that is asked for.
     """
     check_ply(path, replace)
+    moments_s = list(map(float, scene.times_s if times_s is None else times_s))
     if path.suffix.lower() == ".ply":
-        write_ply(scene.at(float(scene.times_s[0])), path)
+        if times_s is not None and len(moments_s) != 1:
+            raise InputError(
+                f"{path} holds one moment, and {len(moments_s)} are asked for; give one, or a folder for all"
+            )
+        write_ply(scene.at(moments_s[0]), path)
         return
     with new_folder(path, replace=replace, kind=PLY_KIND) as folder:
-        (folder / "static.ply").write_bytes(_encode(scene.static_at(float(scene.times_s[0]))))
+        (folder / "static.ply").write_bytes(_encode(scene.static_at(moments_s[0])))
         (folder / "frames").mkdir()
-        for i, t_s in enumerate(scene.times_s):
-            (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
-            progress(i + 1, len(scene.times_s))
+        for i, t_s in enumerate(moments_s):
+            (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(t_s)))
+            progress(i + 1, len(moments_s))
 
 
 def check_ply(path: Path, replace: bool) -> None:
@@ -54,7 +69,7 @@ def check_ply(path: Path, replace: bool) -> None:
 def left_out_of_ply(scene: Scene, path: Path) -> str:
     """What of a scene ``export_ply`` finds no place for, in a sentence."""
     alone = path.suffix.lower() == ".ply"
-    shown = f"the scene at {float(scene.times_s[0]):.3g} s" if alone else "the scene at its recorded times"
+    shown = "one moment of the scene" if alone else "moments of the scene"
     parts = {
         "sky": scene.sky is not None,
         "exposure of the recording": scene.exposure is not None,

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from dreamdrive.export.labels import Labels
 from dreamdrive.export.log import AXLE_M, Moved, RigCamera, Taken
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.level import level_from_world
@@ -28,9 +29,14 @@ _NAMES = {
 """Names of cameras by where they look, in degrees to the left."""
 
 
-def taken_of_scene(scene: Scene, name: str) -> Taken:
-    """A scene along its recorded path by its own cameras; its ground is level and lies at a height of 0."""
+def taken_of_scene(scene: Scene, name: str, labels: Labels | None = None) -> Taken:
+    """A scene along its recorded path by its own cameras; its ground is level and lies at a height of 0.
+
+    With labels it lies in the world of the drive that it was made of, with the map and the things of that.
+    """
     world_from_scene, ego_from_front = level_frame(scene)
+    if labels is not None:
+        world_from_scene = np.array(labels.link.log_from_world)
     path = scene.trajectory
     front = world_from_scene @ path.world_from_camera
     rig = rig_of(scene, ego_from_front)
@@ -46,13 +52,16 @@ def taken_of_scene(scene: Scene, name: str) -> Taken:
     return Taken(
         name=name,
         about=f"Scene made of {scene.provenance.input or 'an unknown input'}",
-        location=f"scene-{name}",
+        location=f"scene-{name}" if labels is None else labels.location,
         times_s=path.times_s,
         world_from_ego=world_from_ego,
         cameras=rig,
         look=look,
-        boxes=tuple(box for box in boxes if box is not None),
-        map=LogMap(),
+        boxes=(
+            *(box for box in boxes if box is not None),
+            *([] if labels is None else labels.at(path.times_s)),
+        ),
+        map=LogMap() if labels is None else labels.map,
     )
 
 

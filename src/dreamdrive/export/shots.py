@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt8
 
 from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.export.lidar import EGO_FROM_LIDAR, turned
-from dreamdrive.export.log import START_US, Moved, Taken
+from dreamdrive.export.log import START_US, Moved, Retouch, Taken
 from dreamdrive.export.nuscenes.writer import write_points
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.clip import Clip
@@ -73,7 +73,14 @@ def shots_of_scene(
     return sorted(map(shot, range(len(scene.cameras))), key=lambda each: (each.time_s, each.camera))
 
 
-def log_of(drive: Taken, shots: Sequence[Shot], folder: Path, progress: Progress = silent) -> Log:
+def log_of(
+    drive: Taken,
+    shots: Sequence[Shot],
+    folder: Path,
+    progress: Progress = silent,
+    *,
+    blur: Retouch | None = None,
+) -> Log:
     """Write the pictures of a drive as PNG and its lidar into a folder, and tell what they are of.
 
     The first camera that has a picture of a time tells where the car was. Each time is labelled, and has
@@ -84,6 +91,7 @@ def log_of(drive: Taken, shots: Sequence[Shot], folder: Path, progress: Progress
         shots: Its pictures, in the order of time and of the cameras.
         folder: To write.
         progress: Told of each picture.
+        blur: Changes each picture before it is written.
     """
     files: list[Path] = []
     sweeps: list[LidarSweep] = []
@@ -95,7 +103,8 @@ def log_of(drive: Taken, shots: Sequence[Shot], folder: Path, progress: Progress
         for shot in rig:
             picture, depth_m = shot.look()
             files.append(folder / f"{len(files):06d}.png")
-            write_picture(files[-1], picture[..., ::-1])
+            shown = picture if blur is None else blur(picture)
+            write_picture(files[-1], shown[..., ::-1])
             views.append((drive.cameras[shot.camera].pinhole.at(shot.world_from_camera), depth_m))
             progress(len(files), len(shots))
         if drive.lidar:

@@ -21,6 +21,9 @@ EXPORTS: "Table[Export]" = Table(
         "colmap": "dreamdrive.export.kinds:COLMAP",
         "nerfstudio": "dreamdrive.export.kinds:NERFSTUDIO",
         "tum": "dreamdrive.export.kinds:TUM",
+        "depth": "dreamdrive.export.kinds:DEPTH",
+        "flow": "dreamdrive.export.kinds:FLOW",
+        "mesh": "dreamdrive.export.kinds:MESH",
     },
 )
 """From a scene to a file or a folder that other programs read."""

@@ -44,6 +44,8 @@ class RenderOptions:
     format: Format = "mp4"
     size: tuple[int, int] | None = None
     fps: float | None = None
+    blur: Callable[[UInt8[np.ndarray, "h w 3"]], UInt8[np.ndarray, "h w 3"]] | None = None
+    """Changes each picture of colours before it is written."""
 
 
 def write_drive(
@@ -66,11 +68,11 @@ def write_drive(
             progress(i + 1)
 
     if options.format == "mp4":
-        write_video(path, (_picture(view, options.show) for view in views()), video_rate(drive, options))
+        write_video(path, (_picture(view, options) for view in views()), video_rate(drive, options))
         return
     with new_folder(path, replace=True, kind="rendered drive") as folder:
         for i, view in enumerate(views()):
-            _write_frame(folder / f"{i:04d}.{options.format}", view, options.show)
+            _write_frame(folder / f"{i:04d}.{options.format}", view, options)
         (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, options), allow_nan=False) + "\n")
 
 
@@ -115,24 +117,24 @@ def depth_png(view: SceneView) -> UInt16[np.ndarray, "h w"]:
     return depth.astype(np.uint16)
 
 
-def _picture(view: SceneView, show: Show) -> UInt8[np.ndarray, "h w 3"]:
-    if show == "depth":
+def _picture(view: SceneView, options: RenderOptions) -> UInt8[np.ndarray, "h w 3"]:
+    if options.show == "depth":
         return panels.depth_colours(view.depth_m.numpy())
-    return view.picture
+    return view.picture if options.blur is None else options.blur(view.picture)
 
 
-def _write_frame(path: Path, view: SceneView, show: Show) -> None:
+def _write_frame(path: Path, view: SceneView, options: RenderOptions) -> None:
     if path.suffix == ".npz":
         # Compressing would save a quarter of the space and take ten times as long.
         colour, depth_m, alpha = view.colour.numpy(), view.depth_m.numpy(), view.alpha.numpy()
-        if show == "depth":
+        if options.show == "depth":
             np.savez(path, depth_m=depth_m, alpha=alpha)
         else:
             np.savez(path, colour=colour, depth_m=depth_m, alpha=alpha)
-    elif show == "depth":
+    elif options.show == "depth":
         write_picture(path, depth_png(view))
     else:
-        write_png(path, _picture(view, show))
+        write_png(path, _picture(view, options))
 
 
 def _note(camera: Camera, drive: Trajectory, options: RenderOptions) -> dict[str, Any]:

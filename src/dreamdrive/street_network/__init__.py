@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from dreamdrive.registry import offer
 
 if TYPE_CHECKING:
+    from dreamdrive.street_network.blur import blur as blur
     from dreamdrive.street_network.files import write_look as write_look
     from dreamdrive.street_network.look import LookOptions as LookOptions, Network as Network, look as look
     from dreamdrive.street_network.network import StreetNetwork as StreetNetwork

@@ -3,6 +3,8 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
+from itertools import pairwise
+from math import isfinite
 from operator import or_
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin
@@ -63,6 +65,10 @@ _TABLES: dict[type[str], Iterable[str]] = {
     ExportName: EXPORTS,
 }
 REGISTRY = ConstructorRegistry()
+MOST_MOMENTS = 10_000
+"""Of ``--times``."""
+_ROUNDED = 1e-6
+"""By so much of a step a last time may be missed."""
 
 
 @REGISTRY.primitive_rule
@@ -112,6 +118,27 @@ def parse_view(text: str) -> tuple[float, float]:
     except InputError as error:
         raise InputError(f"--view {error}; such as 30,0, in degrees") from None
     return heading, pitch
+
+
+def parse_times(text: str) -> tuple[float, ...]:
+    """Seconds from ``0.5``, ``0,0.5,2`` or ``0:2:0.1``, which is from the first to the last in steps."""
+    try:
+        if ":" in text:
+            first_s, last_s, step_s = map(float, text.split(":"))
+            steps = (last_s - first_s) / step_s
+            if not 0 <= steps < MOST_MOMENTS or step_s <= 0:
+                raise ValueError
+            return tuple(first_s + k * step_s for k in range(int(steps + _ROUNDED) + 1))
+        times_s = tuple(map(float, text.split(",")))
+        rising = all(one < other for one, other in pairwise(times_s))
+        if not rising or not all(map(isfinite, times_s)) or len(times_s) > MOST_MOMENTS:
+            raise ValueError
+    except (ValueError, ZeroDivisionError):
+        raise InputError(
+            f"--times {text}: expected seconds, such as 0.5 or 0,0.5,2, or first:last:step, such as 0:2:0.1; "
+            f"{MOST_MOMENTS} at most, each later than the one before"
+        ) from None
+    return times_s
 
 
 def parse_action(text: str) -> Action:

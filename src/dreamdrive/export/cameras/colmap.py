@@ -5,6 +5,7 @@ from pathlib import Path
 from scipy.spatial.transform import Rotation
 
 from dreamdrive.export.cameras.views import street_points, write_views
+from dreamdrive.export.log import Retouch
 from dreamdrive.files.kinds import COLMAP_KIND
 from dreamdrive.files.output import new_folder
 from dreamdrive.progress import Progress, silent
@@ -17,6 +18,7 @@ def scene_to_colmap(
     folder: Path,
     *,
     clip: Clip | None = None,
+    blur: Retouch | None = None,
     replace: bool = False,
     progress: Progress = silent,
 ) -> None:
@@ -29,6 +31,7 @@ def scene_to_colmap(
         scene: The scene.
         folder: To write.
         clip: What the scene was made of, whose frames are written; without it the scene is rendered.
+        blur: Changes each picture before it is written.
         replace: Take the place of an older folder of this kind.
         progress: Told of each picture.
 
@@ -36,7 +39,7 @@ def scene_to_colmap(
         InputError: The folder cannot be written, or the clip is of another scene.
     """
     with new_folder(folder, replace=replace, kind=COLMAP_KIND) as made:
-        names = write_views(scene, clip, made / "images", progress)
+        names = write_views(scene, clip, made / "images", progress, blur=blur)
         model = made / "sparse" / "0"
         model.mkdir(parents=True)
         (model / "cameras.txt").write_text(_cameras(scene))

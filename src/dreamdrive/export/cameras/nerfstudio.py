@@ -2,10 +2,12 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dreamdrive.export.cameras.views import street_points, write_views
+from dreamdrive.export.log import Retouch
 from dreamdrive.files.json_file import write_json
 from dreamdrive.files.kinds import NERFSTUDIO_KIND
 from dreamdrive.files.output import new_folder
@@ -23,6 +25,7 @@ def scene_to_nerfstudio(
     folder: Path,
     *,
     clip: Clip | None = None,
+    blur: Retouch | None = None,
     replace: bool = False,
     progress: Progress = silent,
 ) -> None:
@@ -32,21 +35,7 @@ def scene_to_nerfstudio(
     has seen are those of ``test_filenames``.
     """
     with new_folder(folder, replace=replace, kind=NERFSTUDIO_KIND) as made:
-        names = [f"images/{name}" for name in write_views(scene, clip, made / "images", progress)]
-        frames = [
-            {
-                "file_path": name,
-                "transform_matrix": camera.world_from_camera @ _FLIPPED,
-                "time": time_s,
-                "fl_x": camera.fx_px,
-                "fl_y": camera.fy_px,
-                "cx": camera.cx_px,
-                "cy": camera.cy_px,
-                "w": camera.width_px,
-                "h": camera.height_px,
-            }
-            for name, camera, time_s in zip(names, scene.cameras, scene.times_s.tolist(), strict=True)
-        ]
+        names = [f"images/{name}" for name in write_views(scene, clip, made / "images", progress, blur=blur)]
         withheld = scene.held_out.tolist()
         write_json(
             made / "transforms.json",
@@ -55,10 +44,28 @@ def scene_to_nerfstudio(
                 "ply_file_path": _POINTS,
                 "train_filenames": [name for name, held in zip(names, withheld, strict=True) if not held],
                 "test_filenames": [name for name, held in zip(names, withheld, strict=True) if held],
-                "frames": frames,
+                "frames": frames_of(scene, names),
             },
         )
         (made / _POINTS).write_bytes(_points(scene))
+
+
+def frames_of(scene: Scene, names: list[str]) -> list[dict[str, Any]]:
+    """The views of a scene as ``transforms.json`` lists them, by the names of their pictures."""
+    return [
+        {
+            "file_path": name,
+            "transform_matrix": camera.world_from_camera @ _FLIPPED,
+            "time": time_s,
+            "fl_x": camera.fx_px,
+            "fl_y": camera.fy_px,
+            "cx": camera.cx_px,
+            "cy": camera.cy_px,
+            "w": camera.width_px,
+            "h": camera.height_px,
+        }
+        for name, camera, time_s in zip(names, scene.cameras, scene.times_s.tolist(), strict=True)
+    ]
 
 
 def _points(scene: Scene) -> bytes:

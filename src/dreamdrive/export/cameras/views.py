@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float, UInt8
 
 from dreamdrive.data.pictures.picture_file import write_picture
+from dreamdrive.export.log import Retouch
 from dreamdrive.export.whole_log import check_clip
 from dreamdrive.progress import Progress
 from dreamdrive.scene.clip import Clip
@@ -20,25 +21,35 @@ MOST_POINTS = 100_000
 _SOLID = 0.5
 
 
-def write_views(scene: Scene, clip: Clip | None, folder: Path, progress: Progress) -> list[str]:
+def write_views(
+    scene: Scene, clip: Clip | None, folder: Path, progress: Progress, *, blur: Retouch | None = None
+) -> list[str]:
     """Write each recorded view as PNG, and name the files below the folder, in the order of the views.
 
-    Those of a rig have a folder each. Without the clip that the scene was made of they are rendered.
+    Those of a rig have a folder each; for the pictures see ``picture_of_view``.
     """
     check_clip(scene, clip)
     names: list[str] = []
-    for i, camera in enumerate(scene.cameras):
-        of_rig = scene.of_rig(i)
-        name = f"{i:05d}.png" if scene.camera is None else f"camera{of_rig}/{i:05d}.png"
-        if clip is None:
-            picture = render_scene(scene, camera, float(scene.times_s[i]), of_rig=of_rig).picture
-        else:
-            picture = clip.frames[i]
+    for i in range(len(scene.cameras)):
+        name = f"{i:05d}.png" if scene.camera is None else f"camera{scene.of_rig(i)}/{i:05d}.png"
+        picture = picture_of_view(scene, clip, i, blur)
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_picture(folder / name, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
         names.append(name)
         progress(i + 1, len(scene.cameras))
     return names
+
+
+def picture_of_view(
+    scene: Scene, clip: Clip | None, view: int, blur: Retouch | None
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A recorded frame, of the clip that the scene was made of; without it the view is rendered."""
+    if clip is None:
+        of_rig, time_s = scene.of_rig(view), float(scene.times_s[view])
+        picture = render_scene(scene, scene.cameras[view], time_s, of_rig=of_rig).picture
+    else:
+        picture = clip.frames[view]
+    return picture if blur is None else blur(picture)
 
 
 @torch.no_grad()

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from dreamdrive.data.pictures.images import read_image
 from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.export.log import Retouch
 from dreamdrive.export.log_parts import NS, path_of, picture_of, stamps
 from dreamdrive.export.mcap.file import need_foxglove
 from dreamdrive.export.mcap.words import RecordedBox
@@ -61,7 +62,13 @@ def write_mcap(log: Log, file: Path, *, points: Points = read_points, replace: b
 
 
 def scene_to_mcap(
-    scene: Scene, file: Path, *, clip: Clip | None = None, replace: bool = False, progress: Progress = silent
+    scene: Scene,
+    file: Path,
+    *,
+    clip: Clip | None = None,
+    blur: Retouch | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
 ) -> None:
     """Write the recorded views of a scene, with the scene's poses, actors and depth.
 
@@ -72,6 +79,7 @@ def scene_to_mcap(
         scene: The scene.
         file: To write; its name ends in ``.mcap``.
         clip: What the scene was made of, whose frames are written; without it the scene is rendered.
+        blur: Changes each picture before it is written.
         replace: Take the place of an older file.
         progress: Told of each picture.
 
@@ -82,18 +90,23 @@ def scene_to_mcap(
     need_foxglove()
     check_mcap(file, replace)
     with scratch_beside(file) as scratch:
-        log = log_of_scene(scene, file.stem, clip, scratch, progress)
+        log = log_of_scene(scene, file.stem, clip, scratch, progress, blur=blur)
         write_mcap(log, file, replace=replace)
 
 
 def world_to_mcap(
-    drives: Mapping[Mount, DriveTruth], file: Path, *, replace: bool = False, progress: Progress = silent
+    drives: Mapping[Mount, DriveTruth],
+    file: Path,
+    *,
+    blur: Retouch | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
 ) -> None:
     """Write a drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
     need_foxglove()
     check_mcap(file, replace)
     with scratch_beside(file) as scratch:
-        log = log_of_world(drives, file.stem, scratch, progress)
+        log = log_of_world(drives, file.stem, scratch, progress, blur=blur)
         write_mcap(log, file, replace=replace)
 
 

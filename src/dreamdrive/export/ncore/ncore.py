@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dreamdrive.export.log import Retouch
 from dreamdrive.export.ncore.words import need_ncore
 from dreamdrive.export.ncore.writer import NO_MASKS, Masks, write_ncore
 from dreamdrive.export.whole_log import log_of_scene, log_of_world
@@ -22,6 +23,7 @@ def scene_to_ncore(
     *,
     clip: Clip | None = None,
     geometry: Geometry | None = None,
+    blur: Retouch | None = None,
     replace: bool = False,
     progress: Progress = silent,
 ) -> None:
@@ -36,6 +38,7 @@ def scene_to_ncore(
         clip: What the scene was made of, whose frames are written; without it the scene is rendered. What
             holds no picture is masked.
         geometry: Of the clip; what is fixed to its cameras, such as the bonnet, is masked.
+        blur: Changes each picture before it is written.
         replace: Take the place of an older folder of this kind.
         progress: Told of each picture.
 
@@ -45,19 +48,24 @@ def scene_to_ncore(
     """
     need_ncore()
     with scratch_beside(folder) as scratch:
-        log = log_of_scene(scene, folder.name, clip, scratch, progress)
+        log = log_of_scene(scene, folder.name, clip, scratch, progress, blur=blur)
         names = [camera.name for camera in log.cameras]
         hidden = NO_MASKS if clip is None else _hidden(clip, geometry, names)
         write_ncore(log, folder, origin="AUTOLABEL", hidden=hidden, replace=replace)
 
 
 def world_to_ncore(
-    drives: Mapping[Mount, DriveTruth], folder: Path, *, replace: bool = False, progress: Progress = silent
+    drives: Mapping[Mount, DriveTruth],
+    folder: Path,
+    *,
+    blur: Retouch | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
 ) -> None:
     """Write a drawn street: frames, poses and boxes are true, lidar points those that depth shows."""
     need_ncore()
     with scratch_beside(folder) as scratch:
-        log = log_of_world(drives, folder.name, scratch, progress)
+        log = log_of_world(drives, folder.name, scratch, progress, blur=blur)
         write_ncore(log, folder, origin="GT_SYNTHETIC", replace=replace)
 
 
