@@ -60,6 +60,7 @@ PLY = Export(
     name="ply",
     about="what viewers of 3D Gaussians read",
     scene="dreamdrive.export.ply:export_ply",
+    takes=frozenset({"times"}),
     ending=".ply",
     folder=PLY_KIND,
     left_out="dreamdrive.export.ply:left_out_of_ply",
@@ -109,4 +110,12 @@ TUM = Export(
     about="the path of the first camera, a pose a line",
     scene="dreamdrive.export.cameras.tum:scene_to_tum",
     ending=".txt",
+)
+HTML = Export(
+    name="html",
+    about="one page that plays the scene in a browser",
+    scene="dreamdrive.export.page.page:scene_to_page",
+    takes=frozenset({"times"}),
+    ending=".html",
+    left_out="dreamdrive.export.page.page:left_out_of_page",
 )

@@ -1,11 +1,13 @@
 """Gaussians as PLY, in the layout that 3DGS viewers read."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import torch
 
+from dreamdrive.export.stills import Still, left_out_of_stills, write_stills
 from dreamdrive.files.kinds import PLY_KIND
-from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
+from dreamdrive.files.output import new_file
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
@@ -23,45 +25,26 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
         partial.write_bytes(data)
 
 
-def export_ply(scene: Scene, path: Path, *, replace: bool = False, progress: Progress = silent) -> None:
-    """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
+def export_ply(
+    scene: Scene,
+    path: Path,
+    *,
+    times_s: Sequence[float] | None = None,
+    replace: bool = False,
+    progress: Progress = silent,
+) -> None:
+    """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder, see ``write_stills``.
 
-    The single file holds everything as it is at the first recorded time. The folder holds ``static.ply``
-    (what never moves) and ``frames/NNNN.ply``, everything as it is at each recorded time: a numbered sequence
-    that viewers play. PLY has no place for sky and exposure. One Gaussian takes 68 bytes, with spherical
-    harmonics of degree 1 104. What is there already is replaced only if that is asked for.
+    The sequence ``frames/NNNN.ply`` is what viewers play. PLY has no place for sky and exposure. One Gaussian
+    takes 68 bytes, with spherical harmonics of degree 1 104. What is there already is replaced only if that
+    is asked for.
     """
-    check_ply(path, replace)
-    if path.suffix.lower() == ".ply":
-        write_ply(scene.at(float(scene.times_s[0])), path)
-        return
-    with new_folder(path, replace=replace, kind=PLY_KIND) as folder:
-        (folder / "static.ply").write_bytes(_encode(scene.static_at(float(scene.times_s[0]))))
-        (folder / "frames").mkdir()
-        for i, t_s in enumerate(scene.times_s):
-            (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(float(t_s))))
-            progress(i + 1, len(scene.times_s))
-
-
-def check_ply(path: Path, replace: bool) -> None:
-    """Fail before the work where ``export_ply``, of the same arguments, would fail after it."""
-    if path.suffix.lower() == ".ply":
-        check_new_file(path, replace)
-    else:
-        check_free(path, replace, PLY_KIND)
+    write_stills(scene, path, _PLY, times_s=times_s, replace=replace, progress=progress)
 
 
 def left_out_of_ply(scene: Scene, path: Path) -> str:
     """What of a scene ``export_ply`` finds no place for, in a sentence."""
-    alone = path.suffix.lower() == ".ply"
-    shown = f"the scene at {float(scene.times_s[0]):.3g} s" if alone else "the scene at its recorded times"
-    parts = {
-        "sky": scene.sky is not None,
-        "exposure of the recording": scene.exposure is not None,
-        "motion" if alone else "motion in between": scene.moves_per_frame or len(scene.dynamic) > 0,
-    }
-    missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
-    return f"PLY holds {shown}{': ' if missing else ''}{missing}."
+    return left_out_of_stills(scene, path, _PLY)
 
 
 def _fields(coefficients: int) -> list[str]:
@@ -85,3 +68,6 @@ def _encode(gaussians: Gaussians) -> bytes:
     ]
     table = torch.cat([c.detach().cpu().float() for c in columns], dim=1).numpy()
     return header.encode("ascii") + table.astype("<f4").tobytes()
+
+
+_PLY = Still("PLY", ".ply", PLY_KIND, _encode)

@@ -21,6 +21,7 @@ EXPORTS: "Table[Export]" = Table(
         "colmap": "dreamdrive.export.kinds:COLMAP",
         "nerfstudio": "dreamdrive.export.kinds:NERFSTUDIO",
         "tum": "dreamdrive.export.kinds:TUM",
+        "html": "dreamdrive.export.kinds:HTML",
     },
 )
 """From a scene to a file or a folder that other programs read."""
