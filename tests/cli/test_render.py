@@ -110,7 +110,8 @@ def test_nothing_is_written_where_the_scene_shows_nothing(run: Run, out: Path) -
 def test_export_says_what_is_left_out(run: Run, out: Path, tmp_path: Path) -> None:
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").out
     assert said == (
-        f"{tmp_path}/all.ply PLY holds the scene at one time: no sky, no exposure of the recording, no motion."
+        f"{tmp_path}/all.ply PLY holds the scene at one time: "
+        "no sky, no exposure of the recording, no motion."
     )
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all").out
     assert said.endswith(

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from dreamdrive.files.kinds import COLMAP_KIND, NCORE_KIND, NERFSTUDIO_KIND, NUSCENES_KIND, PLY_KIND
+from dreamdrive.files.kinds import (
+    COLMAP_KIND,
+    GLB_KIND,
+    NCORE_KIND,
+    NERFSTUDIO_KIND,
+    NUSCENES_KIND,
+    PLY_KIND,
+    SPZ_KIND,
+)
 from dreamdrive.files.output import check_ending, check_free, check_new_file
 from dreamdrive.registry import loaded
 
@@ -22,7 +30,8 @@ class Export:
         about: What it is, for people.
         scene: Writes a scene; of it, a path, and by name ``replace``, ``progress`` and what is in ``takes``.
         world: Likewise of the drives of a drawn street; None where that is not written.
-        takes: ``clip`` and ``geometry``, of which a scene was made, and ``name``, that of a drawn street.
+        takes: ``clip`` and ``geometry``, of which a scene was made, ``name``, that of a drawn street, and
+            ``times``: at which moments, by name ``times_s``.
         ending: Of the file that it is; None of a folder.
         folder: The kind of folder that it is, see ``files.kinds``; None of a file. Of both, the path decides.
         need: Raises ``InputError`` where a package is missing.
@@ -118,4 +127,23 @@ HTML = Export(
     takes=frozenset({"times"}),
     ending=".html",
     left_out="dreamdrive.export.page.page:left_out_of_page",
+)
+SPZ = Export(
+    name="spz",
+    about="Gaussians in a tenth of the size of PLY",
+    scene="dreamdrive.export.splats.spz:scene_to_spz",
+    takes=frozenset({"times"}),
+    ending=".spz",
+    folder=SPZ_KIND,
+    need="dreamdrive.data.splats.spz:need_zstandard",
+    left_out="dreamdrive.export.splats.spz:left_out_of_spz",
+)
+GLB = Export(
+    name="glb",
+    about="Gaussians as glTF, the standard of Khronos",
+    scene="dreamdrive.export.splats.glb:scene_to_glb",
+    takes=frozenset({"times"}),
+    ending=".glb",
+    folder=GLB_KIND,
+    left_out="dreamdrive.export.splats.glb:left_out_of_glb",
 )

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import torch
-
+from dreamdrive.data.splats.ply import pack_ply
 from dreamdrive.export.stills import Still, left_out_of_stills, write_stills
 from dreamdrive.files.kinds import PLY_KIND
 from dreamdrive.files.output import new_file
@@ -20,7 +19,7 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
     scale_0..2 (log), rot_0..3 (wxyz, unit). Axes stay: x right, y down, z forward. Life spans, actors,
     features and source frames have no field and are left out; use ``Scene.at`` first for a scene at a time.
     """
-    data = _encode(gaussians)
+    data = pack_ply(gaussians)
     with new_file(path) as partial:
         partial.write_bytes(data)
 
@@ -47,27 +46,4 @@ def left_out_of_ply(scene: Scene, path: Path) -> str:
     return left_out_of_stills(scene, path, _PLY)
 
 
-def _fields(coefficients: int) -> list[str]:
-    names = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
-    names += [f"f_rest_{i}" for i in range(3 * (coefficients - 1))]
-    return [*names, "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
-
-
-def _encode(gaussians: Gaussians) -> bytes:
-    count, coefficients = gaussians.sh.shape[:2]
-    properties = "".join(f"property float {name}\n" for name in _fields(coefficients))
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n"
-    columns = [
-        gaussians.means,
-        torch.zeros_like(gaussians.means),
-        gaussians.sh[:, 0],
-        gaussians.sh[:, 1:].transpose(1, 2).reshape(count, 3 * (coefficients - 1)),
-        gaussians.logit_opacities[:, None],
-        gaussians.log_scales,
-        torch.nn.functional.normalize(gaussians.quaternions, dim=-1),
-    ]
-    table = torch.cat([c.detach().cpu().float() for c in columns], dim=1).numpy()
-    return header.encode("ascii") + table.astype("<f4").tobytes()
-
-
-_PLY = Still("PLY", ".ply", PLY_KIND, _encode)
+_PLY = Still("PLY", ".ply", PLY_KIND, pack_ply)

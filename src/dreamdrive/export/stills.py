@@ -4,10 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from jaxtyping import Float
-
-from dreamdrive.errors import InputError
+from dreamdrive.export.moving import moments_of
 from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
 from dreamdrive.progress import Progress
 from dreamdrive.scene.gaussians import Gaussians
@@ -29,14 +26,6 @@ class Still:
     ending: str
     kind: str
     encode: Callable[[Gaussians], bytes]
-
-
-def moments_of(scene: Scene, times_s: Sequence[float] | None) -> Float[np.ndarray, " t"]:
-    """The times to write: those given, else the recorded ones; ``InputError`` where they do not grow."""
-    moments_s = scene.times_s[scene.front] if times_s is None else np.asarray(times_s, np.float64)
-    if len(moments_s) == 0 or not np.isfinite(moments_s).all() or (np.diff(moments_s) <= 0).any():
-        raise InputError("times: expected at least one, each later than the one before")
-    return moments_s
 
 
 def write_stills(

@@ -21,6 +21,8 @@ EXPORTS: "Table[Export]" = Table(
         "colmap": "dreamdrive.export.kinds:COLMAP",
         "nerfstudio": "dreamdrive.export.kinds:NERFSTUDIO",
         "tum": "dreamdrive.export.kinds:TUM",
+        "spz": "dreamdrive.export.kinds:SPZ",
+        "glb": "dreamdrive.export.kinds:GLB",
         "html": "dreamdrive.export.kinds:HTML",
     },
 )

@@ -9,7 +9,7 @@ import torch
 
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, export, function
-from dreamdrive.export.page.moving import at_moments
+from dreamdrive.export.moving import at_moments
 from dreamdrive.export.page.page import scene_to_page
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians

@@ -13,8 +13,7 @@ import torch
 from jaxtyping import Float, Shaped
 
 from dreamdrive.errors import InputError
-from dreamdrive.export.page.moving import AtMoments, at_moments, joined
-from dreamdrive.export.stills import moments_of
+from dreamdrive.export.moving import AtMoments, at_moments, joined, moments_of
 from dreamdrive.files.output import check_ending, check_new_file, new_file
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.scene import Scene

@@ -1,13 +1,14 @@
 """Gaussians at moments: what a player needs to show all that is in between."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 
@@ -46,6 +47,14 @@ class AtMoments:
         """Row of the first moment of each."""
         counts = self.last - self.first + 1
         return np.cumsum(counts) - counts
+
+
+def moments_of(scene: Scene, times_s: Sequence[float] | None) -> Float[np.ndarray, " t"]:
+    """The times to write: those given, else the recorded ones; ``InputError`` where they do not grow."""
+    moments_s = scene.times_s[scene.front] if times_s is None else np.asarray(times_s, np.float64)
+    if len(moments_s) == 0 or not np.isfinite(moments_s).all() or (np.diff(moments_s) <= 0).any():
+        raise InputError("times: expected at least one, each later than the one before")
+    return moments_s
 
 
 @torch.no_grad()
