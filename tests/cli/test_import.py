@@ -30,7 +30,7 @@ def test_an_imported_scene_is_a_scene(run: Run, tmp_path: Path) -> None:
 def test_other_commands_take_it(run: Run, tmp_path: Path) -> None:
     write_ply(gaussians(30, 1), tmp_path / "a.ply")
     run("import", tmp_path / "a.ply", "-o", tmp_path / "out")
-    for command in ("render OUT --trajectory stop -o OUT/a.mp4", "export OUT --to colmap -o OUT/c"):
+    for command in ("render OUT --trajectory stop -o OUT-video.mp4", "export OUT --to colmap -o OUT-colmap"):
         words = [word.replace("OUT", str(tmp_path / "out")) for word in command.split()]
         done = run(*words)
         assert done.code == 0, done.err

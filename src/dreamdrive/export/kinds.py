@@ -147,3 +147,21 @@ GLB = Export(
     folder=GLB_KIND,
     left_out="dreamdrive.export.splats.glb:left_out_of_glb",
 )
+USD = Export(
+    name="usd",
+    about="Gaussians over time as OpenUSD, with the recorded camera",
+    scene="dreamdrive.export.splats.usd:scene_to_usd",
+    takes=frozenset({"times"}),
+    ending=".usdc",
+    need="dreamdrive.export.splats.usd:need_usd",
+    left_out="dreamdrive.export.splats.usd:left_out_of_usd",
+)
+FOURDGS = Export(
+    name="4dgs",
+    about="Gaussians over time in the open format of that name",
+    scene="dreamdrive.export.splats.fourdgs:scene_to_4dgs",
+    takes=frozenset({"times"}),
+    ending=".4dgs",
+    need="dreamdrive.export.splats.fourdgs:need_fourdgs",
+    left_out="dreamdrive.export.splats.fourdgs:left_out_of_4dgs",
+)

@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from dreamdrive.data.splats.splats import UP_AND_BACK
 from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.harmonics import sh_rotation
 from dreamdrive.scene.scene import Scene
 
 _REACH = math.sqrt(2 * math.log(255.0))
@@ -121,3 +123,15 @@ def joined(parts: tuple[AtMoments, AtMoments]) -> AtMoments:
     """Both as one."""
     names = AtMoments.__dataclass_fields__
     return AtMoments(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def turned_back(these: AtMoments) -> AtMoments:
+    """The same in axes x right, y up, z back: half a turn about x."""
+    w, x, y, z = these.quaternions.T
+    degree = int(these.sh.shape[1] ** 0.5) - 1
+    return replace(
+        these,
+        means=these.means @ UP_AND_BACK.astype(np.float32),
+        quaternions=np.stack([-x, w, -z, y], axis=1),
+        sh=np.einsum("ij,njc->nic", sh_rotation(UP_AND_BACK, degree).astype(np.float32), these.sh),
+    )

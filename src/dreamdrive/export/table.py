@@ -23,6 +23,8 @@ EXPORTS: "Table[Export]" = Table(
         "tum": "dreamdrive.export.kinds:TUM",
         "spz": "dreamdrive.export.kinds:SPZ",
         "glb": "dreamdrive.export.kinds:GLB",
+        "usd": "dreamdrive.export.kinds:USD",
+        "4dgs": "dreamdrive.export.kinds:FOURDGS",
         "html": "dreamdrive.export.kinds:HTML",
     },
 )
