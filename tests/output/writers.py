@@ -70,6 +70,7 @@ WRITERS = {
     "export mcap": Writer("export IN/run --to mcap -o OUT", ".mcap", _FORCE),
     "export spz": Writer("export IN/scene --to spz -o OUT", "", _FORCE),
     "export glb file": Writer("export IN/scene --to glb -o OUT", ".glb", _FORCE),
+    "export sog": Writer("export IN/scene --to sog -o OUT", ".sog", _FORCE),
     "export usd": Writer("export IN/scene --to usd -o OUT", ".usdc", _FORCE),
     "export 4dgs": Writer("export IN/scene --to 4dgs -o OUT", ".4dgs", _FORCE),
     "export html": Writer("export IN/scene --to html -o OUT", ".html", _FORCE),

@@ -36,11 +36,11 @@ def export(
         out: The folder that generate wrote; for nuscenes, ncore and mcap also one of world make.
         to: ply is what viewers of 3D Gaussians read; nuscenes a data set with pictures, labels and lidar;
             ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove; colmap
-            and nerfstudio the frames with cameras and points; tum the path of the first camera; spz and glb
-            Gaussians at one time or more, usd and 4dgs over time; html a page that plays the scene.
+            and nerfstudio the frames with cameras and points; tum the path of the first camera; spz, glb and
+            sog Gaussians at one time or more, usd and 4dgs over time; html a page that plays the scene.
         output: For ply NAME.ply for everything at the first recorded time; else a folder for static.ply and,
-            with everything at each recorded time, frames/NNNN.ply; spz and glb likewise. For mcap NAME.mcap,
-            tum NAME.txt, usd NAME.usdc, 4dgs NAME.4dgs, html NAME.html; for the others a folder.
+            with everything at each recorded time, frames/NNNN.ply; spz, glb and sog likewise. For mcap
+            NAME.mcap, tum NAME.txt, usd NAME.usdc, 4dgs NAME.4dgs, html NAME.html; for the others a folder.
         force: Replace what is there already, if dreamdrive wrote it.
     """
     check_there(out, SCENE)

@@ -12,6 +12,7 @@ from dreamdrive.files.kinds import (
     NERFSTUDIO_KIND,
     NUSCENES_KIND,
     PLY_KIND,
+    SOG_KIND,
     SPZ_KIND,
 )
 from dreamdrive.files.output import check_ending, check_free, check_new_file
@@ -164,4 +165,13 @@ FOURDGS = Export(
     ending=".4dgs",
     need="dreamdrive.export.splats.fourdgs:need_fourdgs",
     left_out="dreamdrive.export.splats.fourdgs:left_out_of_4dgs",
+)
+SOG = Export(
+    name="sog",
+    about="Gaussians as SuperSplat's format for the web",
+    scene="dreamdrive.export.splats.sog:scene_to_sog",
+    takes=frozenset({"times"}),
+    ending=".sog",
+    folder=SOG_KIND,
+    left_out="dreamdrive.export.splats.sog:left_out_of_sog",
 )

@@ -23,6 +23,7 @@ EXPORTS: "Table[Export]" = Table(
         "tum": "dreamdrive.export.kinds:TUM",
         "spz": "dreamdrive.export.kinds:SPZ",
         "glb": "dreamdrive.export.kinds:GLB",
+        "sog": "dreamdrive.export.kinds:SOG",
         "usd": "dreamdrive.export.kinds:USD",
         "4dgs": "dreamdrive.export.kinds:FOURDGS",
         "html": "dreamdrive.export.kinds:HTML",

@@ -105,7 +105,7 @@ def test_trimesh_shows_glb_as_points(tmp_path: Path) -> None:
     assert np.abs(cloud.colors[:, :3] - rgb).max() <= 0.51
 
 
-@pytest.mark.parametrize("kind", ["spz", "glb"])
+@pytest.mark.parametrize("kind", ["spz", "glb", "sog"])
 def test_a_folder_holds_all_times(kind: str, tmp_path: Path) -> None:
     scene = make_scene()
     export(scene, kind, tmp_path / "all")

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         scene_to_4dgs as scene_to_4dgs,
     )
     from dreamdrive.export.splats.glb import left_out_of_glb as left_out_of_glb, scene_to_glb as scene_to_glb
+    from dreamdrive.export.splats.sog import left_out_of_sog as left_out_of_sog, scene_to_sog as scene_to_sog
     from dreamdrive.export.splats.spz import left_out_of_spz as left_out_of_spz, scene_to_spz as scene_to_spz
     from dreamdrive.export.splats.usd import left_out_of_usd as left_out_of_usd, scene_to_usd as scene_to_usd
 
