@@ -131,7 +131,7 @@ HTML = Export(
 )
 SPZ = Export(
     name="spz",
-    about="Gaussians in a tenth of the size of PLY",
+    about="Gaussians in a fifth of the size of PLY",
     scene="dreamdrive.export.splats.spz:scene_to_spz",
     takes=frozenset({"times"}),
     ending=".spz",

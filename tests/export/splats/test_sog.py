@@ -61,7 +61,7 @@ def test_many_colours_become_a_palette() -> None:
     true = some(6000, 4)
     archive = zipfile.ZipFile(io.BytesIO(pack_sog(true)))
     about = json.loads(archive.read("meta.json"))["shN"]
-    assert about["count"] == 4096
+    assert about["count"] == 2048
     picture = np.array(Image.open(io.BytesIO(archive.read("shN_labels.webp"))))
     labels = picture.reshape(-1, picture.shape[-1])[:6000].astype(int)
     centroids = np.array(Image.open(io.BytesIO(archive.read("shN_centroids.webp"))))[..., :3]

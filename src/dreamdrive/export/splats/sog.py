@@ -23,7 +23,7 @@ from dreamdrive.scene.scene import Scene
 
 _LEVELS = 256
 _ROUNDS = 20
-_PALETTE = 4096
+_PALETTE = 2048
 """Further colours that are told apart."""
 _IN_A_ROW = 64
 _LARGEST_IS = 252
@@ -42,7 +42,7 @@ def scene_to_sog(
     """Write a scene as SOG: one file for a name ending in ``.sog``, else a folder, see ``write_stills``.
 
     Positions have 16 bits an axis, rotations 26, opacities 8, sizes and colours 256 levels each; further
-    colours are those of 4096 that are nearest.
+    colours are those of 2048 that are nearest.
 
     Raises:
         InputError: The path cannot be written, or the times do not grow.
@@ -142,13 +142,15 @@ def _further(
 
 
 def _palette(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray, "p c"], np.ndarray]:
-    """At most 4096 rows that are near all rows, and which is nearest to each."""
+    """At most 2048 rows that are near all rows, and which is nearest to each."""
     different, labels = np.unique(values, axis=0, return_inverse=True)
     if len(different) <= _PALETTE:
         return different, labels.ravel()
     from sklearn.cluster import MiniBatchKMeans
 
-    found = MiniBatchKMeans(_PALETTE, random_state=0, n_init=1, batch_size=8192, max_iter=5).fit(values)
+    found = MiniBatchKMeans(
+        _PALETTE, init="random", random_state=0, n_init=1, batch_size=8192, max_iter=5
+    ).fit(values)
     return found.cluster_centers_, found.labels_
 
 

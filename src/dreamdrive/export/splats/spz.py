@@ -1,4 +1,4 @@
-"""Gaussians as SPZ, a tenth of the size of PLY."""
+"""Gaussians as SPZ, a fifth of the size of PLY."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,9 +22,9 @@ def scene_to_spz(
 ) -> None:
     """Write a scene as SPZ, with axes x right, y up, z back.
 
-    One file for a name ending in ``.spz``, else a folder, see ``write_stills``. Positions are good to 0.25 mm
-    within 2 km, logarithms of sizes to 1/32, opacities to 1/500, rotations to 0.3 degrees; colours beyond
-    single directions are cut off at 1.
+    One file for a name ending in ``.spz``, else a folder, see ``write_stills``. Positions are good to 0.12 mm
+    within 2 km, logarithms of sizes to 1/32, opacities to 1/500, rotations to 0.3 degrees; colours are
+    cut off at 3.3, their further coefficients at 1.
 
     Raises:
         InputError: The path cannot be written, or the times do not grow.
