@@ -1,6 +1,6 @@
 """A page in Debian's Chromium, without a screen and without a graphics card."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import which
@@ -13,7 +13,7 @@ _LONGEST_MS = 120_000
 
 
 @contextmanager
-def opened(file: Path, fragment: str, size: tuple[int, int]) -> Iterator[Page]:
+def opened(file: Path, fragment: str, size: tuple[int, int]) -> Generator[Page, None, None]:
     """The page of a file, opened from disk; what it asks of the network, and its errors, fail the test."""
     chromium = which("chromium")
     if chromium is None:

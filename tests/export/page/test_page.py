@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -82,7 +83,7 @@ def test_the_address_says_when_and_from_where(finished: Path, tmp_path: Path) ->
     view = _aside(scene.cameras[2], 1.0)
     with opened(tmp_path / "a.html", f"t={t_s}&right=1&plain", (view.width_px, view.height_px)) as page:
         page.wait_for_function("document.getElementById('clock').textContent")
-        shot = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+        shot = np.array(cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR))[..., ::-1]
         assert _psnr(shot, render_scene(scene, view, t_s).picture) > 40
         assert page.text_content("#clock") == f"{t_s:.2f} s"
 
@@ -151,7 +152,7 @@ def _of_degree_3() -> Scene:
 
 
 @pytest.mark.parametrize("make", [make_scene, per_frame_scene, lambda: make_baseline("vibration")])
-def test_at_its_moments_all_is_in_place(make: "type[Scene]") -> None:
+def test_at_its_moments_all_is_in_place(make: Callable[[], Scene]) -> None:
     scene = make()
     for moment, t_s in enumerate(scene.times_s.tolist()):
         still = scene.static_at(t_s), scene.dynamic_at(t_s)

@@ -1,13 +1,14 @@
 """Formats that hold motion, read by programs that are not ours at all moments and between them."""
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from typing import Any, cast
 
 import fourdgs
 import numpy as np
 import pytest
 import torch
-from pxr import Usd, UsdGeom, UsdVol
 
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, export, function
@@ -16,6 +17,7 @@ from dreamdrive.scene.scene import Scene
 from tests.data.splats.some import check_same, up_and_back
 from tests.scene.scenes import make_baseline, make_scene, per_frame_scene
 
+Usd, UsdGeom, UsdVol = (cast(Any, import_module(f"pxr.{name}")) for name in ("Usd", "UsdGeom", "UsdVol"))
 SCENES: list[Callable[[], Scene]] = [make_scene, per_frame_scene, lambda: make_baseline("vibration")]
 _BACK = np.array([1, -1, -1])
 
@@ -25,7 +27,7 @@ def _logits(opacities: np.ndarray) -> np.ndarray:
     return np.log(inside / (1 - inside))
 
 
-def _of_prim(prim: "UsdVol.ParticleField3DGaussianSplat", code: "Usd.TimeCode") -> Gaussians:
+def _of_prim(prim: Any, code: Any) -> Gaussians:
     turns = [[q.GetReal(), *q.GetImaginary()] for q in prim.GetOrientationsAttr().Get(code)]
     means = np.array(prim.GetPositionsAttr().Get(code))
     coefficients = (prim.GetRadianceSphericalHarmonicsDegreeAttr().Get() + 1) ** 2

@@ -69,6 +69,7 @@ def test_pygltflib_and_4dgs_read_glb(tmp_path: Path) -> None:
     gltf = pygltflib.GLTF2().load(str(file))
     assert gltf is not None
     blob = gltf.binary_blob()
+    assert blob is not None
     attributes = gltf.meshes[0].primitives[0].attributes.__dict__
 
     def values(name: str) -> np.ndarray:
@@ -99,7 +100,8 @@ def test_trimesh_shows_glb_as_points(tmp_path: Path) -> None:
 
     true = some()
     (tmp_path / "a.glb").write_bytes(pack_glb(true))
-    cloud = trimesh.load(tmp_path / "a.glb", force="scene").geometry.popitem()[1]
+    read: Any = trimesh.load(tmp_path / "a.glb", force="scene")
+    cloud = read.geometry.popitem()[1]
     assert np.allclose(cloud.vertices, true.means.numpy() * [1, -1, -1], atol=1e-5)
     rgb = np.clip(true.sh[:, 0].numpy() * SH_C0 + 0.5, 0, 1) * 255
     assert np.abs(cloud.colors[:, :3] - rgb).max() <= 0.51

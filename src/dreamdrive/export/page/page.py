@@ -52,7 +52,9 @@ def scene_to_page(
     check_new_file(path, replace)
     moments_s = moments_of(scene, times_s)
     data, about = _packed(scene, moments_s)
-    template, shaders, program = (files(__package__).joinpath(name).read_text("utf-8") for name in _PARTS)
+    template, shaders, program = (
+        files("dreamdrive.export.page").joinpath(name).read_text("utf-8") for name in _PARTS
+    )
     parts = {
         "@NUMBERS@": base64.b64encode(data).decode("ascii"),
         "@SCENE@": json.dumps(about).replace("<", "\\u003c"),

@@ -1,6 +1,7 @@
 """Gaussians over time as OpenUSD: two ParticleField3DGaussianSplat, and the camera of the recorded drive."""
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +25,15 @@ def need_usd() -> None:
     """Raise ``InputError`` where the package is missing, or older than its Gaussians."""
     try:
         from pxr import UsdVol
+    except ImportError:
+        UsdVol = None
+    if not hasattr(UsdVol, "ParticleField3DGaussianSplat"):
+        raise InputError("usd needs usd-core 26.3 or newer: pip install 'dreamdrive[usd]'")
 
-        UsdVol.ParticleField3DGaussianSplat  # noqa: B018
-    except (ImportError, AttributeError):
-        raise InputError("usd needs usd-core 26.3 or newer: pip install 'dreamdrive[usd]'") from None
+
+def _pxr(name: str) -> Any:
+    """A module of OpenUSD, whose types tell less than there is."""
+    return import_module(f"pxr.{name}")
 
 
 def scene_to_usd(
@@ -49,8 +55,7 @@ def scene_to_usd(
     check_ending(path, ".usdc")
     check_new_file(path, replace)
     need_usd()
-    from pxr import Usd, UsdGeom
-
+    Usd, UsdGeom = _pxr("Usd"), _pxr("UsdGeom")
     moments_s = moments_of(scene, times_s)
     with new_file(path) as partial:
         stage: Any = Usd.Stage.CreateNew(str(partial))
@@ -81,8 +86,7 @@ def left_out_of_usd(scene: Scene, path: Path) -> str:
 
 
 def _write(stage: Any, place: str, these: AtMoments, moments_s: Float[np.ndarray, " t"]) -> None:
-    from pxr import Usd, UsdVol, Vt
-
+    Usd, UsdVol, Vt = _pxr("Usd"), _pxr("UsdVol"), _pxr("Vt")
     prim: Any = UsdVol.ParticleField3DGaussianSplat.Define(stage, place)
     prim.CreateRadianceSphericalHarmonicsDegreeAttr(int(these.sh.shape[1] ** 0.5) - 1)
     prim.CreateRadianceSphericalHarmonicsCoefficientsAttr(_vectors(these.sh.reshape(-1, 3)))
@@ -106,9 +110,7 @@ def _write(stage: Any, place: str, these: AtMoments, moments_s: Float[np.ndarray
 
 
 def _vectors(values: Float[np.ndarray, "n 3"]) -> Any:
-    from pxr import Vt
-
-    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, np.float32))
+    return _pxr("Vt").Vec3fArray.FromNumpy(np.ascontiguousarray(values, np.float32))
 
 
 def _share(these: AtMoments, t_s: float) -> Float[np.ndarray, " n"]:
@@ -118,8 +120,7 @@ def _share(these: AtMoments, t_s: float) -> Float[np.ndarray, " n"]:
 
 
 def _write_drive(stage: Any, scene: Scene, start_s: float) -> None:
-    from pxr import Gf, Usd, UsdGeom
-
+    Gf, Usd, UsdGeom = _pxr("Gf"), _pxr("Usd"), _pxr("UsdGeom")
     camera, drive = scene.cameras[int(scene.front[0])], scene.trajectory
     prim: Any = UsdGeom.Camera.Define(stage, "/scene/drive")
     mm = _APERTURE_MM / camera.width_px
