@@ -20,7 +20,8 @@ from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import Gaussians
 from tests.data.splats.some import check_same, colours, covariances, some
 
-Pack, Unpack = Callable[[Gaussians], bytes], Callable[[bytes, str], Splats]
+Pack = Callable[[Gaussians], bytes]
+Unpack = Callable[[bytes, str], Splats]
 _EXACT = {"place_m": 0.0, "size": 1e-4, "opacity": 1e-5, "colour": 1e-5}
 _QUANTISED = {"place_m": 2e-4, "size": 0.09, "opacity": 0.0021, "colour": 0.09}
 FORMATS: dict[str, tuple[Pack, Unpack, bool, dict[str, float]]] = {

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from dreamdrive.data import write_trajectory
-from dreamdrive.data.splats.read_splats import down_from
+from dreamdrive.data.splats.read_splats import Up, down_from
 from dreamdrive.data.splats.splat_scene import read_splat_scene
 from dreamdrive.errors import InputError
 from dreamdrive.export import export
@@ -72,7 +72,7 @@ def test_without_cameras_views_stand_around_and_upright(finished: Path, tmp_path
 
 
 @pytest.mark.parametrize("up", ["x", "-x", "y", "-y", "z", "-z"])
-def test_each_axis_can_point_up(up: str) -> None:
+def test_each_axis_can_point_up(up: Up) -> None:
     axis = np.eye(3)["xyz".index(up[-1])] * (-1 if up.startswith("-") else 1)
     rotation = down_from(up)
     assert np.allclose(rotation @ axis, [0, -1, 0])

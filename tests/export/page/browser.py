@@ -6,7 +6,7 @@ from pathlib import Path
 from shutil import which
 
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 _IN_SOFTWARE = "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"
 _LONGEST_MS = 120_000
@@ -22,7 +22,9 @@ def opened(file: Path, fragment: str, size: tuple[int, int]) -> Generator[Page, 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", *_IN_SOFTWARE])
         width, height = size
-        page = browser.new_page(viewport={"width": width, "height": height}, device_scale_factor=1)
+        viewport: ViewportSize = {"width": width, "height": height}
+        # Waiting is done by eval, which the page forbids itself.
+        page = browser.new_page(viewport=viewport, device_scale_factor=1, bypass_csp=True)
         page.set_default_timeout(_LONGEST_MS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
