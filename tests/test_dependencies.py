@@ -25,6 +25,7 @@ NAMES = {
     "cv2": "opencv-python-headless",
     "foxglove": "foxglove-sdk",
     "ncore": "nvidia-ncore",
+    "pxr": "usd-core",
     "skimage": "scikit-image",
     "sklearn": "scikit-learn",
     "upath": "universal-pathlib",

@@ -38,6 +38,8 @@ WRONG = """
     export none --to ply -o o
     export here --to mcap -o o.txt
     export here --to nuscenes -o here
+    import none.ply -o o
+    import here -o o
     clean none
     evaluate video none here
     evaluate consistency none

@@ -110,17 +110,17 @@ def test_nothing_is_written_where_the_scene_shows_nothing(run: Run, out: Path) -
 def test_export_says_what_is_left_out(run: Run, out: Path, tmp_path: Path) -> None:
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all.ply").out
     assert said == (
-        f"{tmp_path}/all.ply PLY holds one moment of the scene: no sky, no exposure of the recording, no "
-        "motion."
+        f"{tmp_path}/all.ply PLY holds the scene at one time: "
+        "no sky, no exposure of the recording, no motion."
     )
     said = run("export", out, "--to", "ply", "-o", tmp_path / "all").out
     assert said.endswith(
-        f"{tmp_path}/all PLY holds moments of the scene: no sky, no exposure of the recording, no "
+        f"{tmp_path}/all PLY holds the scene at single times: no sky, no exposure of the recording, no "
         "motion in between."
     )
     save_scene(driving(make_scene(dynamic=0, full=False)), tmp_path / "bare")
     said = run("export", tmp_path / "bare", "--to", "ply", "-o", tmp_path / "bare.ply").out
-    assert said == f"{tmp_path}/bare.ply PLY holds one moment of the scene."
+    assert said == f"{tmp_path}/bare.ply PLY holds the scene at one time."
 
 
 def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:

@@ -23,13 +23,19 @@ from dreamdrive.data.photo import read_photo
 from dreamdrive.data.pictures.images import read_image
 from dreamdrive.data.pictures.picture_file import MAX_PIXELS
 from dreamdrive.data.pictures.video import RATES_HZ, Video
+from dreamdrive.data.splats.glb import pack_glb
+from dreamdrive.data.splats.ply import pack_ply
+from dreamdrive.data.splats.read_splats import read_splats
+from dreamdrive.data.splats.spz import pack_spz
 from dreamdrive.geometry.backends.dust3r.network.checkpoint import load_dust3r
 from dreamdrive.geometry.backends.feedforward.load import read_stored
 from dreamdrive.geometry.backends.files.depth import read_depth
 from dreamdrive.models.weights import load_network
 from dreamdrive.prior.vista.kinds import SVD
 from dreamdrive.prior.vista.stored import open_weights
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.tasks.perception import CrossViewTransformer, load_cvt, save_cvt
+from tests.data.splats.some import some
 from tests.data.textures import texture, write_video
 from tests.geometry.backends.dust3r.network.networks import tiny
 from tests.geometry.backends.dust3r.network.test_checkpoint import save_hub, save_pth
@@ -234,4 +240,17 @@ _WEIGHTS = (
     Reader("weights-dust3r-hub", lambda f: save_hub(f, tiny()), load_dust3r),
     Reader("weights-svd", lambda f: save_official(f / "svd.safetensors", SVD), open_weights),
 )
-BINARY: tuple[Reader, ...] = (*_PICTURES, *_VIDEOS, *_ARRAYS, *_WEIGHTS)
+
+
+def _splats(name: str, pack: Callable[[Gaussians], bytes]) -> Reader:
+    def write(folder: Path) -> None:
+        (folder / name).write_bytes(pack(some(5, 4)))
+
+    def read(folder: Path) -> None:
+        assert read_splats(folder / name)[0].problem() is None
+
+    return Reader(f"splats-{name}", write, read)
+
+
+_SPLATS = _splats("a.ply", pack_ply), _splats("a.spz", pack_spz), _splats("a.glb", pack_glb)
+BINARY: tuple[Reader, ...] = (*_PICTURES, *_VIDEOS, *_ARRAYS, *_WEIGHTS, *_SPLATS)

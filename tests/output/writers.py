@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 
 from dreamdrive.datasets.lidar_file import read_points
+from dreamdrive.export import write_ply
 from dreamdrive.export.nuscenes.writer import write_nuscenes
 from dreamdrive.prior.vista.kinds import SVD, VISTA
 from dreamdrive.stored import save_scene
@@ -78,6 +79,13 @@ WRITERS = {
     "export nerfstudio blurred": Writer("export IN/run --to nerfstudio --blur -o OUT", "", _FORCE),
     "export mesh": Writer("export IN/run --to mesh -o OUT", ".glb", _FORCE),
     "export mcap": Writer("export IN/run --to mcap -o OUT", ".mcap", _FORCE),
+    "export spz": Writer("export IN/scene --to spz -o OUT", "", _FORCE),
+    "export glb file": Writer("export IN/scene --to glb -o OUT", ".glb", _FORCE),
+    "export sog": Writer("export IN/scene --to sog -o OUT", ".sog", _FORCE),
+    "export usd": Writer("export IN/scene --to usd -o OUT", ".usdc", _FORCE),
+    "export 4dgs": Writer("export IN/scene --to 4dgs -o OUT", ".4dgs", _FORCE),
+    "export html": Writer("export IN/scene --to html -o OUT", ".html", _FORCE),
+    "import": Writer("import IN/splats.ply -o OUT", "", _FORCE),
     "evaluate video": Writer("evaluate video IN/real IN/real --window 0 --resamples 0 --json OUT", ".json"),
     "evaluate consistency": Writer(
         "evaluate consistency IN/world/frames --trajectory IN/world/poses.json --fps 10 --json OUT", ".json"
@@ -118,6 +126,7 @@ _INPUTS = (
 def make_inputs(folder: Path, run: Callable[[list[str]], Came]) -> None:
     """All that the commands read."""
     save_scene(driving(make_scene()), folder / "scene")
+    write_ply(make_scene().static, folder / "splats.ply")
     logs = [log(folder / "pictures of a log" / name, name) for name in ("scene-0001", "scene-0002")]
     write_nuscenes(logs, folder / "set", read_points)
     save_scene(upright_scene_of(logs[0]), folder / "of-drive")

@@ -9,8 +9,9 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from dreamdrive.scene.camera import NEAR_M
+from dreamdrive.scene.harmonics import sh_basis
 from dreamdrive.splat.arguments import SplatArguments
-from dreamdrive.splat.reference import FAR_M, MIN_ALPHA, rotation_matrices, sh_basis
+from dreamdrive.splat.reference import FAR_M, MIN_ALPHA, rotation_matrices
 from tests.splat.scenes import IMAGES
 
 KINDS = (

@@ -77,10 +77,12 @@ def export(
             ncore the clip with its poses for NuRec, 3dgrut and gsplat; mcap the drive for Foxglove; colmap
             and nerfstudio the frames with cameras and points; tum the path of the first camera; depth and
             flow metres and motion of every pixel as KITTI writes them; mesh road and standing surfaces as
-            triangles.
-        output: For ply NAME.ply for everything at one moment, the first recorded one; else a folder for
-            static.ply and, with everything at each moment, frames/NNNN.ply. For mcap NAME.mcap, for tum
-            NAME.txt, for mesh NAME.ply or NAME.glb; for the others a folder.
+            triangles; spz, glb and sog Gaussians at one time or more, usd and 4dgs over time; html a page
+            that plays the scene.
+        output: For ply NAME.ply for everything at one time, the first recorded one; else a folder for
+            static.ply and, with everything at each time, frames/NNNN.ply; spz, glb and sog likewise. For mcap
+            NAME.mcap, tum NAME.txt, mesh NAME.ply or NAME.glb, usd NAME.usdc, 4dgs NAME.4dgs, html
+            NAME.html; for the others a folder.
         trajectory: Along a new drive in place of the recorded one, rendered: forward, left, right, stop,
             lane-left, lane-right, shift, or a file with a trajectory. For formats with cameras.
         shift_m: How far shift goes to the right in metres; negative is to the left.

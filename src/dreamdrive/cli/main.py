@@ -24,6 +24,7 @@ from dreamdrive.cli.edit import edit
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate
+from dreamdrive.cli.import_splats import import_splats
 from dreamdrive.cli.look import look
 from dreamdrive.cli.plan import plan
 from dreamdrive.cli.prior import prior
@@ -41,6 +42,7 @@ COMMANDS = {
     "edit": edit,
     "plan": plan,
     "export": export,
+    "import": import_splats,
     "clean": clean,
     "evaluate": evaluate,
     "data": data,

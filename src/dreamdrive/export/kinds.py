@@ -9,10 +9,13 @@ from dreamdrive.files.kinds import (
     COLMAP_KIND,
     DEPTH_KIND,
     FLOW_KIND,
+    GLB_KIND,
     NCORE_KIND,
     NERFSTUDIO_KIND,
     NUSCENES_KIND,
     PLY_KIND,
+    SOG_KIND,
+    SPZ_KIND,
 )
 from dreamdrive.files.output import check_ending, check_free, check_new_file
 from dreamdrive.registry import loaded
@@ -73,10 +76,10 @@ PLY = Export(
     name="ply",
     about="what viewers of 3D Gaussians read",
     scene="dreamdrive.export.ply:export_ply",
+    takes=frozenset({"times"}),
     ending=".ply",
     folder=PLY_KIND,
     left_out="dreamdrive.export.ply:left_out_of_ply",
-    takes=frozenset({"times"}),
 )
 NUSCENES = Export(
     name="nuscenes",
@@ -148,4 +151,58 @@ MESH = Export(
     ending=(".ply", ".glb"),
     need="dreamdrive.export.surfaces.mesh:need_scikit_image",
     left_out="dreamdrive.export.surfaces.mesh:left_out_of_mesh",
+)
+HTML = Export(
+    name="html",
+    about="one page that plays the scene in a browser",
+    scene="dreamdrive.export.page.page:scene_to_page",
+    takes=frozenset({"times"}),
+    ending=".html",
+    left_out="dreamdrive.export.page.page:left_out_of_page",
+)
+SPZ = Export(
+    name="spz",
+    about="Gaussians in a fifth of the size of PLY",
+    scene="dreamdrive.export.splats.spz:scene_to_spz",
+    takes=frozenset({"times"}),
+    ending=".spz",
+    folder=SPZ_KIND,
+    need="dreamdrive.data.splats.spz:need_zstandard",
+    left_out="dreamdrive.export.splats.spz:left_out_of_spz",
+)
+GLB = Export(
+    name="glb",
+    about="Gaussians as glTF, the standard of Khronos",
+    scene="dreamdrive.export.splats.glb:scene_to_glb",
+    takes=frozenset({"times"}),
+    ending=".glb",
+    folder=GLB_KIND,
+    left_out="dreamdrive.export.splats.glb:left_out_of_glb",
+)
+USD = Export(
+    name="usd",
+    about="Gaussians over time as OpenUSD, with the recorded camera",
+    scene="dreamdrive.export.splats.usd:scene_to_usd",
+    takes=frozenset({"times"}),
+    ending=".usdc",
+    need="dreamdrive.export.splats.usd:need_usd",
+    left_out="dreamdrive.export.splats.usd:left_out_of_usd",
+)
+FOURDGS = Export(
+    name="4dgs",
+    about="Gaussians over time in the open format of that name",
+    scene="dreamdrive.export.splats.fourdgs:scene_to_4dgs",
+    takes=frozenset({"times"}),
+    ending=".4dgs",
+    need="dreamdrive.export.splats.fourdgs:need_fourdgs",
+    left_out="dreamdrive.export.splats.fourdgs:left_out_of_4dgs",
+)
+SOG = Export(
+    name="sog",
+    about="Gaussians as SuperSplat's format for the web",
+    scene="dreamdrive.export.splats.sog:scene_to_sog",
+    takes=frozenset({"times"}),
+    ending=".sog",
+    folder=SOG_KIND,
+    left_out="dreamdrive.export.splats.sog:left_out_of_sog",
 )

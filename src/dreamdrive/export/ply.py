@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import torch
-
-from dreamdrive.errors import InputError
+from dreamdrive.data.splats.ply import pack_ply
+from dreamdrive.export.stills import Still, left_out_of_stills, write_stills
 from dreamdrive.files.kinds import PLY_KIND
-from dreamdrive.files.output import check_free, check_new_file, new_file, new_folder
+from dreamdrive.files.output import new_file
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
@@ -20,7 +19,7 @@ def write_ply(gaussians: Gaussians, path: Path) -> None:
     scale_0..2 (log), rot_0..3 (wxyz, unit). Axes stay: x right, y down, z forward. Life spans, actors,
     features and source frames have no field and are left out; use ``Scene.at`` first for a scene at a time.
     """
-    data = _encode(gaussians)
+    data = pack_ply(gaussians)
     with new_file(path) as partial:
         partial.write_bytes(data)
 
@@ -33,70 +32,18 @@ def export_ply(
     replace: bool = False,
     progress: Progress = silent,
 ) -> None:
-    """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder.
+    """Write a scene as PLY: one file for a name ending in ``.ply``, else a folder, see ``write_stills``.
 
-    The single file holds everything as it is at one moment, the first recorded time where no other is given.
-    The folder holds ``static.ply`` (what never moves) and ``frames/NNNN.ply``, everything as it is at each
-    moment, without others at each recorded time: a numbered sequence that viewers play. PLY has no place for
-    sky and exposure. One Gaussian takes 68 bytes, with spherical harmonics of degree 1 104. What is there
-    already is replaced only if that is asked for.
+    The sequence ``frames/NNNN.ply`` is what viewers play. PLY has no place for sky and exposure. One Gaussian
+    takes 68 bytes, with spherical harmonics of degree 1 104. What is there already is replaced only if that
+    is asked for.
     """
-    check_ply(path, replace)
-    moments_s = list(map(float, scene.times_s if times_s is None else times_s))
-    if path.suffix.lower() == ".ply":
-        if times_s is not None and len(moments_s) != 1:
-            raise InputError(
-                f"{path} holds one moment, and {len(moments_s)} are asked for; give one, or a folder for all"
-            )
-        write_ply(scene.at(moments_s[0]), path)
-        return
-    with new_folder(path, replace=replace, kind=PLY_KIND) as folder:
-        (folder / "static.ply").write_bytes(_encode(scene.static_at(moments_s[0])))
-        (folder / "frames").mkdir()
-        for i, t_s in enumerate(moments_s):
-            (folder / "frames" / f"{i:04d}.ply").write_bytes(_encode(scene.at(t_s)))
-            progress(i + 1, len(moments_s))
-
-
-def check_ply(path: Path, replace: bool) -> None:
-    """Fail before the work where ``export_ply``, of the same arguments, would fail after it."""
-    if path.suffix.lower() == ".ply":
-        check_new_file(path, replace)
-    else:
-        check_free(path, replace, PLY_KIND)
+    write_stills(scene, path, _PLY, times_s=times_s, replace=replace, progress=progress)
 
 
 def left_out_of_ply(scene: Scene, path: Path) -> str:
     """What of a scene ``export_ply`` finds no place for, in a sentence."""
-    alone = path.suffix.lower() == ".ply"
-    shown = "one moment of the scene" if alone else "moments of the scene"
-    parts = {
-        "sky": scene.sky is not None,
-        "exposure of the recording": scene.exposure is not None,
-        "motion" if alone else "motion in between": scene.moves_per_frame or len(scene.dynamic) > 0,
-    }
-    missing = ", ".join(f"no {part}" for part, there in parts.items() if there)
-    return f"PLY holds {shown}{': ' if missing else ''}{missing}."
+    return left_out_of_stills(scene, path, _PLY)
 
 
-def _fields(coefficients: int) -> list[str]:
-    names = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
-    names += [f"f_rest_{i}" for i in range(3 * (coefficients - 1))]
-    return [*names, "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
-
-
-def _encode(gaussians: Gaussians) -> bytes:
-    count, coefficients = gaussians.sh.shape[:2]
-    properties = "".join(f"property float {name}\n" for name in _fields(coefficients))
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n"
-    columns = [
-        gaussians.means,
-        torch.zeros_like(gaussians.means),
-        gaussians.sh[:, 0],
-        gaussians.sh[:, 1:].transpose(1, 2).reshape(count, 3 * (coefficients - 1)),
-        gaussians.logit_opacities[:, None],
-        gaussians.log_scales,
-        torch.nn.functional.normalize(gaussians.quaternions, dim=-1),
-    ]
-    table = torch.cat([c.detach().cpu().float() for c in columns], dim=1).numpy()
-    return header.encode("ascii") + table.astype("<f4").tobytes()
+_PLY = Still("PLY", ".ply", PLY_KIND, pack_ply)

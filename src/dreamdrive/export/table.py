@@ -24,6 +24,12 @@ EXPORTS: "Table[Export]" = Table(
         "depth": "dreamdrive.export.kinds:DEPTH",
         "flow": "dreamdrive.export.kinds:FLOW",
         "mesh": "dreamdrive.export.kinds:MESH",
+        "spz": "dreamdrive.export.kinds:SPZ",
+        "glb": "dreamdrive.export.kinds:GLB",
+        "sog": "dreamdrive.export.kinds:SOG",
+        "usd": "dreamdrive.export.kinds:USD",
+        "4dgs": "dreamdrive.export.kinds:FOURDGS",
+        "html": "dreamdrive.export.kinds:HTML",
     },
 )
 """From a scene to a file or a folder that other programs read."""

@@ -30,6 +30,7 @@ WANTED = {
     "options": "a TOML file, see docs/options.md",
     "edits": "edits.json of a scene that dreamdrive edit wrote",
     "layout": "a layout, see docs/layout.md",
+    "cameras": "a file with poses and times, or the folder of a COLMAP model",
 }
 """What the files of flags are expected to be, by their names without dashes."""
 

@@ -21,13 +21,13 @@ class Exposure:
 
     def __post_init__(self) -> None:
         cameras = [0] if self.camera is None else np.unique(self.camera).tolist()
-        times = [self._of(camera)[1] for camera in cameras]
+        times = [self.of(camera)[1] for camera in cameras]
         if len(self.times_s) == 0 or any((np.diff(each) <= 0).any() for each in times):
             raise ValueError("exposure: expected at least one frame and strictly increasing times")
 
     def at(self, t_s: float, camera: int = 0) -> Float[Tensor, "3 4"]:
         """The transform at a time: linear between the neighbouring trained frames, constant outside."""
-        transforms, times_s = self._of(camera)
+        transforms, times_s = self.of(camera)
         after = int(np.searchsorted(times_s, t_s, side="right"))
         if after == 0 or after == len(times_s):
             return transforms[min(after, len(times_s) - 1)]
@@ -39,7 +39,8 @@ class Exposure:
         """An image of the scene as a camera of the rig would have recorded it at ``t_s``; not clipped."""
         return transform_colour(image, self.at(t_s, camera))
 
-    def _of(self, camera: int) -> tuple[Float[Tensor, "k 3 4"], Float[np.ndarray, " k"]]:
+    def of(self, camera: int) -> tuple[Float[Tensor, "k 3 4"], Float[np.ndarray, " k"]]:
+        """The transforms of a camera of the rig, and their times."""
         if self.camera is None:
             return self.transforms, self.times_s
         own = np.flatnonzero(self.camera == camera)
