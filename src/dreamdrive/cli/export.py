@@ -10,10 +10,8 @@ from tyro.conf import Positional, arg
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.cli.terminal.arguments import ExportName
 from dreamdrive.cli.terminal.progress import Bars
-from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, Export, function
 from dreamdrive.files.given import SCENE, check_there
-from dreamdrive.files.paths import inside
 
 if TYPE_CHECKING:
     from dreamdrive.scene.clip import Clip
@@ -52,6 +50,7 @@ def export(
 def _written(chosen: Export, to: str, out: Path, output: Path, force: bool) -> list[str]:
     """Write it, and say what it holds."""
     from dreamdrive.data.truth_folder import is_world, read_drives
+    from dreamdrive.run import stages_of
 
     pictures = "clip" in chosen.takes
     with Bars(Console()) as bars:
@@ -60,18 +59,13 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool) -> l
             named = {"name": out.resolve().name} if "name" in chosen.takes else {}
             function(chosen.world)(read_drives(out), output, **named, **how)
             return [_OF_WORLD] if pictures else []
-        scene, stages = open_scene(out), _stages(out)
+        scene, stages = open_scene(out), stages_of(out)
         clip, geometry = _kept(stages, scene) if pictures else (None, None)
         kept: dict[str, object] = {"clip": clip, "geometry": geometry}
         how |= {name: kept[name] for name in chosen.takes & set(kept)}
         function(chosen.scene)(scene, output, **how)
     said = [] if chosen.left_out is None else [function(chosen.left_out)(scene, output)]
     return [*said, _of_pictures(clip, stages)] if pictures else said
-
-
-def _stages(out: Path) -> Path:
-    """Where the run of a scene keeps its results."""
-    return (out.parent if (out / "scene.json").is_file() else out) / "stages"
 
 
 def _of_pictures(clip: "Clip | None", stages: Path) -> str:
@@ -83,32 +77,7 @@ def _of_pictures(clip: "Clip | None", stages: Path) -> str:
 
 def _kept(stages: Path, scene: "Scene") -> "tuple[Clip | None, Geometry | None]":
     """What the run kept of clip and geometry; ``InputError`` where they are not those of the scene."""
-    import numpy as np
+    from dreamdrive.run import kept_clip, kept_geometry
 
-    from dreamdrive.run import codec
-    from dreamdrive.scene.clip import Clip
-    from dreamdrive.scene.geometry import Geometry
-    from dreamdrive.stored import check
-
-    prior, geometry = inside(stages, "prior"), inside(stages, "geometry")
-    if not (prior / codec.JSON_NAME).is_file():
-        return None, None
-    try:
-        clip = codec.read(prior, Clip)
-        check.clip(clip)
-        check.scene(clip, scene)
-        if scene.provenance.source_index not in (None, tuple(clip.source_index.tolist())):
-            raise ValueError("its frames are others")
-        if not (geometry / codec.JSON_NAME).is_file():
-            return clip, None
-        found = codec.read(geometry, Geometry)
-        check.geometry(clip, found)
-        pairs = zip(found.cameras, scene.cameras, strict=True)
-        if not all(np.allclose(a.world_from_camera, b.world_from_camera) for a, b in pairs):
-            raise ValueError("its cameras are elsewhere")
-    except ValueError as error:
-        raise InputError(
-            f"{stages} does not belong to the scene ({error}); run generate again, or let dreamdrive clean "
-            "remove it: pictures are then rendered from the scene"
-        ) from error
-    return clip, found
+    clip = kept_clip(stages, scene)
+    return clip, None if clip is None else kept_geometry(stages, scene, clip)
