@@ -84,12 +84,20 @@ def drive_along(scene: Scene, points_m: Sequence[Float[np.ndarray, "3"]], second
     times_s = first_s + seconds * at_m / at_m[-1]
     ahead = np.gradient(places, at_m, axis=0)
     poses = np.tile(np.eye(4), (len(places), 1, 1))
-    poses[:, :3, :3] = _facing(ahead, up) @ _tilt(scene)
+    poses[:, :3, :3] = _facing(_level(ahead, scene), up) @ _tilt(scene)
     poses[:, :3, 3] = places
     rate = max(
         HZ, 1 / float(np.median(np.diff(smooth(scene.trajectory).times_s))) if len(scene.front) > 1 else 0
     )
     return resampled(Trajectory(poses, times_s), rate)
+
+
+def _level(ahead: Float[np.ndarray, "n 3"], scene: Scene) -> Float[np.ndarray, "n 3"]:
+    """Directions along the ground; where a path turns back or goes straight up, that of the recording."""
+    up, recorded = scene.up, scene.trajectory.world_from_camera[0][:3, 2]
+    level = ahead - (ahead @ up)[:, None] * up
+    along = np.linalg.norm(level, axis=1, keepdims=True)
+    return np.where(along > 1e-3, level, recorded - (recorded @ up) * up)
 
 
 def _facing(ahead: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 3 3"]:

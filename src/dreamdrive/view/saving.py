@@ -10,7 +10,7 @@ from dreamdrive.drive import Drive
 from dreamdrive.edit import Edit, Edits, digest_of_scene, write_edited
 from dreamdrive.errors import InputError
 from dreamdrive.files.kinds import EDITED_KIND
-from dreamdrive.files.output import check_free, check_new_file, check_place
+from dreamdrive.files.output import check_free, check_new_file, check_place, check_writable
 from dreamdrive.files.paths import inside
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.trajectory import Trajectory
@@ -50,7 +50,7 @@ class Desk:
     def save_path(self, path: Trajectory, name: str, replace: bool) -> Path:
         """Write a drive as ``render --trajectory`` reads it, and say where."""
         place = self.place(name, ".json")
-        check_place(place, None)
+        check_writable(place.parent)
         check_new_file(place, replace)
         write_trajectory(path, place)
         return place
@@ -71,7 +71,7 @@ class Desk:
             InputError: It cannot be written, or another one is being rendered.
         """
         place = self.place(name, ".mp4")
-        check_place(place, None)
+        check_writable(place.parent)
         check_new_file(place, replace)
         if not self._one.acquire(blocking=False):
             raise InputError(_BUSY)

@@ -130,7 +130,8 @@ class Session:
         ahead = actor.ahead(scene.up)
         if ahead is None:
             raise InputError(f"nothing tells where {actor.name} points: it has no box and hardly moves")
-        ahead_m, left_m = float(by_m @ ahead), float(by_m @ np.cross(scene.up, ahead))
+        ways = np.stack([ahead, np.cross(scene.up, ahead)], axis=1)
+        ahead_m, left_m = np.linalg.lstsq(ways, by_m, rcond=None)[0].tolist()
         if not done:
             self._preview = scene.moved(self.chosen, ahead_m, left_m)
         elif math.hypot(ahead_m, left_m) > 0.01:
