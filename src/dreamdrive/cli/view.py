@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dreamdrive.view import RunWatch, Viewer
 
 _COLUMNS = ("scene", "frames", "MB", "actors", "made")
-_PORTS = (1, 65535)
+_PORTS = (0, 65535)
 _LOOK_S = 1.0
 _INTERRUPTED, _TERMINATED = 130, 143
 
@@ -38,7 +38,7 @@ def view(
 
     Args:
         out: The folder that generate wrote.
-        port: Of the page, at http://localhost:PORT.
+        port: Of the page, at http://localhost:PORT; 0 is any that is free.
         host: Where the page can be reached from: localhost is this machine alone; with any other address the
             page needs the token that is printed with it.
         during: The folder is one that generate is still working on, or is about to: show what there is.

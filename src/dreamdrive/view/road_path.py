@@ -19,7 +19,7 @@ APART_M = 0.3
 """Points that are nearer to one another count as one."""
 HZ = 20.0
 """Poses a second; that of ``drive.smooth`` where the recording gives more."""
-_STEP_M = 0.25
+_STEP_M, _LEAST_M = 0.25, 1e-4
 _PROBE_PX, _PROBE_FOCAL_PX, _PICKED_ALPHA = 3, 2000.0, 0.5
 
 
@@ -64,7 +64,9 @@ def spline(points_m: Sequence[Float[np.ndarray, "3"]]) -> Float[np.ndarray, "n 3
     points = np.stack(kept)
     at_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     along = np.linspace(0, at_m[-1], int(np.ceil(at_m[-1] / _STEP_M)) + 1)
-    return np.stack([PchipInterpolator(at_m, axis)(along) for axis in points.T], axis=1)
+    road = np.stack([PchipInterpolator(at_m, axis)(along) for axis in points.T], axis=1)
+    goes_on = np.linalg.norm(np.diff(road, axis=0), axis=1) > _LEAST_M  # not where a path turns back
+    return road[np.concatenate([[True], goes_on])]
 
 
 def drive_along(scene: Scene, points_m: Sequence[Float[np.ndarray, "3"]], seconds: float) -> Trajectory:
@@ -82,7 +84,7 @@ def drive_along(scene: Scene, points_m: Sequence[Float[np.ndarray, "3"]], second
     at_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
     first_s = float(scene.times_s[scene.front[0]])
     times_s = first_s + seconds * at_m / at_m[-1]
-    ahead = np.gradient(places, at_m, axis=0)
+    ahead = np.gradient(places, axis=0)
     poses = np.tile(np.eye(4), (len(places), 1, 1))
     poses[:, :3, :3] = _facing(_level(ahead, scene), up) @ _tilt(scene)
     poses[:, :3, 3] = places
