@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from viser import TransformControlsEvent, TransformControlsHandle
+from viser import Icon, TransformControlsEvent, TransformControlsHandle
 
 from dreamdrive.edit import Copy, Delay, Edit, Recolour, Remove, Speed, Turn
 from dreamdrive.errors import InputError
@@ -22,7 +22,7 @@ class ActorPanel:
         self._tools, gui = tools, tools.client.gui
         self._handle: TransformControlsHandle | None = None
         why = tools.session.why_no_actors
-        with gui.add_folder("Actors", expand_by_default=why is None):
+        with gui.add_folder("Actors"):
             if why is not None:
                 gui.add_markdown(why)
                 return
@@ -31,10 +31,10 @@ class ActorPanel:
             self._chosen = gui.add_folder(None, visible=False)
             with self._chosen:
                 self._build_edits()
-            self._undo = gui.add_button("Undo", icon="arrow-back-up", disabled=True)
+            self._undo = gui.add_button("Undo", icon=Icon.ARROW_BACK_UP, disabled=True)
             self._name = gui.add_text("Name", f"{tools.shared.name}-edited")
             self._save = gui.add_button(
-                "Save as", icon="device-floppy", hint=f"In {tools.shared.desk.folder}"
+                "Save as", icon=Icon.DEVICE_FLOPPY, hint=f"In {tools.shared.desk.folder}"
             )
             gui.add_markdown(f"In `{tools.shared.desk.folder}`. {_FILLED}")
         doing = tools.talk.doing

@@ -18,7 +18,7 @@ DRIVE, VIEW, TRACK, CHOSEN = (70, 150, 255), (120, 180, 255), (255, 190, 60), (2
 MOST_VIEWS = 40
 _SMALL_M = 1.5
 _SLACK_S = 1e-3
-_LINE_M, _RIBBON_M, _VIEW_M = 0.04, 0.25, 0.35
+_LINE_M, _RIBBON_M, _VIEW_M = 0.04, 0.25, 0.2
 
 
 class Lines:
@@ -87,15 +87,15 @@ class Lines:
                     handle.position, handle.wxyz = _placed(actor, t_s, self._up)
 
     def show(self, shown: bool) -> None:
-        """Show them, or hide all."""
+        """Show actors, or hide them."""
         self._shown = shown
         for handle in self._tracks:
             handle.visible = shown
 
     def show_views(self, shown: bool) -> None:
-        """Show the recorded views: they are in the way of who looks out of one of them."""
+        """Show the recorded views and the drive, or hide them."""
         for handle in self._views:
-            handle.visible = shown and self._shown
+            handle.visible = shown
 
 
 def wxyz(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:

@@ -27,6 +27,8 @@ REST_S = 0.25
 """How long the camera has to rest until a large picture is drawn."""
 MOST_HZ = 25.0
 """Pictures a second while the time runs."""
+ECHO_S = 1.0
+"""How long browsers may take to tell where they were made to look from."""
 _MOVING_QUALITY, _RESTING_QUALITY, _BESIDE_PX = 75, 88, 420
 _SAME_M, _SAME = 0.02, 1e-3
 _LOOK_M = 10.0
@@ -46,7 +48,7 @@ class Page:
     _looking: Looking = field(init=False)
     _pace: Pace = field(default_factory=Pace, init=False)
     _placed: deque[tuple[np.ndarray, np.ndarray]] = field(init=False)
-    _settled: bool = field(default=False, init=False)
+    _placed_s: float = field(default_factory=time.monotonic, init=False)
     _window: tuple[int, int] = field(default=(0, 0), init=False)
     _beside: int = field(default=-1, init=False)
     _open: bool = field(default=True, init=False)
@@ -58,6 +60,7 @@ class Page:
         self.recorded = Recorded(self.shared.kept, scene)
         with self.talk.lock, self.client.atomic():
             self.client.scene.set_up_direction(tuple(scene.up.tolist()))
+            self.client.camera.up_direction = scene.up
             self.client.camera.fov = vertical_fov_rad(scene.cameras[0])
             self.lines = Lines(self.client, scene, self.pick, self.jump)
             self.tools = Tools(self.client, self.shared, self.session, self.talk, self.lines, self.refresh)
@@ -109,17 +112,19 @@ class Page:
         with self.talk.lock:
             window = (int(camera.image_width), int(camera.image_height))
             resized, self._window = window != self._window, window
-            echo = self._is_echo(camera)
-            self._settled |= echo
-            if not echo and self._settled and self.session.drive != FREE:
-                self.session.drive = FREE
+            by_hand = self._is_by_hand(camera)
+            if by_hand and self.session.drive != FREE:
+                self.session.follow(FREE)
                 self.time_panel.tell()
-            if resized or (not echo and self.session.drive == FREE):
+            if resized or by_hand:
                 self.refresh()
 
-    def _is_echo(self, camera: CameraHandle) -> bool:
+    def _is_by_hand(self, camera: CameraHandle) -> bool:
+        """Whether the mouse has moved it, and not the drive: that is told late, and in between its steps."""
+        if self.session.drive != FREE and time.monotonic() - self._placed_s < ECHO_S:
+            return False
         place, ahead = camera.position, _ahead(camera)
-        return any(
+        return not any(
             np.allclose(place, there, atol=_SAME_M) and np.allclose(ahead, way, atol=_SAME)
             for there, way in self._placed
         )
@@ -129,10 +134,11 @@ class Page:
         camera, here = self.client.camera, pose[:3, 3]
         if self._placed and all(map(np.allclose, self._placed[-1], (here, pose[:3, 2]))):
             return
+        first, self._placed_s = not self._placed, time.monotonic()
         self._placed.append((here.copy(), pose[:3, 2].copy()))
-        camera.up_direction = self.shared.scene.up
         camera.position = here
-        camera.look_at = here + _LOOK_M * pose[:3, 2]
+        if first:  # the mouse turns the camera about this place
+            camera.look_at = here + _LOOK_M * pose[:3, 2]
         camera.wxyz = wxyz(pose[:3, :3])
 
     def _pose(self) -> Float[np.ndarray, "4 4"]:
@@ -211,7 +217,7 @@ class Page:
                 self._place(pose)
             self.client.scene.set_background_image(picture, format="jpeg", jpeg_quality=quality)
             self.lines.at(t_s)
-            self.lines.show_views(self.session.drive == FREE)
+            self.lines.show_views(self.time_panel.shows_views)
             self.time_panel.at(t_s, frame)
 
 

@@ -1,10 +1,11 @@
 """The panel of paths: points on the road, the spline through them, its file and its video."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from viser import SceneClickEvent, SceneNodeHandle, TransformControlsEvent
+from viser import Icon, SceneClickEvent, SceneNodeHandle, TransformControlsEvent
 
 from dreamdrive.errors import InputError
 from dreamdrive.scene.trajectory import Trajectory
@@ -27,7 +28,7 @@ class PathPanel:
         self._tools, self._time, gui = tools, time_panel, tools.client.gui
         self._nodes: list[SceneNodeHandle] = []
         drifts = tools.session.opened.moves_per_frame
-        with gui.add_folder("Path", expand_by_default=not drifts):
+        with gui.add_folder("Path"):
             if drifts:
                 gui.add_markdown(DRIFTS)
             else:
@@ -52,8 +53,8 @@ class PathPanel:
         self._name = gui.add_text("Name", f"{shared.name}-path")
         self._show = gui.add_dropdown("Shows", _SHOWS)
         gui.add_markdown(f"The drive of the camera, as `NAME.json` or `NAME.mp4` in `{shared.desk.folder}`.")
-        save = gui.add_button("Save path", icon="device-floppy")
-        self._render = gui.add_button("Render video", icon="movie")
+        save = gui.add_button("Save path", icon=Icon.DEVICE_FLOPPY)
+        self._render = gui.add_button("Render video", icon=Icon.MOVIE)
         self._bar = gui.add_progress_bar(0.0, visible=False)
         self._cancel = gui.add_button("Cancel", visible=False, color="red")
         save.on_click(talk.unlocked(self._save))
@@ -118,7 +119,7 @@ class PathPanel:
         line = self._tools.client.scene.add_line_segments("/path-line", points, _COLOUR, thickness=_LINE_M)
         self._nodes.append(line)
 
-    def _mover(self, number: int) -> Callable[[TransformControlsEvent], object]:
+    def _mover(self, number: int) -> Callable[[TransformControlsEvent], Coroutine[Any, Any, None]]:
         async def moved(event: TransformControlsEvent) -> None:  # in the order of the hand's moves
             def move() -> None:
                 self._tools.session.points_m[number] = np.asarray(event.target.position, np.float64)

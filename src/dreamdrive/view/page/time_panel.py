@@ -1,6 +1,7 @@
 """The panel of what is shown when: time, drive, layer, the recorded frame, lines."""
 
 import numpy as np
+from viser import Icon
 
 from dreamdrive.show import Image
 from dreamdrive.view.clock import SPEEDS
@@ -24,14 +25,17 @@ class TimePanel:
         span_s = max(clock.last_s - clock.first_s, _STEP_S)
         with gui.add_folder("Time"):
             self._slider = gui.add_slider("Seconds", 0.0, round(span_s, 2), _STEP_S, 0.0)
-            self._play = gui.add_button("Play", icon="player-play")
+            self._play = gui.add_button("Play", icon=Icon.PLAYER_PLAY)
             self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1")
             self._drive = gui.add_dropdown("Camera", self._drives(), initial_value=tools.session.drive)
         with gui.add_folder("Shown"):
             layers = layers_of(tools.shared.scene, tools.shared.kept)
             self._layer = gui.add_dropdown("Layer", layers, initial_value=tools.session.layer)
-            self._lines = gui.add_checkbox("Actors and views", True)
-            places = (_AWAY, BESIDE, OVER)
+            self._lines = gui.add_checkbox("Actors", True, visible=bool(tools.session.actors))
+            self._views = gui.add_checkbox(
+                "Recorded views", False, hint="Of a free camera; click one to go there"
+            )
+            places: tuple[str, ...] = (_AWAY, BESIDE, OVER)
             self._where = gui.add_dropdown("Recorded frame", places, initial_value=_AWAY, visible=has_frames)
             blank = np.zeros((2, 2, 3), np.uint8)
             self._frame = gui.add_image(blank, format="jpeg", visible=False)
@@ -44,6 +48,7 @@ class TimePanel:
         self._drive.on_update(doing(self._follow))
         self._layer.on_update(doing(self._show))
         self._lines.on_update(doing(self._with_lines))
+        self._views.on_update(doing(tools.refresh))
         self._where.on_update(doing(self._put_frame))
 
     def _drives(self) -> tuple[str, ...]:
@@ -69,7 +74,7 @@ class TimePanel:
         self._where.value = self.beside or _AWAY
         self._frame.visible = self.beside == BESIDE
         self._play.label, self._play.icon = (
-            ("Pause", "player-pause") if clock.playing else ("Play", "player-play")
+            ("Pause", Icon.PLAYER_PAUSE) if clock.playing else ("Play", Icon.PLAYER_PLAY)
         )
 
     def _to(self) -> None:
@@ -115,6 +120,6 @@ class TimePanel:
         self._tools.refresh()
 
     @property
-    def is_free(self) -> bool:
-        """Whether the mouse moves the camera."""
-        return self._tools.session.drive == FREE
+    def shows_views(self) -> bool:
+        """Whether the recorded views are shown: they are in the way of who looks out of one of them."""
+        return self._views.value and self._tools.session.drive == FREE
