@@ -123,7 +123,7 @@ def test_an_actor_is_picked_moved_and_saved(opened: Open) -> None:
     page.get_by_role("option", name=re.compile(rf"^{actor.id}:")).click()
     expect(page.get_by_text("Drag it by its arrows")).to_be_visible(timeout=WAIT_MS)
     page.get_by_role("button", name="Turn", exact=True).click()
-    expect(page.get_by_text("1 changes are not saved")).to_be_visible(timeout=WAIT_MS)
+    expect(page.get_by_text("Changes made here: 1.")).to_be_visible(timeout=WAIT_MS)
     shoot(page, "turned")
     page.get_by_role("button", name="Save as").click()
     until((opened.folder / "out-edited" / EDITS).is_file, "it is saved")

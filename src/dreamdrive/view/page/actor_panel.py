@@ -90,7 +90,7 @@ class ActorPanel:
 
     def _told(self) -> str:
         session = self._tools.session
-        changes = f"{len(session.edits)} changes are not saved." if session.edits else ""
+        changes = f"Changes made here: {len(session.edits)}." if session.edits else ""
         if session.chosen is None:
             return f"Click a box or a track in the picture. {changes}"
         actor = session.scene.actor(session.chosen)

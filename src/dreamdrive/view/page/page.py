@@ -1,7 +1,6 @@
 """One browser: its camera, its pictures, and the panels beside them."""
 
 import time
-from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -27,8 +26,6 @@ REST_S = 0.25
 """How long the camera has to rest until a large picture is drawn."""
 MOST_HZ = 25.0
 """Pictures a second while the time runs."""
-ECHO_S = 1.0
-"""How long browsers may take to tell where they were made to look from."""
 _MOVING_QUALITY, _RESTING_QUALITY, _BESIDE_PX = 75, 88, 420
 _SAME_M, _SAME = 0.02, 1e-3
 _LOOK_M = 10.0
@@ -47,14 +44,14 @@ class Page:
     lines: Lines = field(init=False)
     _looking: Looking = field(init=False)
     _pace: Pace = field(default_factory=Pace, init=False)
-    _placed: deque[tuple[np.ndarray, np.ndarray]] = field(init=False)
-    _placed_s: float = field(default_factory=time.monotonic, init=False)
+    _placed: tuple[np.ndarray, np.ndarray] | None = field(default=None, init=False)
+    _confirmed: bool = field(default=False, init=False)
     _window: tuple[int, int] = field(default=(0, 0), init=False)
     _beside: int = field(default=-1, init=False)
     _open: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
-        scene, self._placed = self.shared.scene, deque(maxlen=60)
+        scene = self.shared.scene
         self.talk, self.session = Talk(self.client), Session(scene)
         self._looking = Looking(self.shared.kept)
         self.recorded = Recorded(self.shared.kept, scene)
@@ -120,24 +117,31 @@ class Page:
                 self.refresh()
 
     def _is_by_hand(self, camera: CameraHandle) -> bool:
-        """Whether the mouse has moved it, and not the drive: that is told late, and in between its steps."""
-        if self.session.drive != FREE and time.monotonic() - self._placed_s < ECHO_S:
+        """Whether the mouse has moved it, and not the drive.
+
+        A browser tells late where a drive has put its camera, and in between its steps: only after it has
+        told of the last step is another place one of the mouse's.
+        """
+        if self.session.drive == FREE:
+            return True
+        if self._placed is None:
             return False
-        place, ahead = camera.position, _ahead(camera)
-        return not any(
-            np.allclose(place, there, atol=_SAME_M) and np.allclose(ahead, way, atol=_SAME)
-            for there, way in self._placed
+        place, ahead = self._placed
+        there = np.allclose(camera.position, place, atol=_SAME_M) and np.allclose(
+            _ahead(camera), ahead, atol=_SAME
         )
+        by_hand, self._confirmed = self._confirmed and not there, self._confirmed or there
+        return by_hand
 
     def _place(self, pose: Float[np.ndarray, "4 4"]) -> None:
         """Put the browser's camera at a pose."""
         camera, here = self.client.camera, pose[:3, 3]
-        if self._placed and all(map(np.allclose, self._placed[-1], (here, pose[:3, 2]))):
+        before, self._placed = self._placed, (here.copy(), pose[:3, 2].copy())
+        if before is not None and all(map(np.allclose, before, self._placed)):
             return
-        first, self._placed_s = not self._placed, time.monotonic()
-        self._placed.append((here.copy(), pose[:3, 2].copy()))
+        self._confirmed = False
         camera.position = here
-        if first:  # the mouse turns the camera about this place
+        if before is None:  # the mouse turns the camera about this place
             camera.look_at = here + _LOOK_M * pose[:3, 2]
         camera.wxyz = wxyz(pose[:3, :3])
 
