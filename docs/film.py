@@ -21,7 +21,7 @@ FILM = (960, 540)
 FPS = 8.0
 QUALITY = 80
 _BY_THE_CPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-_REST_MS, _STEP_MS = 4000, 100
+_REST_MS, _STEP_MS, _PATIENCE_MS = 4000, 100, 240_000
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="folder of generate, with something that moves")
     parser.add_argument("--to", type=Path, default=Path("docs/images"))
-    parser.add_argument("--seconds", type=float, default=15.0)
+    parser.add_argument("--seconds", type=float, default=15.0, help="of the film; 0 is none")
     asked = parser.parse_args()
     command = [
         shutil.which("dreamdrive") or "dreamdrive",
@@ -49,42 +49,47 @@ def main() -> None:
             path = shutil.which("chromium")
             browser = playwright.chromium.launch(executable_path=path, args=_BY_THE_CPU)
             page = browser.new_page(viewport=SIZE)  # type: ignore[arg-type]
+            page.set_default_timeout(_PATIENCE_MS)
             page.goto(found[0])
-            page.get_by_role("button", name="Play").wait_for(timeout=90_000)
+            page.get_by_role("button", name="Play").wait_for()
             page.wait_for_timeout(3 * _REST_MS)
             page.locator("[role=alert] button").first.click()  # that a core draws, which is known
-            write_video(asked.to / "view.mp4", _film(page, asked), FPS)
+            _stills(page, asked)
+            if asked.seconds:
+                write_video(asked.to / "view.mp4", _film(page, asked), FPS)
             browser.close()
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(30)
 
 
-def _film(page: Page, asked: argparse.Namespace) -> Iterator[np.ndarray]:
-    """Pictures of a drive, of an actor that is picked and painted, and of a path."""
-    share, actor = round(asked.seconds * FPS / 3), _largest(asked.out)
-    page.get_by_role("button", name="Play").click()
-    yield from _frames(page, share)
-    page.get_by_role("button", name="Pause").click()
-    _choose(page, "Actor", re.compile(rf"^{actor}:"))
+def _stills(page: Page, asked: argparse.Namespace) -> None:
+    """Screenshots of an actor that is picked and painted, and of a path."""
+    _choose(page, "Actor", re.compile(rf"^{_largest(asked.out)}:"))
     page.get_by_role("button", name="Paint").click()
-    page.wait_for_timeout(_REST_MS)
+    page.wait_for_timeout(2 * _REST_MS)
+    page.get_by_text("Time", exact=True).scroll_into_view_if_needed()
     _shot(page, asked.to / "view_actor.jpg")
-    page.get_by_role("button", name="Play").click()
-    yield from _frames(page, share)
-    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Undo").click()
     _choose(page, "Actor", "none")
     page.get_by_role("checkbox", name="Click on the road").check(force=True)
-    page.mouse.move(300, 600)
     for x, y in ((330, 600), (430, 480), (500, 415)):
         page.mouse.click(x, y)
-        page.wait_for_timeout(_REST_MS // 2)
-        yield from _frames(page, 6)
+        page.wait_for_timeout(_REST_MS)
     page.wait_for_timeout(_REST_MS)
     _shot(page, asked.to / "view_path.jpg")
-    _choose(page, "Camera", "path")
+
+
+def _film(page: Page, asked: argparse.Namespace) -> Iterator[np.ndarray]:
+    """Pictures of the recorded drive, of depth, and of the drive along the path."""
+    share = round(asked.seconds * FPS / 3)
     page.get_by_role("button", name="Play").click()
-    yield from _frames(page, share - 18)
+    yield from _frames(page, share)
+    _choose(page, "Layer", "depth")
+    yield from _frames(page, share)
+    _choose(page, "Layer", "colour")
+    _choose(page, "Camera", "path")
+    yield from _frames(page, share)
 
 
 def _largest(out: Path) -> int:

@@ -12,7 +12,7 @@ from dreamdrive.show import depth_colours
 from dreamdrive.splat import render_scene
 from dreamdrive.stored import load_scene
 from dreamdrive.view.layers import LAYERS, Kept, Looking, layers_of
-from dreamdrive.view.recorded import Recorded
+from dreamdrive.view.recorded import RecordedFrames
 from tests.cli.test_commands import driving
 from tests.scene.scenes import make_scene
 
@@ -56,7 +56,7 @@ def test_a_run_has_scores_and_frames(finished: Path, tmp_path: Path) -> None:
     picture = LAYERS["scores"].draw(Looking(kept), scene, camera, t_s)
     assert picture.shape == (camera.height_px, camera.width_px, 3)
     assert picture.max() > 0
-    recorded = Recorded(kept, scene)
+    recorded = RecordedFrames(kept, scene)
     assert recorded.there
     view, frame = recorded.nearest(t_s + 0.01)
     assert view == 2

@@ -2,12 +2,12 @@
 
 import pytest
 
-from dreamdrive.view.page.pace import LEAST_PX, MOVING_PX, RESTING_PX, Pace
+from dreamdrive.view.page.pace import LEAST_PX, MOVING_PX, RESTING_PX, PictureSize
 
 
 @pytest.mark.parametrize("window", [(1280, 720), (2560, 1440), (500, 900), (300, 200), (0, 0), (5000, 1)])
 def test_a_picture_has_the_windows_shape_and_no_more_pixels_than_allowed(window: tuple[int, int]) -> None:
-    pace = Pace()
+    pace = PictureSize()
     for resting, most in ((False, MOVING_PX), (True, RESTING_PX)):
         width, height = pace.size(window, resting)
         assert 2 <= width <= max(2, window[0])
@@ -19,7 +19,7 @@ def test_a_picture_has_the_windows_shape_and_no_more_pixels_than_allowed(window:
 
 
 def test_slow_pictures_become_smaller_and_quick_ones_larger_again() -> None:
-    pace = Pace()
+    pace = PictureSize()
     assert pace.size((1280, 720), False) == (480, 270)
     for _ in range(20):
         pace.took(0.5)

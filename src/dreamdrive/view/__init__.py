@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from dreamdrive.view.during import RunWatch as RunWatch
     from dreamdrive.view.gate import LOOPBACK as LOOPBACK, Gate as Gate
     from dreamdrive.view.layers import LAYERS as LAYERS, Layer as Layer
-    from dreamdrive.view.listing import Found as Found, scenes_below as scenes_below
+    from dreamdrive.view.listing import SceneOnDisk as SceneOnDisk, scenes_below as scenes_below
     from dreamdrive.view.opened import Viewer as Viewer, view_run as view_run, view_scene as view_scene
     from dreamdrive.view.saving import Desk as Desk
     from dreamdrive.view.server import listen as listen

@@ -13,7 +13,7 @@ _DEEPEST, _MOST_FOLDERS = 5, 20_000
 
 
 @dataclass(frozen=True)
-class Found:
+class SceneOnDisk:
     """A scene on disk.
 
     Attributes:
@@ -31,9 +31,9 @@ class Found:
     changed: datetime
 
 
-def scenes_below(folder: Path) -> list[Found]:
+def scenes_below(folder: Path) -> list[SceneOnDisk]:
     """All scenes a few folders deep, by name; links and hidden folders are not followed."""
-    found: dict[Path, Found] = {}
+    found: dict[Path, SceneOnDisk] = {}
     for index in _indices(folder):
         scene = index.parent
         path = scene.parent if scene.name == "scene" and scene != folder else scene
@@ -43,7 +43,7 @@ def scenes_below(folder: Path) -> list[Found]:
         except (InputError, KeyError, TypeError):
             continue
         size = sum(each.stat().st_size for each in scene.iterdir() if each.is_file())
-        found[path] = Found(path, frames, size, actors, datetime.fromtimestamp(index.stat().st_mtime))
+        found[path] = SceneOnDisk(path, frames, size, actors, datetime.fromtimestamp(index.stat().st_mtime))
     return [found[path] for path in sorted(found)]
 
 

@@ -17,7 +17,7 @@ SHARE = 0.5
 
 
 @dataclass
-class Recorded:
+class RecordedFrames:
     """The frames of a scene's first camera, read when they are asked for first."""
 
     kept: Kept

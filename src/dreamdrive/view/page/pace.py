@@ -13,7 +13,7 @@ _STEP, _ROOM = 0.8, 0.6
 
 
 @dataclass
-class Pace:
+class PictureSize:
     """The size of moving pictures, by what the last ones took."""
 
     _px: float = field(default=MOVING_PX, init=False)

@@ -14,12 +14,12 @@ from dreamdrive.show import Image
 from dreamdrive.view.layers import LAYERS, Looking
 from dreamdrive.view.page.actor_panel import ActorPanel
 from dreamdrive.view.page.lines import Lines, wxyz
-from dreamdrive.view.page.pace import Pace
+from dreamdrive.view.page.pace import PictureSize
 from dreamdrive.view.page.path_panel import PathPanel
 from dreamdrive.view.page.talk import Talk
 from dreamdrive.view.page.time_panel import BESIDE, OVER, TimePanel
 from dreamdrive.view.page.tools import Shared, Tools
-from dreamdrive.view.recorded import Recorded, nearest_view
+from dreamdrive.view.recorded import RecordedFrames, nearest_view
 from dreamdrive.view.session import FREE, RECORDED, Session, vertical_fov_rad
 
 REST_S = 0.25
@@ -40,10 +40,10 @@ class Page:
     tools: Tools = field(init=False)
     talk: Talk = field(init=False)
     session: Session = field(init=False)
-    recorded: Recorded = field(init=False)
+    recorded: RecordedFrames = field(init=False)
     lines: Lines = field(init=False)
     _looking: Looking = field(init=False)
-    _pace: Pace = field(default_factory=Pace, init=False)
+    _pace: PictureSize = field(default_factory=PictureSize, init=False)
     _placed: tuple[np.ndarray, np.ndarray] | None = field(default=None, init=False)
     _confirmed: bool = field(default=False, init=False)
     _window: tuple[int, int] = field(default=(0, 0), init=False)
@@ -54,7 +54,7 @@ class Page:
         scene = self.shared.scene
         self.talk, self.session = Talk(self.client), Session(scene)
         self._looking = Looking(self.shared.kept)
-        self.recorded = Recorded(self.shared.kept, scene)
+        self.recorded = RecordedFrames(self.shared.kept, scene)
         with self.talk.lock, self.client.atomic():
             self.client.scene.set_up_direction(tuple(scene.up.tolist()))
             self.client.camera.up_direction = scene.up
