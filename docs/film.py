@@ -65,7 +65,7 @@ def main() -> None:
 
 def _stills(page: Page, asked: argparse.Namespace) -> None:
     """Screenshots of an actor that is picked and painted, and of a path."""
-    _choose(page, "Actor", re.compile(rf"^{_largest(asked.out)}:"))
+    _choose(page, "Actor", re.compile(rf"^{_ahead(asked.out)}:"))
     page.get_by_role("button", name="Paint").click()
     page.wait_for_timeout(2 * _REST_MS)
     page.get_by_text("Time", exact=True).scroll_into_view_if_needed()
@@ -92,11 +92,13 @@ def _film(page: Page, asked: argparse.Namespace) -> Iterator[np.ndarray]:
     yield from _frames(page, share)
 
 
-def _largest(out: Path) -> int:
-    """The actor with the most Gaussians."""
-    actors = load_scene(out / "scene").actors
-    assert actors, f"nothing moves in {out}"
-    return max(actors, key=lambda actor: actor.count).id
+def _ahead(out: Path) -> int:
+    """The actor that the first view shows nearest to its middle."""
+    scene = load_scene(out / "scene")
+    assert scene.actors, f"nothing moves in {out}"
+    seen = scene.cameras[0].project(np.stack([actor.track.positions_m[0] for actor in scene.actors]))
+    aside = np.where(seen[:, 2] > 0, np.abs(seen[:, 0] - scene.cameras[0].cx_px), np.inf)
+    return scene.actors[int(np.argmin(aside))].id
 
 
 def _choose(page: Page, label: str, option: "str | re.Pattern[str]") -> None:
