@@ -82,5 +82,14 @@ def test_a_click_finds_what_stands_there() -> None:
     place = picked(scene, np.zeros(3), np.array([0.3, 0.1, 1.0]), 0.0)
     assert place is not None
     np.testing.assert_allclose(place, [1.5, 0.5, 5.0], atol=0.05)
-    assert picked(scene, np.zeros(3), np.array([0.0, 0.0, -1.0]), 0.0) is None
+    assert picked(scene, scene.trajectory.positions_m[0], np.array([0.0, 0.0, -1.0]), 0.0) is None
     assert picked(scene, np.array([0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0]), 0.0) is None  # straight up
+
+
+def test_a_click_into_a_gap_finds_the_plane_of_the_road() -> None:
+    scene = replace(level(), static=wall(-50.0))
+    first = scene.trajectory.positions_m[0]
+    place = picked(scene, first, np.array([0.0, 0.17, 1.0]), 0.0)
+    assert place is not None
+    np.testing.assert_allclose(place - first, [0.0, 1.7, 10.0], atol=1e-6)
+    assert picked(scene, first, np.array([0.0, 0.01, 1.0]), 0.0) is None  # 170 m away

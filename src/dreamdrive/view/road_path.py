@@ -19,7 +19,7 @@ APART_M = 0.3
 """Points that are nearer to one another count as one."""
 HZ = 20.0
 """Poses a second; that of ``drive.smooth`` where the recording gives more."""
-_STEP_M, _LEAST_M = 0.25, 1e-4
+_STEP_M, _LEAST_M, _FARTHEST_M = 0.25, 1e-4, 100.0
 _PICKED_ALPHA = 0.5
 # Splats beside a very narrow view are projected as at its rim, and leave holes in its middle.
 _PROBE_PX, _PROBE_FOCAL_PX = 161, 500.0
@@ -33,7 +33,10 @@ def height_m(scene: Scene) -> float:
 def picked(
     scene: Scene, origin: Float[np.ndarray, "3"], direction: Float[np.ndarray, "3"], t_s: float
 ) -> Float[np.ndarray, "3"] | None:
-    """The place at which a ray meets what stands in a scene; None in the sky."""
+    """The place at which a ray meets what stands in a scene, or where there is a gap the plane of its road.
+
+    None in the sky.
+    """
     ahead = direction / np.linalg.norm(direction)
     aside = np.cross(ahead, scene.up)
     if np.linalg.norm(aside) < 1e-6:
@@ -47,8 +50,19 @@ def picked(
     seen = render_scene(scene, probe, t_s, part="static")
     middle = _PROBE_PX // 2
     if float(seen.alpha[middle, middle]) < _PICKED_ALPHA:
-        return None
+        return _on_the_plane(scene, origin, ahead)
     return origin + float(seen.depth_m[middle, middle]) * ahead
+
+
+def _on_the_plane(
+    scene: Scene, origin: Float[np.ndarray, "3"], ahead: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3"] | None:
+    """Where a ray meets the road below the first camera; None beyond ``_FARTHEST_M``."""
+    up, first = scene.up, scene.trajectory.positions_m[0]
+    above_m, falls = float((origin - first) @ up) + height_m(scene), -float(ahead @ up)
+    if above_m <= 0 or falls * _FARTHEST_M < above_m:
+        return None
+    return origin + above_m / falls * ahead
 
 
 def spline(points_m: Sequence[Float[np.ndarray, "3"]]) -> Float[np.ndarray, "n 3"]:
