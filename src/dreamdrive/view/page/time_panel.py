@@ -10,9 +10,10 @@ from dreamdrive.view.page.tools import Tools
 from dreamdrive.view.recorded import nearest_view
 from dreamdrive.view.session import DRIFTS, DRIVES, FREE, PATH
 
-BESIDE, OVER = "beside", "over"
+BESIDE: str = "beside"
+OVER: str = "over"
 """Where the recorded frame is shown."""
-_AWAY = "away"
+_AWAY: str = "away"
 _STEP_S = 0.01
 
 
