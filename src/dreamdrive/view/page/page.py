@@ -28,7 +28,7 @@ MOST_HZ = 25.0
 """Pictures a second while the time runs."""
 _MOVING_QUALITY, _RESTING_QUALITY, _BESIDE_PX = 75, 88, 420
 _SAME_M, _SAME = 0.02, 1e-3
-_LOOK_M = 10.0
+_LOOK_M, _MOST_TRIES = 10.0, 20
 
 
 @dataclass
@@ -46,6 +46,7 @@ class Page:
     _pace: PictureSize = field(default_factory=PictureSize, init=False)
     _placed: tuple[np.ndarray, np.ndarray] | None = field(default=None, init=False)
     _confirmed: bool = field(default=False, init=False)
+    _tries: int = field(default=0, init=False)
     _window: tuple[int, int] = field(default=(0, 0), init=False)
     _beside: int = field(default=-1, init=False)
     _open: bool = field(default=True, init=False)
@@ -113,7 +114,9 @@ class Page:
             if by_hand and self.session.drive != FREE:
                 self.session.follow(FREE)
                 self.time_panel.tell()
-            if resized or by_hand:
+            # A browser that has just opened may forget where it was put.
+            lost = self.session.drive != FREE and not self._confirmed and self._tries <= _MOST_TRIES
+            if resized or by_hand or lost:
                 self.refresh()
 
     def _is_by_hand(self, camera: CameraHandle) -> bool:
@@ -137,7 +140,9 @@ class Page:
         """Put the browser's camera at a pose."""
         camera, here = self.client.camera, pose[:3, 3]
         before, self._placed = self._placed, (here.copy(), pose[:3, 2].copy())
-        if before is not None and all(map(np.allclose, before, self._placed)):
+        same = before is not None and all(map(np.allclose, before, self._placed))
+        self._tries = self._tries + 1 if same else 0
+        if same and (self._confirmed or self._tries > _MOST_TRIES):
             return
         self._confirmed = False
         camera.position = here
