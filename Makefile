@@ -18,13 +18,14 @@ OUT ?= $(if $(INPUT),demo/clip,demo/street)
 INPUT ?=
 OPTIONS ?=
 
-.PHONY: help install demo test ci check site sanitize snapshots wheels format clean
+.PHONY: help install demo test ci check site sanitize page snapshots wheels format clean
 
 help:
 	@echo "make demo [INPUT=clip.mp4] [OUT=demo/street] [OPTIONS='--quality draft']   a scene and its videos"
 	@echo "make test      the quick tests"
-	@echo "make ci        lint, types, sanitizers, slow tests, examples, the site"
+	@echo "make ci        lint, types, sanitizers, the site, the viewer's page, slow tests, examples"
 	@echo "make site      the documentation as a site, into build/site"
+	@echo "make page      the viewer in Chromium"
 	@echo "make snapshots the texts that tests keep, anew"
 	@echo "make wheels    wheels for Linux into dist/ [PYTHONS='python3.11 python3.12']"
 	@echo "make install   only the set-up, into $(VENV)"
@@ -64,8 +65,12 @@ site: install
 sanitize: install
 	.ci/sanitize
 
-ci: check sanitize site
-	$(PYTEST) $(PARALLEL) -m "slow and not gpu"
+# The viewer in headless Chromium, which is installed where it is missing.
+page: install
+	.ci/page
+
+ci: check sanitize site page
+	$(PYTEST) $(PARALLEL) -m "slow and not gpu and not page"
 	@for example in examples/[0-9]*.py; do echo "$$example"; $(BIN)/python "$$example" --out "out/examples/$$(basename "$$example" .py)" || exit 1; done
 
 # Public names, messages and pages that tests compare with: look at the difference before it is committed.

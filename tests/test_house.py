@@ -23,7 +23,7 @@ ALL = [file for name, root in ROOTS.items() for file in sorted((root / name).rgl
 OPEN = {"scene", "files", "data", "datasets", "vision", "metrics", "compute"}
 """Packages whose modules others import one by one."""
 BACKENDS = "dreamdrive.geometry.backends"
-ABOVE = {"tasks", "evaluate", "export"}
+ABOVE = {"tasks", "evaluate", "export", "view"}
 ENTRY = "dreamdrive.cli.main"
 """What the command and ``python -m dreamdrive`` start with."""
 WITH_AN_EXTRA = {"dreamdrive.prior.vista.convert", "dreamdrive.prior.vista.features"}

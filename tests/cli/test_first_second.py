@@ -25,6 +25,10 @@ WRONG = """
     generate here -o o --action nowhere
     look none.jpg -o o
     look here -o here
+    view none
+    view here
+    view here --during --port 70000
+    view here --during -o taken
     render none --trajectory shift
     render here --trajectory shift --fps 0
     actors none

@@ -26,8 +26,9 @@ Tree = dict[str, bytes | str | None]
 _PRIVATE = ".dreamdrive-"
 _LOCK = ".dreamdrive.lock"
 _MOMENTS = 20
-ELSEWHERE = {("evaluate perception", "json")}
-"""A second place that a command writes to, by what the others write JSON with."""
+ELSEWHERE = {("evaluate perception", "json"), ("view", "output")}
+"""A second place that a command writes to, by what the others write JSON with; and what the page writes when
+somebody asks for it, by what render, plan and edit write with (``tests/view/test_saving.py``)."""
 _ENDS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 

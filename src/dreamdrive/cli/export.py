@@ -14,7 +14,6 @@ from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, Export, function
 from dreamdrive.files.given import DATASET, SCENE, check_there
-from dreamdrive.files.paths import inside
 from dreamdrive.scene.control import check_numbers
 
 if TYPE_CHECKING:
@@ -121,6 +120,7 @@ def _check_asked(chosen: Export, asked: _Asked) -> None:
 def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, asked: _Asked) -> list[str]:
     """Write it, and say what it holds."""
     from dreamdrive.data.truth_folder import is_world, read_drives
+    from dreamdrive.run import stages_of
 
     pictures = "clip" in chosen.takes
     with Bars(Console()) as bars:
@@ -132,7 +132,7 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, aske
             named = {"name": out.resolve().name} if "name" in chosen.takes else {}
             function(chosen.world)(read_drives(out), output, **named, **how)
             return [_OF_WORLD] if pictures else []
-        scene, stages = open_scene(out), _stages(out)
+        scene, stages = open_scene(out), stages_of(out)
         clip, geometry = _kept(stages, scene) if pictures and not asked.changed else (None, None)
         if asked.labels is not None:
             how["labels"] = _labels(out, scene, asked.labels)
@@ -151,13 +151,14 @@ def _labels(out: Path, scene: "Scene", path: Path) -> "Labels":
     from dreamdrive.data.input import dataset_of
     from dreamdrive.edit import EDITS
     from dreamdrive.export import labels_of
+    from dreamdrive.run import stages_of
 
     logs, link = dataset_of(None, path).logs, scene.provenance.log
     if logs is None:
         raise InputError(f"--labels {path} is no data set with labels")
     if link is None:
         raise InputError(f"{out} was made of no drive of a data set; leave --labels out")
-    return labels_of(scene, logs.read(path, link.name), edited=(_home(out) / EDITS).is_file())
+    return labels_of(scene, logs.read(path, link.name), edited=(stages_of(out).parent / EDITS).is_file())
 
 
 def _check_world(out: Path, asked: _Asked) -> None:
@@ -187,16 +188,6 @@ def _changed(scene: "Scene", asked: _Asked) -> "Scene":
     return along(scene, drive.path)
 
 
-def _home(out: Path) -> Path:
-    """What lies around the scene."""
-    return out.parent if (out / "scene.json").is_file() else out
-
-
-def _stages(out: Path) -> Path:
-    """Where the run of a scene keeps its results."""
-    return _home(out) / "stages"
-
-
 def _of_pictures(clip: "Clip | None", stages: Path, asked: _Asked) -> str:
     """What the pictures of a scene are."""
     if asked.trajectory is not None:
@@ -210,32 +201,7 @@ def _of_pictures(clip: "Clip | None", stages: Path, asked: _Asked) -> str:
 
 def _kept(stages: Path, scene: "Scene") -> "tuple[Clip | None, Geometry | None]":
     """What the run kept of clip and geometry; ``InputError`` where they are not those of the scene."""
-    import numpy as np
+    from dreamdrive.run import kept_clip, kept_geometry
 
-    from dreamdrive.run import codec
-    from dreamdrive.scene.clip import Clip
-    from dreamdrive.scene.geometry import Geometry
-    from dreamdrive.stored import check
-
-    prior, geometry = inside(stages, "prior"), inside(stages, "geometry")
-    if not (prior / codec.JSON_NAME).is_file():
-        return None, None
-    try:
-        clip = codec.read(prior, Clip)
-        check.clip(clip)
-        check.scene(clip, scene)
-        if scene.provenance.source_index not in (None, tuple(clip.source_index.tolist())):
-            raise ValueError("its frames are others")
-        if not (geometry / codec.JSON_NAME).is_file():
-            return clip, None
-        found = codec.read(geometry, Geometry)
-        check.geometry(clip, found)
-        pairs = zip(found.cameras, scene.cameras, strict=True)
-        if not all(np.allclose(a.world_from_camera, b.world_from_camera) for a, b in pairs):
-            raise ValueError("its cameras are elsewhere")
-    except ValueError as error:
-        raise InputError(
-            f"{stages} does not belong to the scene ({error}); run generate again, or let dreamdrive clean "
-            "remove it: pictures are then rendered from the scene"
-        ) from error
-    return clip, found
+    clip = kept_clip(stages, scene)
+    return clip, None if clip is None else kept_geometry(stages, scene, clip)

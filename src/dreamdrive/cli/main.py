@@ -31,12 +31,14 @@ from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.terminal.arguments import REGISTRY
 from dreamdrive.cli.terminal.machine import Terminated, asked_to_end, stop_like_an_interruption
+from dreamdrive.cli.view import view
 from dreamdrive.errors import InputError
 from dreamdrive.registry import loaded
 
 COMMANDS = {
     "generate": generate,
     "look": look,
+    "view": view,
     "render": render,
     "actors": actors,
     "edit": edit,

@@ -6,9 +6,21 @@ from dreamdrive.registry import offer
 
 if TYPE_CHECKING:
     from dreamdrive.run import codec as codec
+    from dreamdrive.run.kept import (
+        is_kept as is_kept,
+        kept_clip as kept_clip,
+        kept_geometry as kept_geometry,
+        kept_scores as kept_scores,
+        kept_static as kept_static,
+        stages_of as stages_of,
+    )
     from dreamdrive.run.lock import only_run as only_run
     from dreamdrive.run.options_file import read_options as read_options
-    from dreamdrive.run.production import Production as Production, start as start
+    from dreamdrive.run.production import (
+        FIRST_PICTURE as FIRST_PICTURE,
+        Production as Production,
+        start as start,
+    )
     from dreamdrive.run.program import program_digest as program_digest, program_of as program_of
     from dreamdrive.run.report.document import PACKAGES as PACKAGES, package_versions as package_versions
     from dreamdrive.run.report.held_out import (

@@ -17,18 +17,21 @@ if TYPE_CHECKING:
         depth_colours as depth_colours,
         grid as grid,
         labelled as labelled,
+        score_colours as score_colours,
     )
     from dreamdrive.show.rendering import (
         RenderOptions as RenderOptions,
         frames as frames,
         places as places,
         video_rate as video_rate,
+        view_camera as view_camera,
         write_drive as write_drive,
     )
     from dreamdrive.show.videos import (
         Scored as Scored,
         drive_frames as drive_frames,
         lens_of as lens_of,
+        score_image as score_image,
         write_held_out as write_held_out,
         write_png as write_png,
         write_videos as write_videos,

@@ -166,7 +166,7 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
         near = front[max(k - 1, 0) : k + 2]
         whole = render_scene(scene, camera, t_s)
         still, moving = (render_scene(scene, camera, t_s, part=part).colour for part in ("static", "dynamic"))
-        score = torch.zeros_like(whole.alpha) if scored is None else _score_image(scored, camera, near)
+        score = torch.zeros_like(whole.alpha) if scored is None else score_image(scored, camera, near)
         images = {
             "static": panels.to_bytes(still.numpy()),
             "dynamic": with_ids(panels.to_bytes(moving.numpy()), scene, camera, t_s),
@@ -179,7 +179,7 @@ def _panels(scene: Scene, scored: Scored | None) -> Iterator[UInt8[np.ndarray, "
 
 
 @torch.no_grad()
-def _score_image(scored: Scored, camera: Camera, frames: list[int]) -> Float[Tensor, "h w"]:
+def score_image(scored: Scored, camera: Camera, frames: list[int]) -> Float[Tensor, "h w"]:
     """Scores composited like colour (eq. 8).
 
     The seeds hold a moving thing once a frame; of those only the ones from ``frames`` are shown.

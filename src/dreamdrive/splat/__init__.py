@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from dreamdrive.splat.cuda import load_gsplat as load_gsplat, why_unusable as why_unusable
     from dreamdrive.splat.rasterize import BACKENDS as BACKENDS, rasterize as rasterize
     from dreamdrive.splat.scene_view import (
+        Moment as Moment,
         Part as Part,
         SceneView as SceneView,
         moment_of as moment_of,
