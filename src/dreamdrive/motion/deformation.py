@@ -27,6 +27,7 @@ class DeformationConfig(MotionConfig):
         time_frequencies: Octaves of the encoding of the normalised time.
         actors: Actors with a rigid track; 0 for none.
         track_times: Key frames of each track; 0 for none.
+        rigid: How many of the actors follow their track alone, with no residual: those of other scenes.
     """
 
     depth: int = 4
@@ -35,12 +36,15 @@ class DeformationConfig(MotionConfig):
     time_frequencies: int = 6
     actors: int = 0
     track_times: int = 0
+    rigid: int = 0
 
     def __post_init__(self) -> None:
         if self.depth < 1 or self.width < 1 or min(self.position_frequencies, self.time_frequencies) < 0:
             raise ValueError(f"deformation: expected depth, width >= 1 and frequencies >= 0, got {self}")
         if self.actors < 0 or (self.actors == 0) != (self.track_times == 0):
             raise ValueError(f"deformation: {self.actors} actors with {self.track_times} key frames")
+        if not 0 <= self.rigid <= self.actors:
+            raise ValueError(f"deformation: {self.rigid} of {self.actors} actors are rigid")
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,7 @@ class DeformationField(Motion):
     up: Tensor
     track_times_s: Tensor
     track_pivot_m: Tensor
+    track_rigid: Tensor | None
 
     def __init__(
         self, config: DeformationConfig, domain: Domain, tracks: Tracks | None = None, seed: int = 0
@@ -138,6 +143,9 @@ class DeformationField(Motion):
         times_s = np.zeros(0) if tracks is None else tracks.times_s
         self.register_buffer("track_times_s", torch.tensor(times_s, dtype=torch.float64))
         self.register_buffer("track_pivot_m", _tensor(np.zeros((0, 3)) if tracks is None else tracks.pivot_m))
+        # Where there is none it is no part of what is stored.
+        rigid = torch.arange(config.actors) >= config.actors - config.rigid if config.rigid else None
+        self.register_buffer("track_rigid", rigid)
         self.track_translation = nn.Parameter(
             _tensor(np.zeros((0, 0, 3)) if tracks is None else tracks.translation_m)
         )
@@ -237,6 +245,8 @@ class DeformationField(Motion):
         offsets = self.residual(means, t_s)
         if actor is None or self.config.actors == 0:
             return offsets
+        if (bends := self._bends(actor)) is not None:
+            offsets = Offsets(*(bends * each for each in (offsets.mean_m, offsets.quaternion, offsets.log_scale)))
         member = (actor >= 0).to(means.dtype)[:, None]
         index = actor.clamp(min=0)
         translation, yaw_rad = self.pose(t_s)
@@ -282,26 +292,73 @@ class DeformationField(Motion):
     @torch.no_grad()
     def steered(self, actor: int, track: Track) -> "DeformationField":
         """See ``Motion``; key frames keep their times."""
-        if not 0 <= actor < self.config.actors:
-            raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
+        self._check_known(actor)
         copy, keyed = deepcopy(self), track.at(self.track_times_s.numpy(force=True))
-        pivot_m = self.track_pivot_m[actor].double().numpy(force=True)
+        pivot_m = self.pivot_of(actor)
         copy.track_translation[actor] = torch.from_numpy(keyed.positions_m - pivot_m).to(self.centre_m)
         copy.track_yaw_rad[actor] = torch.from_numpy(keyed.yaw_rad).to(self.centre_m)
         return copy
 
     @torch.no_grad()
+    def shifted(self, actor: int, by_m: Float[np.ndarray, "3"], turn_rad: float) -> "DeformationField":
+        """See ``Motion``."""
+        self._check_known(actor)
+        copy = deepcopy(self)
+        copy.track_translation[actor] += torch.from_numpy(by_m).to(self.centre_m)
+        copy.track_yaw_rad[actor] += turn_rad
+        return copy
+
+    @torch.no_grad()
     def copied(self, actor: int) -> "tuple[DeformationField, int]":
         """See ``Motion``."""
+        self._check_known(actor)
+        rigid = self.track_rigid is not None and bool(self.track_rigid[actor])
+        rows = self.track_translation[actor], self.track_yaw_rad[actor]
+        return self._with_one_more(rows, self.track_pivot_m[actor], rigid)
+
+    @torch.no_grad()
+    def adopted(self, track: Track) -> "tuple[DeformationField, int]":
+        """See ``Motion``; without key frames so far, those are the times of the track."""
+        base = self
+        if not self.config.actors:
+            base = deepcopy(self)
+            base.track_times_s = torch.from_numpy(track.times_s).double()
+            base.config = replace(self.config, track_times=len(track.times_s), actors=1)
+            base.track_translation = nn.Parameter(self.centre_m.new_zeros(0, len(track.times_s), 3))
+            base.track_yaw_rad = nn.Parameter(self.centre_m.new_zeros(0, len(track.times_s)))
+        keyed = track.at(base.track_times_s.numpy(force=True))
+        rows = (torch.from_numpy(each).to(self.centre_m) for each in (keyed.positions_m, keyed.yaw_rad))
+        return base._with_one_more(tuple(rows), torch.zeros_like(self.centre_m), True)
+
+    def pivot_of(self, actor: int) -> Float[np.ndarray, "3"]:
+        """See ``Motion``."""
+        self._check_known(actor)
+        return self.track_pivot_m[actor].double().numpy(force=True)
+
+    def _with_one_more(
+        self, rows: tuple[Tensor, ...], pivot_m: Float[Tensor, "3"], rigid: bool
+    ) -> "tuple[DeformationField, int]":
+        """A copy with one actor more, on key frames of translation and yaw."""
+        copy, new = deepcopy(self), len(self.track_pivot_m)
+        copy.config = replace(self.config, actors=new + 1, rigid=self.config.rigid + rigid)
+        copy.track_pivot_m = torch.cat([self.track_pivot_m, pivot_m[None]])
+        if copy.config.rigid:
+            known = torch.zeros(new, dtype=torch.bool) if self.track_rigid is None else self.track_rigid
+            copy.track_rigid = torch.cat([known, torch.tensor([rigid])])
+        for name, row in zip(("track_translation", "track_yaw_rad"), rows, strict=True):
+            setattr(copy, name, nn.Parameter(torch.cat([getattr(self, name), row[None]])))
+        return copy.requires_grad_(False), new
+
+    def _check_known(self, actor: int) -> None:
         if not 0 <= actor < self.config.actors:
             raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
-        copy = deepcopy(self)
-        copy.config = replace(self.config, actors=self.config.actors + 1)
-        copy.track_pivot_m = torch.cat([self.track_pivot_m, self.track_pivot_m[actor, None]])
-        for name in ("track_translation", "track_yaw_rad"):
-            rows = getattr(self, name)
-            setattr(copy, name, nn.Parameter(torch.cat([rows, rows[actor, None]])))
-        return copy, self.config.actors
+
+    def _bends(self, actor: Int[Tensor, " n"]) -> Float[Tensor, "n 1"] | None:
+        """1 for Gaussians that have a residual, 0 for those of rigid actors; None where all have one."""
+        if self.track_rigid is None:
+            return None
+        rigid = self.track_rigid[actor.clamp(min=0)] & (actor >= 0)
+        return (~rigid).to(self.centre_m.dtype)[:, None]
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""
@@ -322,6 +379,8 @@ class DeformationField(Motion):
             self._skip,
             [tensor for layer in self._dense() for tensor in (layer.weight, layer.bias)],
         )
+        if gaussians.actor is not None and (bends := self._bends(gaussians.actor)) is not None:
+            residual = bends * residual
         means, quaternions, log_scales, logits = posed(
             (gaussians.means, gaussians.quaternions, gaussians.log_scales, gaussians.logit_opacities),
             residual,
