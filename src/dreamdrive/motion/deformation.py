@@ -246,7 +246,9 @@ class DeformationField(Motion):
         if actor is None or self.config.actors == 0:
             return offsets
         if (bends := self._bends(actor)) is not None:
-            offsets = Offsets(*(bends * each for each in (offsets.mean_m, offsets.quaternion, offsets.log_scale)))
+            offsets = Offsets(
+                *(bends * each for each in (offsets.mean_m, offsets.quaternion, offsets.log_scale))
+            )
         member = (actor >= 0).to(means.dtype)[:, None]
         index = actor.clamp(min=0)
         translation, yaw_rad = self.pose(t_s)
@@ -294,7 +296,7 @@ class DeformationField(Motion):
         """See ``Motion``; key frames keep their times."""
         self._check_known(actor)
         copy, keyed = deepcopy(self), track.at(self.track_times_s.numpy(force=True))
-        pivot_m = self.pivot_of(actor)
+        pivot_m = self.track_pivot_m[actor].double().numpy(force=True)
         copy.track_translation[actor] = torch.from_numpy(keyed.positions_m - pivot_m).to(self.centre_m)
         copy.track_yaw_rad[actor] = torch.from_numpy(keyed.yaw_rad).to(self.centre_m)
         return copy
@@ -329,11 +331,6 @@ class DeformationField(Motion):
         keyed = track.at(base.track_times_s.numpy(force=True))
         rows = (torch.from_numpy(each).to(self.centre_m) for each in (keyed.positions_m, keyed.yaw_rad))
         return base._with_one_more(tuple(rows), torch.zeros_like(self.centre_m), True)
-
-    def pivot_of(self, actor: int) -> Float[np.ndarray, "3"]:
-        """See ``Motion``."""
-        self._check_known(actor)
-        return self.track_pivot_m[actor].double().numpy(force=True)
 
     def _with_one_more(
         self, rows: tuple[Tensor, ...], pivot_m: Float[Tensor, "3"], rigid: bool

@@ -140,14 +140,6 @@ class Motion(nn.Module, ABC):
         """
         raise ValueError(f"motion: {self.kind} knows no tracks of actors")
 
-    def pivot_of(self, actor: int) -> Float[np.ndarray, "3"]:
-        """Where the middle of the bottom of an actor is in its canonical place.
-
-        Raises:
-            ValueError: It knows no tracks, or none of this actor.
-        """
-        raise ValueError(f"motion: {self.kind} knows no tracks of actors")
-
     def penalty(self, canonical: Gaussians, moved: Gaussians) -> Float[Tensor, ""] | None:
         """A term to add to the loss of a step, weighted; None for none.
 

@@ -136,12 +136,12 @@ class Gaussians:
         return replace(self, means=self.means + away_s * self.velocity, velocity=None).faded_at(t_s)
 
     def and_more(self, more: "Gaussians") -> "Gaussians":
-        """These and others; what one side lacks it gets as nothing: no actor, filled in nowhere, always there.
+        """These and others; what one side lacks it gets as nothing: no actor, not filled in, always there.
 
         Features are those of these, and 0 for the others; the fewer coefficients of colour are filled with 0.
         """
         coefficients = max(self.sh.shape[1], more.sh.shape[1])
-        named = (set(self.tensors()) | set(more.tensors())) - (set() if self.features is not None else {"features"})
+        named = set(self.tensors()) | set(replace(more, features=None).tensors())
         made = []
         for part in (self, replace(more, features=None)):
             like, count = self.means, len(part)

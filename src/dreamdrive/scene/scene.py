@@ -52,10 +52,6 @@ class SceneMotion(Protocol):
         """A copy with a rigid actor more, canonically at the origin, on a track, and its index; likewise."""
         ...
 
-    def pivot_of(self, actor: int) -> Float[np.ndarray, "3"]:
-        """Where the middle of an actor's bottom is in its canonical place; likewise."""
-        ...
-
     def state_dict(self) -> dict[str, Tensor]:
         """What it has learned, by name."""
         ...
@@ -254,7 +250,7 @@ class Scene:
 
         Args:
             actor: Its id is the index that the motion has for it.
-            gaussians: Those of the actor, in its canonical place; see ``edit.inserted`` for one of another scene.
+            gaussians: Those of the actor, in its canonical place; ``edit.inserted`` makes them.
             motion: That of the scene with one actor more, see ``SceneMotion.adopted``.
 
         Raises:

@@ -218,8 +218,8 @@ def _values(scene: Scene) -> dict[str, Any]:
 def _version(scene: Scene) -> int:
     """The first format version that can hold a scene.
 
-    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a per-frame street; 4 what was filled
-    in, and rigid actors of other scenes.
+    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a per-frame street; 4 what
+    was filled in, and rigid actors of other scenes.
     """
     config = None if scene.deformation is None else scene.deformation.config
     if scene.static.filled is not None or getattr(config, "rigid", 0):
@@ -232,7 +232,10 @@ def _version(scene: Scene) -> int:
 def _described(motion: SceneMotion) -> dict[str, Any]:
     kind = {} if motion.kind == _FIRST_MOTION else {"kind": motion.kind}
     # What none has is not named, so that older programs read what they can move.
-    return {**kind, **{name: value for name, value in asdict(motion.config).items() if name != "rigid" or value}}
+    return {
+        **kind,
+        **{name: value for name, value in asdict(motion.config).items() if name != "rigid" or value},
+    }
 
 
 def _rebuilt(values: dict[str, Any], state: dict[str, Tensor]) -> SceneMotion:

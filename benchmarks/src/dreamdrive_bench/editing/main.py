@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dreamdrive.edit import Delay, Edit, Move, Remove, Turn, edited
+from dreamdrive.edit import Delay, Edit, Insert, Move, Remove, Turn, edited
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.street.layout import Layout
 from dreamdrive.scene.street.truth import DriveTruth
@@ -27,13 +27,13 @@ from dreamdrive_bench.common.options import parser_of
 from dreamdrive_bench.common.report import publish
 from dreamdrive_bench.common.worlds import DEVELOPMENT, set_of
 from dreamdrive_bench.editing.measure import Shown, Truths, figures, shown
-from dreamdrive_bench.editing.truth import Pair, delayed, inserted, moved, pairs_of, removed, turned
+from dreamdrive_bench.editing.truth import Pair, delayed, inserted, moved, pairs_of, removed, room_m, turned
 from streetworld import drive, make_street
 
 _FRAMES, _RATE_HZ, _SIZE, _QUALITY = 24, 10.0, (320, 192), "draft"
 _METRES, _DEGREES, _SECONDS = 2.0, 20.0, 0.5
-_PLACES_M = ((14.0, 0.0), (14.0, 3.5), (20.0, 0.0))
-"""Ahead and left, where another street's actor is set, the first that is free."""
+_PLACES_M = tuple((ahead_m, left_m) for ahead_m in (10.0, 15.0, 20.0, 28.0) for left_m in (0.0, 3.5, -3.5))
+"""Ahead and left: where another street's actor may be set."""
 KINDS = ("remove", "ahead", "aside", "turn", "delay", "insert")
 
 
@@ -59,20 +59,34 @@ def _street(seed: int) -> DriveTruth:
 
 
 def _scene(seed: int, runs: Path) -> Scene:
-    return scene_of(partial(_street, seed), _QUALITY, runs / f"street-{seed}")
+    return scene_of(partial(_street, seed), _QUALITY, _folder(seed, runs))
+
+
+def _folder(seed: int, runs: Path) -> Path:
+    return runs / f"street-{seed}"
 
 
 def _of_street(seed: int, args: argparse.Namespace) -> Iterator[dict[str, Any]]:
     scene, made = _scene(seed, args.runs), _street(seed)
     before = shown(scene)
+    other = args.seeds[(args.seeds.index(seed) + 1) % len(args.seeds)]
     for pair in pairs_of(scene, made)[: args.actors]:
-        for kind in args.kinds:
-            file = args.runs / f"{seed}-{pair.actor.id}-{kind}.json"
-            if not args.resume:
-                file.unlink(missing_ok=True)
-            about = {"seed": seed, "kind": kind, "actor": pair.actor.id, "apart_m": pair.apart_m}
-            measure = partial(_measured, kind, scene, made, pair, before)
-            yield about | kept(file, kind, measure)
+        for kind in [kind for kind in args.kinds if kind != "insert"]:
+            about = {"kind": kind, "actor": pair.actor.id, "apart_m": pair.apart_m}
+            yield _kept(seed, about, args, partial(_measured, kind, scene, made, pair, before))
+    if "insert" in args.kinds and other != seed:
+        about = {"kind": "insert", "actor": other}
+        yield _kept(seed, about, args, partial(_set_in, seed, other, before, args.runs))
+
+
+def _kept(
+    seed: int, about: dict[str, Any], args: argparse.Namespace, measure: Callable[[], dict[str, Any]]
+) -> dict[str, Any]:
+    """A row, measured now, or before with ``--resume``."""
+    file = args.runs / f"{seed}-{about['actor']}-{about['kind']}.json"
+    if not args.resume:
+        file.unlink(missing_ok=True)
+    return {"seed": seed, **about, **kept(file, str(about), measure)}
 
 
 def _measured(kind: str, scene: Scene, made: DriveTruth, pair: Pair, before: Shown) -> dict[str, Any]:
@@ -89,6 +103,21 @@ def _measured(kind: str, scene: Scene, made: DriveTruth, pair: Pair, before: Sho
     after = drive(drawn(made.layout), _FRAMES, _RATE_HZ, _SIZE)
     truths = Truths.of(made, after, box, None if kind == "remove" else box)
     return figures(truths, before, shown(edited(scene, [edit])))
+
+
+def _set_in(seed: int, other: int, before: Shown, runs: Path) -> dict[str, Any]:
+    """An actor of another street in this one, where it comes nearest to nothing."""
+    scene, made = _scene(seed, runs), _street(seed)
+    guest, layout = _scene(other, runs), _street(other).layout
+    pair = pairs_of(guest, _street(other))[0]
+    from_s = pair.actor.track.first_s
+    trials = [inserted(made.layout, layout, pair.box.id, from_s, np.array(place)) for place in _PLACES_M]
+    best = int(np.argmax([room_m(trial, made.times_s) for trial in trials]))
+    ahead_m, left_m = _PLACES_M[best]
+    after = drive(trials[best], _FRAMES, _RATE_HZ, _SIZE)
+    edit = Insert.from_folder(_folder(other, runs), pair.actor.id, ahead_m, left_m)
+    truths = Truths.of(made, after, None, "inserted")
+    return {"other": other, **figures(truths, before, shown(edited(scene, [edit])))}
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

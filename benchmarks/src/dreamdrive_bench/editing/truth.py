@@ -95,6 +95,13 @@ def inserted(
     return msgspec.structs.replace(layout, boxes=[*layout.boxes, new])
 
 
+def room_m(layout: Layout, times_s: Float[np.ndarray, " f"]) -> float:
+    """How near the last road user comes to another one or to the recording car, middle to middle."""
+    *others, new = (track_function(box.track)(times_s)[:, :2] for box in layout.boxes)
+    others.append(track_function(layout.ego.track)(times_s)[:, :2])
+    return min(float(np.linalg.norm(each - new, axis=1).min()) for each in others)
+
+
 def _turn(yaw_rad: float) -> Float[np.ndarray, "2 2"]:
     return np.array([[np.cos(yaw_rad), -np.sin(yaw_rad)], [np.sin(yaw_rad), np.cos(yaw_rad)]])
 
