@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
@@ -112,7 +112,7 @@ class Insert(_OfActor, frozen=True):
     @classmethod
     def from_folder(
         cls, other: Path, actor: int, ahead_m: float, left_m: float, at_s: float | None = None
-    ) -> Self:
+    ) -> "Insert":
         """Of the scene that is in a folder now, or in its ``scene``."""
         folder = other if (other / _INDEX).is_file() else other / "scene"
         return cls(actor, str(folder.resolve()), digest_of_scene(folder), ahead_m, left_m, at_s)

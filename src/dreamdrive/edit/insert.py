@@ -119,7 +119,7 @@ def _taken(
             replace(
                 rows,
                 means=torch.from_numpy(means).float(),
-                quaternions=multiply_quaternions(_quaternion(rigid), moved.quaternions),
+                quaternions=multiply_quaternions(_quaternion(rigid).expand(len(rows), 4), moved.quaternions),
                 log_scales=moved.log_scales,
                 sh=_turned(rows.sh, rigid, gain),
             )

@@ -102,11 +102,9 @@ class DeformationField(Motion):
     A Gaussian of an actor follows the actor's rigid track; the network adds the residual. A Gaussian of no
     actor (index -1) has the residual alone, which is the paper's formulation.
 
-    The heads start at zero, so the field starts as the identity (plus tracks). Deformable-3DGS leaves them at
-    the default initialisation and hides the first, random deformations behind 3000 steps of warm-up; a CPU
-    budget has no such steps to spare. Scale offsets are added to log-scales (as drivestudio does;
-    Deformable-3DGS adds them to the scales themselves, which can turn them negative). The network sees
-    detached means: the canonical means get gradients through the splat only.
+    The heads start at zero, so the field starts as the identity (plus tracks). Scale offsets are added to
+    log-scales (as drivestudio does; Deformable-3DGS adds them to the scales themselves, which can turn them
+    negative). The network sees detached means: the canonical means get gradients through the splat only.
 
     Attributes:
         config: The shape, to rebuild the field from its ``state_dict``.
@@ -143,7 +141,6 @@ class DeformationField(Motion):
         times_s = np.zeros(0) if tracks is None else tracks.times_s
         self.register_buffer("track_times_s", torch.tensor(times_s, dtype=torch.float64))
         self.register_buffer("track_pivot_m", _tensor(np.zeros((0, 3)) if tracks is None else tracks.pivot_m))
-        # Where there is none it is no part of what is stored.
         rigid = torch.arange(config.actors) >= config.actors - config.rigid if config.rigid else None
         self.register_buffer("track_rigid", rigid)
         self.track_translation = nn.Parameter(
@@ -219,10 +216,8 @@ class DeformationField(Motion):
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
-        A cubic through the key frames whose slopes are those of their neighbours (Catmull-Rom): between two
-        key frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off.
-        Before the first and after the last key frame the velocity there continues.
-        """
+        A cubic through the key frames (Catmull-Rom): a line would put a braking car centimetres off.
+        Before the first and after the last key frame the velocity there continues."""
         weights = self.track_yaw_rad.new_tensor(key_weights(self.track_times_s.tolist(), t_s))
         translation = torch.einsum("atk,t->ak", self.track_translation, weights)
         return translation, self.track_yaw_rad @ weights
@@ -315,22 +310,23 @@ class DeformationField(Motion):
         """See ``Motion``."""
         self._check_known(actor)
         rigid = self.track_rigid is not None and bool(self.track_rigid[actor])
-        rows = self.track_translation[actor], self.track_yaw_rad[actor]
-        return self._with_one_more(rows, self.track_pivot_m[actor], rigid)
+        return self._with_one_more(
+            (self.track_translation[actor], self.track_yaw_rad[actor]), self.track_pivot_m[actor], rigid
+        )
 
     @torch.no_grad()
     def adopted(self, track: Track) -> "tuple[DeformationField, int]":
         """See ``Motion``; without key frames so far, those are the times of the track."""
         base = self
         if not self.config.actors:
-            base = deepcopy(self)
+            base, count = deepcopy(self), len(track.times_s)
             base.track_times_s = torch.from_numpy(track.times_s).double()
-            base.config = replace(self.config, track_times=len(track.times_s), actors=1)
-            base.track_translation = nn.Parameter(self.centre_m.new_zeros(0, len(track.times_s), 3))
-            base.track_yaw_rad = nn.Parameter(self.centre_m.new_zeros(0, len(track.times_s)))
+            base.config = replace(self.config, track_times=count, actors=1)
+            base.track_translation = nn.Parameter(self.centre_m.new_zeros(0, count, 3))
+            base.track_yaw_rad = nn.Parameter(self.centre_m.new_zeros(0, count))
         keyed = track.at(base.track_times_s.numpy(force=True))
-        rows = (torch.from_numpy(each).to(self.centre_m) for each in (keyed.positions_m, keyed.yaw_rad))
-        return base._with_one_more(tuple(rows), torch.zeros_like(self.centre_m), True)
+        rows = [torch.from_numpy(each).to(self.centre_m) for each in (keyed.positions_m, keyed.yaw_rad)]
+        return base._with_one_more((rows[0], rows[1]), torch.zeros_like(self.centre_m), True)
 
     def _with_one_more(
         self, rows: tuple[Tensor, ...], pivot_m: Float[Tensor, "3"], rigid: bool
@@ -354,8 +350,8 @@ class DeformationField(Motion):
         """1 for Gaussians that have a residual, 0 for those of rigid actors; None where all have one."""
         if self.track_rigid is None:
             return None
-        rigid = self.track_rigid[actor.clamp(min=0)] & (actor >= 0)
-        return (~rigid).to(self.centre_m.dtype)[:, None]
+        bends = (actor < 0) | ~self.track_rigid[actor.clamp(min=0)]
+        return bends.to(self.centre_m.dtype)[:, None]
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""
