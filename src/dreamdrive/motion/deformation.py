@@ -182,7 +182,6 @@ class DeformationField(Motion):
     def _build_network(self) -> None:
         c = self.config
         inputs = 3 * (1 + 2 * c.position_frequencies) + 1 + 2 * c.time_frequencies
-        # The index of the layer that gets the encoded input again; short networks do without.
         self._skip = c.depth // 2 if c.depth >= 6 else None
         widths = [inputs] + [c.width + (inputs if i == self._skip else 0) for i in range(1, c.depth)]
         self.layers = nn.ModuleList(nn.Linear(width, c.width) for width in widths)
@@ -216,8 +215,8 @@ class DeformationField(Motion):
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
-        A cubic through the key frames (Catmull-Rom): a line would put a braking car centimetres off.
-        Before the first and after the last key frame the velocity there continues."""
+        A cubic through the key frames (Catmull-Rom); beyond them the velocity at the end continues.
+        """
         weights = self.track_yaw_rad.new_tensor(key_weights(self.track_times_s.tolist(), t_s))
         translation = torch.einsum("atk,t->ak", self.track_translation, weights)
         return translation, self.track_yaw_rad @ weights
