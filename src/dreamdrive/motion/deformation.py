@@ -354,9 +354,8 @@ class DeformationField(Motion):
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""
-        named = dict(self.named_parameters())
-        tracks = [named.pop(name) for name in ("track_translation", "track_yaw_rad")]
-        return {"network": list(named.values()), "tracks": tracks}
+        tracks = [self.track_translation, self.track_yaw_rad]
+        return {"network": [p for n, p in self.named_parameters() if "track_" not in n], "tracks": tracks}
 
     def _compiled_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         if gaussians.lifespan is not None and gaussians.lifespan.requires_grad:
