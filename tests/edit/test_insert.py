@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive.edit import Insert, Place, Remove, edited, inserted
+from dreamdrive.edit import Insert, Remove, SetPlace, edited, inserted
 from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.level import level_from_world
@@ -38,7 +38,7 @@ def own(scene: Scene, actor: int, t_s: float) -> Gaussians:
 
 
 def test_its_first_place_is_the_one_given(scene: Scene) -> None:
-    made = inserted(scene, scene, 0, Place(12.0, 3.0, 5.0))
+    made = inserted(scene, scene, 0, SetPlace(12.0, 3.0, 5.0))
     new, level = made.actors[-1], level_from_world(scene)
     assert (new.id, new.kind, len(made.actors)) == (2, "vehicle", 2)
     first = level[:3, :3] @ new.track.positions_m[0] + level[:3, 3]
@@ -49,14 +49,14 @@ def test_its_first_place_is_the_one_given(scene: Scene) -> None:
 
 
 def test_it_is_as_high_above_the_road_here_as_there(scene: Scene) -> None:
-    made = inserted(on_a_road(scene, 2.5), scene, 0, Place(12.0, 0.0))
+    made = inserted(on_a_road(scene, 2.5), scene, 0, SetPlace(12.0, 0.0))
     sunk = made.actors[-1].track.positions_m - scene.actor(0).track.positions_m
     np.testing.assert_allclose(sunk @ scene.up, -1.0)
 
 
 def test_it_looks_as_it_did_there(scene: Scene) -> None:
     """At the time of its Gaussians, which is when its track begins, moved by as much as its track."""
-    made = inserted(scene, scene, 0, Place(12.0, 3.0, 0.0))
+    made = inserted(scene, scene, 0, SetPlace(12.0, 3.0, 0.0))
     then, now = own(scene, 0, 0.0), own(made, 2, 0.0)
     by_m = made.actors[-1].track.positions_m[0] - scene.actor(0).track.positions_m[0]
     np.testing.assert_allclose(now.means.numpy() - then.means.numpy(), np.tile(by_m, (3, 1)), atol=1e-5)
@@ -67,7 +67,7 @@ def test_it_looks_as_it_did_there(scene: Scene) -> None:
 
 
 def test_what_was_there_moves_as_before(scene: Scene) -> None:
-    made = inserted(scene, scene, 0, Place(12.0, 3.0))
+    made = inserted(scene, scene, 0, SetPlace(12.0, 3.0))
     for actor in (-1, 0):
         torch.testing.assert_close(own(made, actor, 0.05).means, own(scene, actor, 0.05).means)
     assert torch.equal(edited(made, [Remove(2)]).dynamic.means, scene.dynamic.means)
@@ -75,7 +75,7 @@ def test_what_was_there_moves_as_before(scene: Scene) -> None:
 
 def test_a_street_in_which_nothing_moves_takes_it(scene: Scene, tmp_path: Path) -> None:
     bare = on_a_road(make_scene(dynamic=0, full=False))
-    made = inserted(bare, scene, 0, Place(12.0, 3.0, 0.0))
+    made = inserted(bare, scene, 0, SetPlace(12.0, 3.0, 0.0))
     assert [actor.id for actor in made.actors] == [0]
     by_m = made.actors[0].track.positions_m[0] - scene.actor(0).track.positions_m[0]
     there = own(scene, 0, 0.0).means.numpy() + by_m
@@ -96,7 +96,7 @@ def test_it_is_as_bright_as_the_road_here(scene: Scene) -> None:
         road = replace(scene.static.select(rows), means=flat, sh=colour, features=None)
         return replace(scene, static=road)
 
-    made = inserted(paved(0.3), paved(0.2), 0, Place(12.0, 3.0))
+    made = inserted(paved(0.3), paved(0.2), 0, SetPlace(12.0, 3.0))
     assert scene.dynamic.actor is not None
     was = scene.dynamic.sh[scene.dynamic.actor == 0]
     now = made.dynamic.sh[made.dynamic.actor == 2]
@@ -104,7 +104,7 @@ def test_it_is_as_bright_as_the_road_here(scene: Scene) -> None:
 
 
 def test_what_cannot_be_set_in_is_a_sentence(scene: Scene) -> None:
-    place = Place(10.0, 0.0)
+    place = SetPlace(10.0, 0.0)
     unknown = replace(scene, provenance=replace(scene.provenance, scale="none: nothing tells"))
     with pytest.raises(InputError, match="metres of the other scene are not known"):
         inserted(scene, unknown, 0, place)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         write_edited as write_edited,
     )
     from dreamdrive.edit.insert import (
-        Place as Place,
+        SetPlace as SetPlace,
         digest_of_scene as digest_of_scene,
         inserted as inserted,
     )

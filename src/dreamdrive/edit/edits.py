@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from dreamdrive.edit.behind import filled_behind
-from dreamdrive.edit.insert import Place, digest_of_scene, inserted
+from dreamdrive.edit.insert import SetPlace, digest_of_scene, inserted
 from dreamdrive.errors import InputError
 from dreamdrive.scene.scene import Scene
 from dreamdrive.stored import load_scene
@@ -126,7 +126,7 @@ class Insert(_OfActor, frozen=True):
             raise InputError(
                 f"insert {self.actor}: the scene in {folder} is another one than when this was said"
             )
-        return inserted(scene, load_scene(folder), self.actor, Place(self.ahead_m, self.left_m, self.at_s))
+        return inserted(scene, load_scene(folder), self.actor, SetPlace(self.ahead_m, self.left_m, self.at_s))
 
 
 Edit = Remove | Move | Turn | Delay | Speed | Copy | Recolour | Insert

@@ -24,7 +24,7 @@ _NO_METRES = "none"
 
 
 @dataclass(frozen=True)
-class Place:
+class SetPlace:
     """Where an actor is set: metres ahead of and to the left of the first camera, and when it is there.
 
     None is when the scene begins.
@@ -40,7 +40,7 @@ def digest_of_scene(folder: Path) -> str:
     return str(read_json(folder / "scene.json", follow=False).get("sha256", ""))
 
 
-def inserted(scene: Scene, other: Scene, id: int, place: Place) -> Scene:
+def inserted(scene: Scene, other: Scene, id: int, place: SetPlace) -> Scene:
     """The scene with an actor of another one, the last of its actors; its first place is the one given.
 
     It drives as it did there, its way turned from the direction of the first camera there to that of the one
@@ -72,7 +72,7 @@ def inserted(scene: Scene, other: Scene, id: int, place: Place) -> Scene:
     return scene.inserted(named, gaussians, motion)
 
 
-def _laid(scene: Scene, other: Scene, track: Track, place: Place, later_s: float) -> Track:
+def _laid(scene: Scene, other: Scene, track: Track, place: SetPlace, later_s: float) -> Track:
     """The track on the road of the scene, as high above it as above the one it was on."""
     here, there = level_from_world(scene), level_from_world(other)
     points = track.positions_m @ there[:3, :3].T + there[:3, 3]
