@@ -24,6 +24,7 @@ from dreamdrive.registry import MovedFinder, offer
 
 if TYPE_CHECKING:
     from dreamdrive.build import Given as Given, build_scene as build_scene
+    from dreamdrive.edit import edited as edited
     from dreamdrive.errors import InputError as InputError
     from dreamdrive.generate import generate as generate
     from dreamdrive.options import Options as Options

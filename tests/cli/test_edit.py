@@ -1,12 +1,14 @@
 """``dreamdrive edit`` and ``dreamdrive actors``."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import pytest
 
 from dreamdrive import load_scene
+from dreamdrive.scene.scene import Provenance
 from dreamdrive.stored import save_scene
 from tests.cli.conftest import Run
 from tests.cli.test_commands import driving
@@ -47,6 +49,8 @@ def test_a_scene_is_edited_edited_again_and_taken_back(run: Run, out: Path, tmp_
         (("--recolour", "0=red"), "--recolour 0=red: expected ID=#RRGGBB"),
         (("--remove", "9"), "remove 9: no actor 9; there are 0"),
         (("--speed", "0=-1"), "speed -1: expected a factor above 0"),
+        (("--insert", "b:1"), "--insert b:1: expected OTHER:ID@AHEAD,LEFT"),
+        (("--insert", "nothere:1@3,0"), "nothere does not exist"),
         (("--undo", "1"), "--undo needs --edits FILE"),
         (("--edits", "none.json"), "--edits none.json does not exist; expected edits.json"),
     ],
@@ -58,6 +62,23 @@ def test_one_message_and_exit_2(
     assert result.code == 2, result
     assert said in result.err
     assert not (tmp_path / "made").exists()
+
+
+def test_an_actor_of_another_scene_is_set_in(run: Run, out: Path, tmp_path: Path) -> None:
+    made = driving(make_scene(dynamic=9))
+    road = replace(made, provenance=Provenance(up=(0.0, -1.0, 0.0), camera_height_m=1.5))
+    for name in ("here", "there"):
+        save_scene(road, tmp_path / name)
+    here, one = tmp_path / "here", tmp_path / "one"
+    result = run("edit", here, "--insert", f"{tmp_path / 'there'}:0@12,-3,0.5", "-o", one)
+    assert result.code == 0, result
+    assert result.out.startswith("the new one is actor 2")
+    assert load_scene(tmp_path / "one" / "scene").actor(2).track.first_s == 0.5
+    kept = json.loads((tmp_path / "one" / "edits.json").read_text())["edits"][0]
+    assert (kept["kind"], kept["other"]) == ("insert", str(tmp_path / "there"))
+    without = run("edit", out, "--insert", f"{tmp_path / 'there'}:0@12,0", "-o", tmp_path / "two")
+    assert "does not know its road" in without.err
+    assert not (tmp_path / "two").exists()
 
 
 def test_edits_of_another_scene_are_refused(run: Run, out: Path, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Behind what is taken away stands the street: nothing that no frame saw, and no hole."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene
+from dreamdrive.stored import load_scene, save_scene
 
 CAMERA = Camera(40.0, 40.0, 24.0, 16.0, 48, 32)
 GREEN, RED, WHITE = (0.2, 0.6, 0.2), (0.8, 0.1, 0.1), (1.0, 1.0, 1.0)
@@ -71,7 +73,7 @@ def test_what_no_frame_saw_goes_with_what_hid_it(wall: Gaussians) -> None:
     np.testing.assert_allclose(middle(after), GREEN, atol=0.05)
 
 
-def test_a_hole_is_filled_from_around_it_where_it_is(wall: Gaussians) -> None:
+def test_a_hole_is_filled_from_around_it_where_it_is(wall: Gaussians, tmp_path: Path) -> None:
     off = wall.means[:, :2].abs().amax(dim=1) > 0.9
     before = scene(wall.select(off))
     assert middle(before.without(0)).max() < 0.35
@@ -80,6 +82,14 @@ def test_a_hole_is_filled_from_around_it_where_it_is(wall: Gaussians) -> None:
     added = after.static.means[after.static.means[:, :2].abs().amax(dim=1) < 0.8]
     assert len(added)
     assert (added[:, 2] - 10).abs().max() < 1
+    assert after.static.filled is not None
+    made_up = after.static.means[after.static.filled]
+    assert len(made_up)
+    assert made_up[:, :2].abs().max() < 1
+    save_scene(after, tmp_path / "scene")
+    read = load_scene(tmp_path / "scene").static.filled
+    assert read is not None
+    assert torch.equal(read, after.static.filled)
     edge = render_scene(after, CAMERA, 0.0).colour[:, :8] - render_scene(before, CAMERA, 0.0).colour[:, :8]
     assert edge.abs().max() < 1 / 255
 

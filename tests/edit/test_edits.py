@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from dreamdrive.edit import Copy, Delay, Move, Recolour, Remove, Speed, Turn, edited
+from dreamdrive.edit import Copy, Delay, Edit, Move, Recolour, Remove, Speed, Turn, edited
 from dreamdrive.errors import InputError
 from dreamdrive.scene.gaussians import SH_C0
 from dreamdrive.scene.scene import Scene
@@ -51,6 +51,22 @@ def test_it_moves_as_it_points_and_nothing_else_does(scene: Scene) -> None:
     assert scene.moved(0, left_m=3.0).moved(0, left_m=-3.0).actor(0).track.positions_m == pytest.approx(
         scene.actor(0).track.positions_m
     )
+
+
+@pytest.mark.parametrize("nothing", [Move(0, 0.0, 0.0), Turn(0, 0.0), Delay(0, 0.0), Speed(0, 1.0)])
+def test_an_edit_by_nothing_is_nothing(scene: Scene, nothing: Edit) -> None:
+    made = edited(scene, [nothing])
+    for t_s in (0.0, T_S, 0.7):
+        for name, values in scene.at(t_s).tensors().items():
+            assert torch.equal(values, made.at(t_s).tensors()[name])
+    np.testing.assert_array_equal(made.actor(0).track.positions_m, scene.actor(0).track.positions_m)
+
+
+def test_between_key_frames_its_path_keeps_its_shape(scene: Scene) -> None:
+    """The recorded track has two points; the motion bends between them."""
+    moved = scene.moved(0, 3.0, -1.0)
+    shifts = [middle(moved, 0, t_s) - middle(scene, 0, t_s) for t_s in (0.0, 0.2, 0.4, 0.9)]
+    np.testing.assert_allclose(shifts, [shifts[0]] * 4, atol=1e-5)
 
 
 def test_it_turns_about_its_own_place(scene: Scene) -> None:
@@ -119,6 +135,8 @@ def test_it_is_painted_and_its_shades_stay(scene: Scene) -> None:
 def test_what_cannot_be_done_is_a_sentence(scene: Scene) -> None:
     with pytest.raises(InputError, match=r"^turn 7: no actor 7; there are 0$"):
         edited(scene, [Move(0, 1.0, 0.0), Turn(7, 9.0)])
+    with pytest.raises(InputError, match=r"^remove 0: no actor 0; there are none$"):
+        edited(make_scene(dynamic=0, full=False), [Remove(0)])
     bare = replace(scene.actor(0), box=None)
     with pytest.raises(InputError, match=r"^move 0: nothing tells where actor 0 points"):
         edited(replace(scene, actors=(bare,)), [Move(0, 1.0, 0.0)])

@@ -13,6 +13,7 @@ from dreamdrive.edit import (
     Delay,
     Edit,
     Edits,
+    Insert,
     Move,
     Recolour,
     Remove,
@@ -34,6 +35,7 @@ any_edit: st.SearchStrategy[Edit] = st.one_of(
     st.builds(Delay, ids, metres),
     st.builds(Speed, ids, st.floats(0.01, 100)),
     st.builds(Copy, ids, metres, metres),
+    st.builds(Insert, ids, st.text(max_size=9), st.text(max_size=9), metres, metres, st.none() | metres),
     st.builds(Recolour, ids, st.tuples(share, share, share)),
 )
 

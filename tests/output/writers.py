@@ -1,7 +1,7 @@
 """All commands that write, delete or replace, and small inputs for them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -10,6 +10,7 @@ from dreamdrive.datasets.lidar_file import read_points
 from dreamdrive.export import write_ply
 from dreamdrive.export.nuscenes.writer import write_nuscenes
 from dreamdrive.prior.vista.kinds import SVD, VISTA
+from dreamdrive.scene.scene import Provenance
 from dreamdrive.stored import save_scene
 from dreamdrive.street_network.network import StreetNetwork
 from dreamdrive.street_network.weights import Training, write_network
@@ -59,6 +60,7 @@ WRITERS = {
     "render npz": Writer("render IN/scene --trajectory stop --fps 5 --format npz -o OUT"),
     "actors": Writer("actors IN/scene -o OUT", ".png"),
     "edit": Writer("edit IN/scene --move 0=0,1 --copy 0=2,0 -o OUT", "", _FORCE),
+    "edit insert": Writer("edit IN/scene --insert IN/scene:0@9,0 -o OUT", "", _FORCE),
     "plan": Writer("plan IN/run -o OUT", force=_FORCE),
     "export ply file": Writer("export IN/scene --to ply -o OUT", ".ply", _FORCE),
     "export ply": Writer("export IN/scene --to ply -o OUT", "", _FORCE),
@@ -125,7 +127,9 @@ _INPUTS = (
 
 def make_inputs(folder: Path, run: Callable[[list[str]], Came]) -> None:
     """All that the commands read."""
-    save_scene(driving(make_scene()), folder / "scene")
+    made = driving(make_scene())
+    known = Provenance(up=(0.0, -1.0, 0.0), camera_height_m=1.5)
+    save_scene(replace(made, provenance=known), folder / "scene")
     write_ply(make_scene().static, folder / "splats.ply")
     logs = [log(folder / "pictures of a log" / name, name) for name in ("scene-0001", "scene-0002")]
     write_nuscenes(logs, folder / "set", read_points)

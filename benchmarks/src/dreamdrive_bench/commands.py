@@ -17,6 +17,7 @@ COMMANDS = {
     "cuts": "cuts.main",
     "devkit": "devkit.main",
     "drives": "drives.main",
+    "editing": "editing.main",
     "environment": "environment",
     "evaluate": "evaluate",
     "filling": "photo.filling",

@@ -1,11 +1,11 @@
-"""``dreamdrive edit``: a scene with its actors removed, moved, turned, delayed, copied or painted."""
+"""``dreamdrive edit``: a scene with its actors removed, moved, turned, copied or painted, or with more."""
 
-from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from rich.console import Console
-from tyro.conf import Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.errors import InputError
@@ -17,21 +17,42 @@ if TYPE_CHECKING:
     from dreamdrive.edit import Edit, Edits
 
 _NOTHING = "there is nothing to change; give --remove ID, --move ID=AHEAD,LEFT or another edit"
+_PLACE = "OTHER:ID@AHEAD,LEFT or OTHER:ID@AHEAD,LEFT,SECONDS, such as runs/b:3@15,0"
 _Ids = UseAppendAction[tuple[int, ...]]
 _Words = UseAppendAction[tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class ChangeFlags:
+    """What is changed, in the order in which it is made.
+
+    Attributes:
+        remove: Leave it out.
+        move: So many metres ahead of and to the left of where it is, as it points; negative is behind, right.
+        turn: Turned to the left where it is.
+        delay: Later, or earlier where negative.
+        speed: So many times as fast.
+        copy: A second one, elsewhere as move has it; its id is printed.
+        recolour: In one colour.
+        insert: An actor of the scene in the folder OTHER, metres ahead of and to the left of the first camera
+            at its first time, else when the scene begins; its id is printed.
+    """
+
+    remove: Annotated[_Ids, arg(metavar="ID", help_behavior_hint="")] = ()
+    move: Annotated[_Words, arg(metavar="ID=AHEAD,LEFT", help_behavior_hint="")] = ()
+    turn: Annotated[_Words, arg(metavar="ID=DEGREES", help_behavior_hint="")] = ()
+    delay: Annotated[_Words, arg(metavar="ID=SECONDS", help_behavior_hint="")] = ()
+    speed: Annotated[_Words, arg(metavar="ID=FACTOR", help_behavior_hint="")] = ()
+    copy: Annotated[_Words, arg(metavar="ID=AHEAD,LEFT", help_behavior_hint="")] = ()
+    recolour: Annotated[_Words, arg(metavar="ID=#RRGGBB", help_behavior_hint="")] = ()
+    insert: Annotated[_Words, arg(metavar="OTHER:ID@PLACE", help_behavior_hint="")] = ()
 
 
 def edit(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
     output: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
-    remove: Annotated[_Ids, arg(metavar="ID", help_behavior_hint="")] = (),
-    move: Annotated[_Words, arg(metavar="ID=AHEAD,LEFT", help_behavior_hint="")] = (),
-    turn: Annotated[_Words, arg(metavar="ID=DEGREES", help_behavior_hint="")] = (),
-    delay: Annotated[_Words, arg(metavar="ID=SECONDS", help_behavior_hint="")] = (),
-    speed: Annotated[_Words, arg(metavar="ID=FACTOR", help_behavior_hint="")] = (),
-    copy: Annotated[_Words, arg(metavar="ID=AHEAD,LEFT", help_behavior_hint="")] = (),
-    recolour: Annotated[_Words, arg(metavar="ID=#RRGGBB", help_behavior_hint="")] = (),
+    change: OmitArgPrefixes[ChangeFlags] = ChangeFlags(),
     edits: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     undo: Annotated[int, arg(metavar="N")] = 0,
     force: bool = False,
@@ -44,21 +65,15 @@ def edit(
     Args:
         out: The folder that generate wrote.
         output: Folder of the edited scene.
-        remove: Leave it out.
-        move: So many metres ahead of and to the left of where it is, as it points; negative is behind, right.
-        turn: Turned to the left where it is.
-        delay: Later, or earlier where negative.
-        speed: So many times as fast.
-        copy: A second one, elsewhere as move has it; its id is printed.
-        recolour: In one colour.
+        change: What is changed.
         edits: Make those of this file first: edits.json of an edited scene.
         undo: Leave out so many of its last ones.
         force: Replace an edited scene that is there.
     """
     check_there(out, SCENE)
     check_given(edits=edits)
-    told = _told(remove, move, turn, delay, speed, copy, recolour)
-    if not told and edits is None and not undo:
+    told, insert = _told(change), [_of_other(word) for word in change.insert]
+    if not told and not insert and edits is None and not undo:
         raise InputError(_NOTHING)
     check_place(output, out)
     check_free(output, force, EDITED_KIND)
@@ -66,6 +81,7 @@ def edit(
 
     before = _before(out, edits, undo)
     new = tuple(cast("Edit", getattr(package, name)(*values)) for name, values in told)
+    new += tuple(package.Insert.from_folder(*values) for values in insert)
     if not new and not before.edits:
         raise InputError(_NOTHING)
     scene = open_scene(out)
@@ -78,32 +94,40 @@ def edit(
     console.print(str(output))
 
 
-def _told(
-    remove: Iterable[int],
-    move: Iterable[str],
-    turn: Iterable[str],
-    delay: Iterable[str],
-    speed: Iterable[str],
-    copy: Iterable[str],
-    recolour: Iterable[str],
-) -> list[tuple[str, tuple[Any, ...]]]:
-    """The edits of the flags in their order: the name of each, and what it takes."""
+def _told(change: ChangeFlags) -> list[tuple[str, tuple[Any, ...]]]:
+    """The edits of this scene's actors in their order: the name of each, and what it takes."""
     several = {
-        "Move": (move, 2),
-        "Turn": (turn, 1),
-        "Delay": (delay, 1),
-        "Speed": (speed, 1),
-        "Copy": (copy, 2),
+        "Move": (change.move, 2),
+        "Turn": (change.turn, 1),
+        "Delay": (change.delay, 1),
+        "Speed": (change.speed, 1),
+        "Copy": (change.copy, 2),
     }
     return [
-        *(("Remove", (id,)) for id in remove),
+        *(("Remove", (id,)) for id in change.remove),
         *(
             (name, _numbers(f"--{name.lower()}", word, count))
             for name, (words, count) in several.items()
             for word in words
         ),
-        *(("Recolour", _colour(word)) for word in recolour),
+        *(("Recolour", _colour(word)) for word in change.recolour),
     ]
+
+
+def _of_other(word: str) -> tuple[Any, ...]:
+    """A folder, an id and a place of ``--insert``; the folder is there and holds a scene."""
+    name, _, rest = word.rpartition("@")
+    folder, _, id = name.rpartition(":")
+    try:
+        place = [float(part) for part in rest.split(",")]
+    except ValueError:
+        place = []
+    if not folder or not id.isdecimal() or len(place) not in (2, 3):
+        raise InputError(f"--insert {word}: expected {_PLACE}")
+    check_there(Path(folder), SCENE)
+    if not any((Path(folder) / inner).is_file() for inner in ("scene.json", "scene/scene.json")):
+        raise InputError(f"--insert {word}: {folder} holds no scene; expected {SCENE}")
+    return Path(folder), int(id), *place
 
 
 def _before(out: Path, file: Path | None, undo: int) -> "Edits":

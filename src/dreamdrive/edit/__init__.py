@@ -9,6 +9,7 @@ if TYPE_CHECKING:
         Copy as Copy,
         Delay as Delay,
         Edit as Edit,
+        Insert as Insert,
         Move as Move,
         Recolour as Recolour,
         Remove as Remove,
@@ -19,9 +20,13 @@ if TYPE_CHECKING:
     from dreamdrive.edit.edits_file import (
         EDITS as EDITS,
         Edits as Edits,
-        digest_of_scene as digest_of_scene,
         read_edits as read_edits,
         write_edited as write_edited,
+    )
+    from dreamdrive.edit.insert import (
+        SetPlace as SetPlace,
+        digest_of_scene as digest_of_scene,
+        inserted as inserted,
     )
 
 __all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

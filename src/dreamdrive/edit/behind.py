@@ -1,7 +1,7 @@
 """The street behind what is taken away: what no frame saw of it goes, and holes are filled from around."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import cv2
 import numpy as np
@@ -10,16 +10,13 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from dreamdrive.compute.threads import one_torch_thread
+from dreamdrive.edit.shadow import LEAST_WEIGHT, UNSEEN, shade_of, without_shade
+from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import moment_of, render, render_scene
 
-UNSEEN = 0.1
-"""Share of what a Gaussian adds to the recorded views with the actor away that it added with it there, below
-which no frame has seen it: it is what the fit put behind the actor."""
-LEAST_WEIGHT = 0.05
-"""Of a Gaussian in any view, in pixels: fainter ones are no matter."""
 HOLE_ALPHA, COVERED_ALPHA = 0.4, 0.1
 """Pixels with less of the street are a hole where the actor covered that much of them."""
 VIEWS = 6
@@ -33,12 +30,18 @@ def filled_behind(before: Scene, after: Scene) -> Scene:
 
     Only the recorded views tell where something was hidden. Of what never moved, Gaussians that all of them
     saw through the actors alone are taken out; what then is a hole in a view is filled with colours and
-    depths from beside it (colours by Telea 2004), at its place in space.
+    depths from beside it (colours by Telea 2004), at its place in space, and marked as filled. The shadow of
+    who leaves is taken off, as far as it lies on road that no frame saw in the light.
     """
+    leave = [actor for actor in before.actors if _leaves(actor, after)]
+    if not leave:
+        return after
     views = [i for i in before.front.tolist() if not before.held_out[i]]
-    unseen = _unseen(before, after, views)
-    static = after.static.select(torch.nonzero(~unseen).squeeze(1))
-    made = replace(after, static=static)
+    there, away = (torch.stack([_weights(s, before, view) for view in views]) for s in (before, after))
+    best = away.amax(dim=0)
+    made = _lit(before, after, leave, views, there, best)
+    unseen = (best > LEAST_WEIGHT) & (there.amax(dim=0) < UNSEEN * best)
+    made = replace(made, static=made.static.select(torch.nonzero(~unseen).squeeze(1)))
     chosen = views[:: max(1, len(views) // VIEWS)]
     for view in chosen[::-1]:  # from the last on: it is the nearest to what lies behind
         added = _fill(before, made, view)
@@ -47,19 +50,35 @@ def filled_behind(before: Scene, after: Scene) -> Scene:
     return made
 
 
-def _unseen(before: Scene, after: Scene, views: Sequence[int]) -> Bool[Tensor, " n"]:
-    """What of the static Gaussians shows with the actors away, and showed in no view with them there."""
-    count = len(before.static)
-    there, away = torch.zeros(count), torch.zeros(count)
-    for view in views:
-        camera, t_s = before.cameras[view], float(before.times_s[view])
-        there = torch.maximum(there, _weights(before, camera, t_s))
-        away = torch.maximum(away, _weights(after, camera, t_s))
-    return (away > LEAST_WEIGHT) & (there < UNSEEN * away)
+def _leaves(actor: Actor, after: Scene) -> bool:
+    """Whether an actor is not, at all times, where it was."""
+    for other in after.actors:
+        if other.id == actor.id:
+            then, now = actor.track, other.track
+            pairs = ((getattr(then, f.name), getattr(now, f.name)) for f in fields(then))
+            return not all(np.array_equal(a, b) for a, b in pairs)
+    return True
 
 
-def _weights(scene: Scene, camera: Camera, t_s: float) -> Float[Tensor, " n"]:
+def _lit(
+    before: Scene,
+    after: Scene,
+    leave: Sequence[Actor],
+    views: Sequence[int],
+    seen: Float[Tensor, "v n"],
+    most: Float[Tensor, " n"],
+) -> Scene:
+    """``after`` with the shadows of those who leave off the road; without a box none is found."""
+    made, times_s = after, before.times_s[list(views)].tolist()
+    for actor in leave:
+        shade = None if actor.box is None else shade_of(before, actor, times_s, seen, most)
+        made = made if shade is None else without_shade(made, shade)
+    return made
+
+
+def _weights(scene: Scene, recorded: Scene, view: int) -> Float[Tensor, " n"]:
     """What each static Gaussian adds to a view, in pixels: the gradient of a channel that all share."""
+    camera, t_s = recorded.cameras[view], float(recorded.times_s[view])
     gaussians, _ = moment_of(scene, t_s)
     with torch.enable_grad():
         ones = torch.ones(len(gaussians), 1, requires_grad=True)
@@ -114,4 +133,5 @@ def _surface(
         logit_opacities=torch.full((count,), 3.0),
         sh=((torch.from_numpy(colours).float() - 0.5) / SH_C0)[:, None],
         source_frame=torch.full((count,), view, dtype=torch.int64),
+        filled=torch.ones(count, dtype=torch.bool),
     )

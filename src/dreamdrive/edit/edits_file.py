@@ -49,11 +49,6 @@ class _Stored(msgspec.Struct, frozen=True):
     edits: list[Edit]
 
 
-def digest_of_scene(folder: Path) -> str:
-    """What tells the scene in a folder from any other: the checksum of its index."""
-    return str(read_json(folder / "scene.json", follow=False).get("sha256", ""))
-
-
 def read_edits(file: Path) -> Edits:
     """The edits in a file; ``InputError`` where it holds none."""
     values = read_json(file)

@@ -27,6 +27,7 @@ class DeformationConfig(MotionConfig):
         time_frequencies: Octaves of the encoding of the normalised time.
         actors: Actors with a rigid track; 0 for none.
         track_times: Key frames of each track; 0 for none.
+        rigid: How many of the actors follow their track alone, with no residual: those of other scenes.
     """
 
     depth: int = 4
@@ -35,12 +36,15 @@ class DeformationConfig(MotionConfig):
     time_frequencies: int = 6
     actors: int = 0
     track_times: int = 0
+    rigid: int = 0
 
     def __post_init__(self) -> None:
         if self.depth < 1 or self.width < 1 or min(self.position_frequencies, self.time_frequencies) < 0:
             raise ValueError(f"deformation: expected depth, width >= 1 and frequencies >= 0, got {self}")
         if self.actors < 0 or (self.actors == 0) != (self.track_times == 0):
             raise ValueError(f"deformation: {self.actors} actors with {self.track_times} key frames")
+        if not 0 <= self.rigid <= self.actors:
+            raise ValueError(f"deformation: {self.rigid} of {self.actors} actors are rigid")
 
 
 @dataclass(frozen=True)
@@ -98,11 +102,9 @@ class DeformationField(Motion):
     A Gaussian of an actor follows the actor's rigid track; the network adds the residual. A Gaussian of no
     actor (index -1) has the residual alone, which is the paper's formulation.
 
-    The heads start at zero, so the field starts as the identity (plus tracks). Deformable-3DGS leaves them at
-    the default initialisation and hides the first, random deformations behind 3000 steps of warm-up; a CPU
-    budget has no such steps to spare. Scale offsets are added to log-scales (as drivestudio does;
-    Deformable-3DGS adds them to the scales themselves, which can turn them negative). The network sees
-    detached means: the canonical means get gradients through the splat only.
+    The heads start at zero, so the field starts as the identity (plus tracks). Scale offsets are added to
+    log-scales (as drivestudio does; Deformable-3DGS adds them to the scales themselves, which can turn them
+    negative). The network sees detached means: the canonical means get gradients through the splat only.
 
     Attributes:
         config: The shape, to rebuild the field from its ``state_dict``.
@@ -119,6 +121,7 @@ class DeformationField(Motion):
     up: Tensor
     track_times_s: Tensor
     track_pivot_m: Tensor
+    track_rigid: Tensor | None
 
     def __init__(
         self, config: DeformationConfig, domain: Domain, tracks: Tracks | None = None, seed: int = 0
@@ -138,6 +141,8 @@ class DeformationField(Motion):
         times_s = np.zeros(0) if tracks is None else tracks.times_s
         self.register_buffer("track_times_s", torch.tensor(times_s, dtype=torch.float64))
         self.register_buffer("track_pivot_m", _tensor(np.zeros((0, 3)) if tracks is None else tracks.pivot_m))
+        rigid = torch.arange(config.actors) >= config.actors - config.rigid if config.rigid else None
+        self.register_buffer("track_rigid", rigid)
         self.track_translation = nn.Parameter(
             _tensor(np.zeros((0, 0, 3)) if tracks is None else tracks.translation_m)
         )
@@ -177,7 +182,6 @@ class DeformationField(Motion):
     def _build_network(self) -> None:
         c = self.config
         inputs = 3 * (1 + 2 * c.position_frequencies) + 1 + 2 * c.time_frequencies
-        # The index of the layer that gets the encoded input again; short networks do without.
         self._skip = c.depth // 2 if c.depth >= 6 else None
         widths = [inputs] + [c.width + (inputs if i == self._skip else 0) for i in range(1, c.depth)]
         self.layers = nn.ModuleList(nn.Linear(width, c.width) for width in widths)
@@ -211,9 +215,7 @@ class DeformationField(Motion):
     def pose(self, t_s: float) -> tuple[Float[Tensor, "a 3"], Float[Tensor, " a"]]:
         """Translation (A, 3) in metres and yaw (A,) in radians of every track at ``t_s``.
 
-        A cubic through the key frames whose slopes are those of their neighbours (Catmull-Rom): between two
-        key frames 0.4 s apart, a straight line would put a car that brakes at 2 m/s^2 four centimetres off.
-        Before the first and after the last key frame the velocity there continues.
+        A cubic through the key frames (Catmull-Rom); beyond them the velocity at the end continues.
         """
         weights = self.track_yaw_rad.new_tensor(key_weights(self.track_times_s.tolist(), t_s))
         translation = torch.einsum("atk,t->ak", self.track_translation, weights)
@@ -237,6 +239,10 @@ class DeformationField(Motion):
         offsets = self.residual(means, t_s)
         if actor is None or self.config.actors == 0:
             return offsets
+        if (bends := self._bends(actor)) is not None:
+            offsets = Offsets(
+                *(bends * each for each in (offsets.mean_m, offsets.quaternion, offsets.log_scale))
+            )
         member = (actor >= 0).to(means.dtype)[:, None]
         index = actor.clamp(min=0)
         translation, yaw_rad = self.pose(t_s)
@@ -282,8 +288,7 @@ class DeformationField(Motion):
     @torch.no_grad()
     def steered(self, actor: int, track: Track) -> "DeformationField":
         """See ``Motion``; key frames keep their times."""
-        if not 0 <= actor < self.config.actors:
-            raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
+        self._check_known(actor)
         copy, keyed = deepcopy(self), track.at(self.track_times_s.numpy(force=True))
         pivot_m = self.track_pivot_m[actor].double().numpy(force=True)
         copy.track_translation[actor] = torch.from_numpy(keyed.positions_m - pivot_m).to(self.centre_m)
@@ -291,23 +296,66 @@ class DeformationField(Motion):
         return copy
 
     @torch.no_grad()
+    def shifted(self, actor: int, by_m: Float[np.ndarray, "3"], turn_rad: float) -> "DeformationField":
+        """See ``Motion``."""
+        self._check_known(actor)
+        copy = deepcopy(self)
+        copy.track_translation[actor] += torch.from_numpy(by_m).to(self.centre_m)
+        copy.track_yaw_rad[actor] += turn_rad
+        return copy
+
+    @torch.no_grad()
     def copied(self, actor: int) -> "tuple[DeformationField, int]":
         """See ``Motion``."""
+        self._check_known(actor)
+        rigid = self.track_rigid is not None and bool(self.track_rigid[actor])
+        return self._with_one_more(
+            (self.track_translation[actor], self.track_yaw_rad[actor]), self.track_pivot_m[actor], rigid
+        )
+
+    @torch.no_grad()
+    def adopted(self, track: Track) -> "tuple[DeformationField, int]":
+        """See ``Motion``; without key frames so far, those are the times of the track."""
+        base = self
+        if not self.config.actors:
+            base, count = deepcopy(self), len(track.times_s)
+            base.track_times_s = torch.from_numpy(track.times_s).double()
+            base.config = replace(self.config, track_times=count, actors=1)
+            base.track_translation = nn.Parameter(self.centre_m.new_zeros(0, count, 3))
+            base.track_yaw_rad = nn.Parameter(self.centre_m.new_zeros(0, count))
+        keyed = track.at(base.track_times_s.numpy(force=True))
+        rows = [torch.from_numpy(each).to(self.centre_m) for each in (keyed.positions_m, keyed.yaw_rad)]
+        return base._with_one_more((rows[0], rows[1]), torch.zeros_like(self.centre_m), True)
+
+    def _with_one_more(
+        self, rows: tuple[Tensor, ...], pivot_m: Float[Tensor, "3"], rigid: bool
+    ) -> "tuple[DeformationField, int]":
+        """A copy with one actor more, on key frames of translation and yaw."""
+        copy, new = deepcopy(self), len(self.track_pivot_m)
+        copy.config = replace(self.config, actors=new + 1, rigid=self.config.rigid + rigid)
+        copy.track_pivot_m = torch.cat([self.track_pivot_m, pivot_m[None]])
+        if copy.config.rigid:
+            known = torch.zeros(new, dtype=torch.bool) if self.track_rigid is None else self.track_rigid
+            copy.track_rigid = torch.cat([known, torch.tensor([rigid])])
+        for name, row in zip(("track_translation", "track_yaw_rad"), rows, strict=True):
+            setattr(copy, name, nn.Parameter(torch.cat([getattr(self, name), row[None]])))
+        return copy.requires_grad_(False), new
+
+    def _check_known(self, actor: int) -> None:
         if not 0 <= actor < self.config.actors:
             raise ValueError(f"motion: no actor {actor} among the {self.config.actors} with a track")
-        copy = deepcopy(self)
-        copy.config = replace(self.config, actors=self.config.actors + 1)
-        copy.track_pivot_m = torch.cat([self.track_pivot_m, self.track_pivot_m[actor, None]])
-        for name in ("track_translation", "track_yaw_rad"):
-            rows = getattr(self, name)
-            setattr(copy, name, nn.Parameter(torch.cat([rows, rows[actor, None]])))
-        return copy, self.config.actors
+
+    def _bends(self, actor: Int[Tensor, " n"]) -> Float[Tensor, "n 1"] | None:
+        """1 for Gaussians that have a residual, 0 for those of rigid actors; None where all have one."""
+        if self.track_rigid is None:
+            return None
+        bends = (actor < 0) | ~self.track_rigid[actor.clamp(min=0)]
+        return bends.to(self.centre_m.dtype)[:, None]
 
     def groups(self) -> dict[str, list[nn.Parameter]]:
         """The network and the tracks, which learn at different rates."""
-        named = dict(self.named_parameters())
-        tracks = [named.pop(name) for name in ("track_translation", "track_yaw_rad")]
-        return {"network": list(named.values()), "tracks": tracks}
+        tracks = [self.track_translation, self.track_yaw_rad]
+        return {"network": [p for n, p in self.named_parameters() if "track_" not in n], "tracks": tracks}
 
     def _compiled_at(self, gaussians: Gaussians, t_s: float) -> Gaussians:
         if gaussians.lifespan is not None and gaussians.lifespan.requires_grad:
@@ -322,6 +370,8 @@ class DeformationField(Motion):
             self._skip,
             [tensor for layer in self._dense() for tensor in (layer.weight, layer.bias)],
         )
+        if gaussians.actor is not None and (bends := self._bends(gaussians.actor)) is not None:
+            residual = bends * residual
         means, quaternions, log_scales, logits = posed(
             (gaussians.means, gaussians.quaternions, gaussians.log_scales, gaussians.logit_opacities),
             residual,

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -118,6 +119,24 @@ class Motion(nn.Module, ABC):
 
         Raises:
             ValueError: It knows no tracks, or none of this actor.
+        """
+        raise ValueError(f"motion: {self.kind} knows no tracks of actors")
+
+    def shifted(self, actor: int, by_m: Float[np.ndarray, "3"], turn_rad: float) -> "Motion":
+        """A copy in which an actor is elsewhere and turned, on a path of the same shape.
+
+        Raises:
+            ValueError: It knows no tracks, or none of this actor.
+        """
+        raise ValueError(f"motion: {self.kind} knows no tracks of actors")
+
+    def adopted(self, track: Track) -> "tuple[Motion, int]":
+        """A copy with one actor more, which follows a track and is rigid, and its index.
+
+        In its canonical place the middle of its bottom is the origin.
+
+        Raises:
+            ValueError: It knows no tracks.
         """
         raise ValueError(f"motion: {self.kind} knows no tracks of actors")
 

@@ -4,12 +4,14 @@ import math
 from dataclasses import dataclass, fields, replace
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from dreamdrive.scene.camera import FARTHEST_M
 
 SH_C0 = 0.28209479177387814
+_ALWAYS_S = 1e9
+"""Standard deviation of a life span that never ends."""
 _LENGTHS = 1e-6, 1e6
 """Of quaternions; those of fits stay between 0.1 and 100."""
 _MOST_LOG_SCALE, _BRIGHTEST, _LATEST_S = 40.0, 1e6, 1e10
@@ -33,6 +35,7 @@ class Gaussians:
         actor: Index of the actor each belongs to (N,), or None.
         velocity: Velocity at the centre of the life span in m/s (N, 3), of a ``Vibration`` or of a per-frame
             street; or None.
+        filled: Which were put where no frame saw anything (N,), as a guess from around; None where none was.
     """
 
     means: Float[Tensor, "n 3"]
@@ -45,6 +48,7 @@ class Gaussians:
     lifespan: Float[Tensor, "n 2"] | None = None
     actor: Int[Tensor, " n"] | None = None
     velocity: Float[Tensor, "n 3"] | None = None
+    filled: Bool[Tensor, " n"] | None = None
 
     def __post_init__(self) -> None:
         if self.sh.shape[1] not in (1, 4, 9, 16):
@@ -130,6 +134,28 @@ class Gaussians:
             )
         away_s = t_s - self.lifespan[:, :1]
         return replace(self, means=self.means + away_s * self.velocity, velocity=None).faded_at(t_s)
+
+    def and_more(self, more: "Gaussians") -> "Gaussians":
+        """These and others; what one side lacks it gets as nothing: no actor, not filled in, always there.
+
+        Features are those of these, and 0 for the others; the fewer coefficients of colour are filled with 0.
+        """
+        coefficients = max(self.sh.shape[1], more.sh.shape[1])
+        named = set(self.tensors()) | set(replace(more, features=None).tensors())
+        made = []
+        for part in (self, replace(more, features=None)):
+            like, count = self.means, len(part)
+            nothing = {
+                "features": None if self.features is None else like.new_zeros(count, self.features.shape[1]),
+                "lifespan": like.new_tensor([[0.0, _ALWAYS_S]]).repeat(count, 1),
+                "actor": torch.full((count,), -1, dtype=torch.int64),
+                "velocity": like.new_zeros(count, 3),
+                "filled": torch.zeros(count, dtype=torch.bool),
+            }
+            given = {name: nothing[name] for name in named - set(part.tensors())}
+            wide = torch.nn.functional.pad(part.sh, (0, 0, 0, coefficients - part.sh.shape[1]))
+            made.append(replace(part, sh=wide, **given))
+        return Gaussians.concatenate(*made)
 
     @staticmethod
     def concatenate(*parts: "Gaussians") -> "Gaussians":

@@ -45,6 +45,14 @@ class SceneMotion(Protocol):
         """A copy with one actor more that moves as this one, and its index; ``ValueError`` likewise."""
         ...
 
+    def shifted(self, actor: int, by_m: Float[np.ndarray, "3"], turn_rad: float) -> "SceneMotion":
+        """A copy in which an actor is elsewhere and turned, its path of the same shape; likewise."""
+        ...
+
+    def adopted(self, track: Track) -> "tuple[SceneMotion, int]":
+        """A copy with a rigid actor more, canonically at the origin, on a track, and its index; likewise."""
+        ...
+
     def state_dict(self) -> dict[str, Tensor]:
         """What it has learned, by name."""
         ...
@@ -173,18 +181,16 @@ class Scene:
         ahead = actor.ahead(up)
         if ahead is None:
             raise ValueError(f"nothing tells where {actor.name} points: it has no box and hardly moves")
-        shift = ahead_m * ahead + left_m * np.cross(up, ahead)
-        return self._retimed(actor, replace(actor.track, positions_m=actor.track.positions_m + shift))
+        return self._shifted(actor, ahead_m * ahead + left_m * np.cross(up, ahead), 0.0)
 
     def turned(self, id: int, degrees: float) -> "Scene":
         """The scene with an actor turned to the left on its track; ``ValueError``: see ``with_track``."""
-        actor = self.actor(id)
-        return self._retimed(actor, replace(actor.track, yaw_rad=actor.track.yaw_rad + np.deg2rad(degrees)))
+        return self._shifted(self.actor(id), np.zeros(3), float(np.deg2rad(degrees)))
 
     def delayed(self, id: int, seconds: float) -> "Scene":
         """The scene with an actor that comes later, or earlier; ``ValueError``: see ``with_track``."""
         actor = self.actor(id)
-        return self._retimed(actor, replace(actor.track, times_s=actor.track.times_s + seconds), seconds)
+        return self._retimed(actor, replace(actor.track, times_s=actor.track.times_s + seconds), seconds, 1.0)
 
     def with_speed(self, id: int, factor: float) -> "Scene":
         """The scene with an actor so many times as fast from its first time on.
@@ -197,7 +203,7 @@ class Scene:
         actor = self.actor(id)
         first_s = actor.track.first_s
         times_s = first_s + (actor.track.times_s - first_s) / factor
-        return self._retimed(actor, replace(actor.track, times_s=times_s), slower=1 / factor)
+        return self._retimed(actor, replace(actor.track, times_s=times_s), 0.0, 1 / factor)
 
     def copied(self, id: int, ahead_m: float = 0.0, left_m: float = 0.0) -> "Scene":
         """The scene with a second one of an actor, the last of its actors, elsewhere as ``moved`` has it.
@@ -241,9 +247,28 @@ class Scene:
 
     def with_standing(self, more: Gaussians) -> "Scene":
         """The scene with more of what never moves; the fewer coefficients of colour are filled with zeros."""
-        coefficients = max(self.static.sh.shape[1], more.sh.shape[1])
-        parts = [replace(part, sh=_widened(part.sh, coefficients)) for part in (self.static, more)]
-        return replace(self, static=Gaussians.concatenate(*parts))
+        return replace(self, static=self.static.and_more(more))
+
+    def inserted(self, actor: Actor, gaussians: Gaussians, motion: SceneMotion) -> "Scene":
+        """The scene with an actor more, the last of its actors, and what moves all of them.
+
+        Args:
+            actor: Its id is the index that the motion has for it.
+            gaussians: Those of the actor, in its canonical place; ``edit.inserted`` makes them.
+            motion: That of the scene with one actor more, see ``SceneMotion.adopted``.
+
+        Raises:
+            ValueError: There is an actor of this id, or a Gaussian is of another one.
+        """
+        own = gaussians.actor is not None and bool((gaussians.actor == actor.id).all())
+        if any(each.id == actor.id for each in self.actors) or not own:
+            raise ValueError(f"actor {actor.id} is known already, or Gaussians are of another one")
+        return replace(
+            self,
+            dynamic=self.dynamic.and_more(gaussians),
+            deformation=motion,
+            actors=(*self.actors, actor),
+        )
 
     def with_track(self, id: int, track: Track) -> "Scene":
         """The scene with an actor on another track, whose places are those of the same point of it.
@@ -270,11 +295,25 @@ class Scene:
             return torch.zeros(len(self.dynamic), dtype=torch.bool)
         return self.dynamic.actor == actor.id
 
-    def _retimed(self, actor: Actor, track: Track, later_s: float = 0.0, slower: float = 1.0) -> "Scene":
+    def _shifted(self, actor: Actor, by_m: Float[np.ndarray, "3"], turn_rad: float) -> "Scene":
+        """An actor elsewhere and turned; between its points its path is as it was."""
+        if self.deformation is None:
+            raise ValueError(f"nothing moves {actor.name}: the scene has no motion")
+        path = actor.track
+        track = Track(path.times_s, path.positions_m + by_m, path.yaw_rad + turn_rad)
+        return replace(
+            self,
+            deformation=self.deformation.shifted(actor.id, by_m, turn_rad),
+            actors=tuple(replace(a, track=track) if a.id == actor.id else a for a in self.actors),
+        )
+
+    def _retimed(self, actor: Actor, track: Track, later_s: float, slower: float) -> "Scene":
         """An actor on a track of as many points; its surface lives later and longer, from its first time."""
+        if (later_s, slower) == (0.0, 1.0):
+            return self
         steered = self.with_track(actor.id, track)
         kept = tuple(replace(a, spread_m=actor.spread_m) if a.id == actor.id else a for a in steered.actors)
-        if self.dynamic.lifespan is None or (later_s, slower) == (0.0, 1.0):
+        if self.dynamic.lifespan is None:
             return replace(steered, actors=kept)
         lifespan, members = self.dynamic.lifespan.clone(), self._members(actor)
         first_s = actor.track.first_s
@@ -325,7 +364,3 @@ class Scene:
         """All Gaussians at ``t_s``: the static ones, then the living dynamic ones; no gradients."""
         static = self.static_at(t_s)
         return Gaussians.concatenate(static, self.dynamic_at(t_s)) if len(self.dynamic) else static
-
-
-def _widened(sh: Float[Tensor, "n k 3"], coefficients: int) -> Float[Tensor, "n m 3"]:
-    return torch.nn.functional.pad(sh, (0, 0, 0, coefficients - sh.shape[1]))

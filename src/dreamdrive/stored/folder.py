@@ -31,7 +31,7 @@ from dreamdrive.scene.sky import Sky
 from dreamdrive.stored.believable import check_scene
 
 FORMAT = "dreamdrive scene"
-VERSION = 3
+VERSION = 4
 CONVENTIONS = (
     "World: the camera of the first frame, x right, y down, z forward, metres. Times in seconds. "
     "Cameras: pinholes, the centre of the top-left pixel at (0.5, 0.5). Quaternions wxyz, scales as natural "
@@ -220,16 +220,24 @@ def _values(scene: Scene) -> dict[str, Any]:
 def _version(scene: Scene) -> int:
     """The first format version that can hold a scene.
 
-    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a per-frame street.
+    1 knows deformation fields alone, and does not name them; 2 other motions; 3 a per-frame street; 4 what
+    was filled in, and rigid actors of other scenes.
     """
-    if scene.moves_per_frame:
+    config = None if scene.deformation is None else scene.deformation.config
+    if scene.static.filled is not None or getattr(config, "rigid", 0):
         return VERSION
+    if scene.moves_per_frame:
+        return 3
     return 1 if scene.deformation is None or scene.deformation.kind == _FIRST_MOTION else 2
 
 
 def _described(motion: SceneMotion) -> dict[str, Any]:
     kind = {} if motion.kind == _FIRST_MOTION else {"kind": motion.kind}
-    return {**kind, **asdict(motion.config)}
+    # What none has is not named, so that older programs read what they can move.
+    return {
+        **kind,
+        **{name: value for name, value in asdict(motion.config).items() if name != "rigid" or value},
+    }
 
 
 def _rebuilt(values: dict[str, Any], state: dict[str, Tensor]) -> SceneMotion:

@@ -1,0 +1,1 @@
+"""Edited scenes against streets that are drawn with the same edit."""
