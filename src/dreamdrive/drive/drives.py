@@ -87,6 +87,7 @@ def along(scene: Scene, path: Trajectory) -> Scene:
         held_out=np.zeros(len(path) * len(rig), bool),
         provenance=replace(about, source_index=None, camera_height_m=height_m),
         camera=None if scene.camera is None else np.tile(list(rig), len(path)),
+        residual=None,
     )
 
 

@@ -30,7 +30,10 @@ _OWN: dict[str, tuple[str, ...]] = {
     "static": ("dreamdrive.fit.static",),
     "score": ("dreamdrive.decompose.errors", "dreamdrive.decompose.score"),
     "group": ("dreamdrive.decompose.group",),
-    "fit": ("dreamdrive.fit", "dreamdrive.decompose", "dreamdrive.motion", "dreamdrive.stored"),
+    "fit": (
+        *("dreamdrive.fit", "dreamdrive.decompose", "dreamdrive.motion", "dreamdrive.stored"),
+        *("dreamdrive.splat.scene_view", "dreamdrive.scene.residual"),
+    ),
 }
 """Whose work each stage is; of a package all modules count, since tables name some of them."""
 _AROUND = (
