@@ -11,11 +11,11 @@ from torch import Tensor
 
 from dreamdrive.errors import InputError
 from dreamdrive.files.json_file import read_json
-from dreamdrive.motion import DeformationConfig, DeformationField, Domain, multiply_quaternions
+from dreamdrive.motion import DeformationConfig, DeformationField, Domain, Motion, multiply_quaternions
 from dreamdrive.scene.actor import Actor, ActorBox, Track
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.level import level_from_world
-from dreamdrive.scene.scene import Scene, SceneMotion
+from dreamdrive.scene.scene import Scene
 
 _ROAD_M, _NEAR_M, _LEAST = 0.2, 20.0, 50
 """What counts as road: so near to its plane, so near to the path, and so many Gaussians of it."""
@@ -91,7 +91,7 @@ def _road_m(
     return path[nearest, 2] - (scene.provenance.camera_height_m or 0.0)
 
 
-def _nothing(scene: Scene, track: Track) -> SceneMotion:
+def _nothing(scene: Scene, track: Track) -> Motion:
     """A motion of a scene in which nothing moves so far."""
     config = DeformationConfig(depth=1, width=1, position_frequencies=0, time_frequencies=0)
     end_s = max(track.last_s, track.first_s + 1e-3)

@@ -148,8 +148,14 @@ def _palette(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray, "p c"]
         return different, labels.ravel()
     from sklearn.cluster import MiniBatchKMeans
 
-    found = MiniBatchKMeans(
-        _PALETTE, init="random", random_state=0, n_init=1, batch_size=8192, max_iter=5
+    # Its annotations know n_init as a word alone.
+    found: Any = MiniBatchKMeans(
+        _PALETTE,
+        init="random",
+        random_state=0,
+        n_init=1,  # pyright: ignore[reportArgumentType]
+        batch_size=8192,
+        max_iter=5,
     ).fit(values)
     return found.cluster_centers_, found.labels_
 
