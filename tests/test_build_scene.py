@@ -12,8 +12,8 @@ from dreamdrive.decompose import Grouping
 from dreamdrive.fit import FitOptions, Trial, initialise
 from dreamdrive.progress import Work, call
 from dreamdrive.scene.clip import Known
-from dreamdrive.scene.residual import residual_of
 from dreamdrive.splat import render_scene
+from dreamdrive.vision.residual import residual_of
 from tests.streets import small_street, street_clip, true_geometry
 
 DRAFT = options.QUALITIES["draft"]

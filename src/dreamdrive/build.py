@@ -30,12 +30,12 @@ from dreamdrive.progress import Run, Work, call
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.scene.residual import residual_of
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.street.look import Look
 from dreamdrive.splat import render_scene
 from dreamdrive.stored import check
 from dreamdrive.street_network import NO_KNOWLEDGE, look_at, weights_of, with_looks
+from dreamdrive.vision.residual import residual_of
 
 
 @dataclass(frozen=True)

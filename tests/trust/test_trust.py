@@ -10,12 +10,12 @@ from dreamdrive.errors import InputError
 from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
-from dreamdrive.scene.residual import BLOCK_PX, blocks, residual_of
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render
 from dreamdrive.trust import RISING, SceneTrust, aside, error_network, fall_m, reach_m
 from dreamdrive.trust.evidence import asked_views, evidence_of, seen_with
 from dreamdrive.trust.free_space import FreeSpace
+from dreamdrive.vision.residual import BLOCK_PX, blocks, residual_of
 
 WIDE, HIGH = 96, 64
 CAMERA = Camera(80.0, 80.0, WIDE / 2, HIGH / 2, WIDE, HIGH)

@@ -15,12 +15,12 @@ from rich.console import Console
 from rich.logging import RichHandler
 
 import dreamdrive
-from dreamdrive.cli.actors import actors
 from dreamdrive.cli.clean import clean
 from dreamdrive.cli.data import data
 from dreamdrive.cli.dataset import dataset
 from dreamdrive.cli.doctor import doctor
-from dreamdrive.cli.edit import edit
+from dreamdrive.cli.editing.actors import actors
+from dreamdrive.cli.editing.edit import edit
 from dreamdrive.cli.evaluate import evaluate
 from dreamdrive.cli.export import export
 from dreamdrive.cli.generate import generate

@@ -32,7 +32,7 @@ _OWN: dict[str, tuple[str, ...]] = {
     "group": ("dreamdrive.decompose.group",),
     "fit": (
         *("dreamdrive.fit", "dreamdrive.decompose", "dreamdrive.motion", "dreamdrive.stored"),
-        *("dreamdrive.splat.scene_view", "dreamdrive.scene.residual"),
+        *("dreamdrive.splat.scene_view", "dreamdrive.vision.residual"),
     ),
 }
 """Whose work each stage is; of a package all modules count, since tables name some of them."""

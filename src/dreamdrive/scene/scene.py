@@ -103,7 +103,7 @@ class Scene:
         provenance: What the scene was made from.
         camera: Which camera of a rig each view is of (F,), the first one's being the drive; None where there
             is one camera only.
-        residual: How far each view is off its frame, see ``scene.residual`` (F, H // 8, W // 8); None where
+        residual: How far each view is off its frame, see ``vision.residual`` (F, H // 8, W // 8); None where
             no frames were compared.
     """
 

@@ -5,8 +5,8 @@ import torch
 from jaxtyping import Float16
 
 from dreamdrive.scene.camera import FARTHEST_M, Camera, check_rigid
-from dreamdrive.scene.residual import BLOCK_PX
 from dreamdrive.scene.scene import Provenance, Scene
+from dreamdrive.vision.residual import BLOCK_PX
 
 MAX_PIXELS = 64_000_000
 """Most pixels of a view, and of a sky."""

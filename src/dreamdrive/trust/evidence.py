@@ -10,9 +10,9 @@ from torch import Tensor
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
-from dreamdrive.scene.residual import BLOCK_PX
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import SceneView, moment_of, render, render_scene
+from dreamdrive.vision.residual import BLOCK_PX
 
 MOST_VIEWS = 16
 """Recorded views that are asked, evenly among those that the fit has seen."""

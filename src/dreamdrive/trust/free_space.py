@@ -8,10 +8,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.residual import BLOCK_PX
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene
 from dreamdrive.trust.evidence import asked_views
+from dreamdrive.vision.residual import BLOCK_PX
 
 MOST_VIEWS = 48
 _STEPS = 16

@@ -9,8 +9,8 @@ import numpy as np
 import safetensors.numpy
 from jaxtyping import Float
 
-from dreamdrive.scene.residual import blocks
 from dreamdrive.splat import SceneView
+from dreamdrive.vision.residual import blocks
 
 CALIBRATED = Path(__file__).with_name("calibrated.safetensors")
 """Of drawn streets, see ``benchmarks/trust.py``."""

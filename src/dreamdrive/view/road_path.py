@@ -20,6 +20,7 @@ APART_M = 0.3
 HZ = 20.0
 """Poses a second; that of ``drive.smooth`` where the recording gives more."""
 _STEP_M, _LEAST_M, _FARTHEST_M = 0.25, 1e-4, 100.0
+_DIGITS = 4
 _PICKED_ALPHA = 0.5
 # Splats beside a very narrow view are projected as at its rim, and leave holes in its middle.
 _PROBE_PX, _PROBE_FOCAL_PX = 161, 500.0
@@ -77,7 +78,7 @@ def spline(points_m: Sequence[Float[np.ndarray, "3"]]) -> Float[np.ndarray, "n 3
             kept.append(np.asarray(point, np.float64))
     if len(kept) < 2:
         raise InputError("a path needs two points on the road, a step apart; click where it shall go")
-    points = np.stack(kept)
+    points = np.stack(kept).round(_DIGITS)  # slopes of next to nothing overflow
     at_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     along = np.linspace(0, at_m[-1], int(np.ceil(at_m[-1] / _STEP_M)) + 1)
     road = np.stack([PchipInterpolator(at_m, axis)(along) for axis in points.T], axis=1)

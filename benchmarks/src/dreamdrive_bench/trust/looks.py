@@ -14,12 +14,12 @@ from dreamdrive.files.output import new_file
 from dreamdrive.options import QUALITIES
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.residual import residual_of
 from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.street_network import weights_of
 from dreamdrive.trust import SHIFTS_M, SceneTrust, aside, features_of, seen_with
+from dreamdrive.vision.residual import residual_of
 from dreamdrive_bench.common.machine import COMMIT
 from dreamdrive_bench.drives.drive import Drive
 from dreamdrive_bench.street.case import FRAMES, Case, case_digest, clip_of, world_of

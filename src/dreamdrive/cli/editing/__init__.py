@@ -1,0 +1,1 @@
+"""Commands on the actors of a scene."""
