@@ -9,7 +9,7 @@ import re
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from pathlib import Path
 
 import pytest
@@ -25,7 +25,8 @@ __all__ = ["help_of"]
 Tree = dict[str, bytes | str | None]
 _PRIVATE = ".dreamdrive-"
 _LOCK = ".dreamdrive.lock"
-_MOMENTS = 20
+_MOMENTS, _FURTHER_MOMENTS = 20, 6
+"""Moments at which a command is stopped; and at which each further format of it is, through the same door."""
 ELSEWHERE = {("evaluate perception", "json"), ("view", "output")}
 """A second place that a command writes to, by what the others write JSON with; and what the page writes when
 somebody asks for it, by what render, plan and edit write with (``tests/view/test_saving.py``)."""
@@ -40,6 +41,12 @@ class Desk:
     inputs: Path
     folder: Path
     writer: Writer
+
+    @property
+    def moments(self) -> int:
+        """At how many moments it is stopped."""
+        first = next(each for each in WRITERS.values() if name_of(each) == name_of(self.writer))
+        return _MOMENTS if self.writer is first else _FURTHER_MOMENTS
 
     @property
     def place(self) -> Path:
@@ -85,6 +92,11 @@ class Desk:
         """What writers left beside the result, and in the folder for temporary files."""
         found = [p.relative_to(self.folder).as_posix() for p in self.folder.rglob("*")]
         return [name for name in found if _PRIVATE in name or name.startswith("tmp/") or _LOCK in name]
+
+
+def name_of(writer: Writer) -> str:
+    """The command alone, as ``evaluate video``."""
+    return " ".join(takewhile(str.isalpha, writer.words))
 
 
 @pytest.fixture
@@ -234,7 +246,7 @@ def test_two_at_once_do_each_other_no_harm(desk: Desk) -> None:
     """The first stands still at each of some moments while the second runs."""
     came = desk.run()
     whole, before = desk.result(), desk.others()
-    for at in moments(came.changes, 8):
+    for at in moments(came.changes, max(4, desk.moments // 2)):
         remove(desk.place)
         first = desk.run(signal=signal.SIGSTOP, at=at)
         assert first.said == "stopped"
@@ -254,10 +266,10 @@ def test_two_at_once_do_each_other_no_harm(desk: Desk) -> None:
 @every_writer
 @pytest.mark.parametrize("how", ["kill", "signals"])
 def test_stopped_at_any_moment_nothing_half_stays(desk: Desk, how: str) -> None:
-    """Twenty moments: half of them counted in changes of files, half in seconds."""
+    """Half of the moments are counted in changes of files, half in seconds."""
     came = desk.run()
     whole, before = desk.result(), desk.others()
-    for number, moment in enumerate(moments_of(came)):
+    for number, moment in enumerate(moments_of(came, desk.moments)):
         if number % 5 == 0:  # else an older result is there, which stays or is replaced
             remove(desk.place)
         end = signal.SIGKILL if how == "kill" else _ENDS[number % 3]
@@ -282,9 +294,9 @@ def moments(changes: int, count: int) -> list[int]:
     return sorted({round(k * (changes - 1) / (count - 1)) for k in range(count)})
 
 
-def moments_of(came: Came) -> list[dict[str, float]]:
-    counted: list[dict[str, float]] = [{"at": at} for at in moments(came.changes, _MOMENTS // 2)]
-    timed = [{"after": came.seconds * (k + 0.5) / (_MOMENTS // 2)} for k in range(_MOMENTS // 2)]
+def moments_of(came: Came, count: int) -> list[dict[str, float]]:
+    counted: list[dict[str, float]] = [{"at": at} for at in moments(came.changes, count // 2)]
+    timed = [{"after": came.seconds * (k + 0.5) / (count // 2)} for k in range(count // 2)]
     return [each for pair in zip_longest(counted, timed) for each in pair if each is not None]
 
 

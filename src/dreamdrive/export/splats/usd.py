@@ -1,6 +1,7 @@
 """Gaussians over time as OpenUSD: two ParticleField3DGaussianSplat, and the camera of the recorded drive."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from dreamdrive.data.splats.splats import UP_AND_BACK
 from dreamdrive.errors import InputError
 from dreamdrive.export.moving import AtMoments, at_moments, moments_of, turned_back
 from dreamdrive.files.output import check_ending, check_new_file, new_file
+from dreamdrive.files.undisturbed import undisturbed
 from dreamdrive.progress import Progress, silent
 from dreamdrive.scene.scene import Scene
 
@@ -24,7 +26,8 @@ _APERTURE_MM = 36.0
 def need_usd() -> None:
     """Raise ``InputError`` where the package is missing, or older than its Gaussians."""
     try:
-        from pxr import UsdVol
+        with undisturbed():  # its C++ imports Python, and prints what a signal raises there
+            from pxr import UsdVol
     except ImportError:
         UsdVol = None
     if not hasattr(UsdVol, "ParticleField3DGaussianSplat"):
@@ -57,7 +60,7 @@ def scene_to_usd(
     need_usd()
     Usd, UsdGeom = _pxr("Usd"), _pxr("UsdGeom")
     moments_s = moments_of(scene, times_s)
-    with new_file(path) as partial:
+    with new_file(path) as partial, _said_by_the_system():
         stage: Any = Usd.Stage.CreateNew(str(partial))
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -71,6 +74,16 @@ def scene_to_usd(
         _write_drive(stage, scene, float(moments_s[0]))
         stage.GetRootLayer().Save()
     progress(1, 1)
+
+
+@contextmanager
+def _said_by_the_system() -> Generator[None, None, None]:
+    """Make an ``OSError`` of a disk that is full, of which OpenUSD tells in an error of its own."""
+    try:
+        yield
+    except _pxr("Tf").ErrorException as error:
+        said = str(error).strip().splitlines()
+        raise OSError(said[0].rpartition(" : ")[2].strip("' ") if said else "OpenUSD failed") from error
 
 
 def left_out_of_usd(scene: Scene, path: Path) -> str:
