@@ -116,6 +116,19 @@ def test_evidence_counts_pixels_and_knows_directions() -> None:
     torch.testing.assert_close(evidence.directions[middle, 0], towards, rtol=1e-4, atol=1e-4)
 
 
+def test_what_was_filled_in_counts_as_never_seen() -> None:
+    scene = street()
+    guessed = replace(
+        scene, static=replace(scene.static, filled=torch.ones(len(scene.static), dtype=torch.bool))
+    )
+    evidence = evidence_of(guessed, np.zeros((8, HIGH // BLOCK_PX, WIDE // BLOCK_PX), np.float32))
+    assert not evidence.sees.any()
+    camera = scene.cameras[3]
+    assert (
+        SceneTrust.of(guessed).view(camera, 0.3).psnr_db < SceneTrust.of(scene).view(camera, 0.3).psnr_db - 3
+    )
+
+
 def test_angles_and_closeness_of_a_view(trust: SceneTrust) -> None:
     camera = aside(CAMERA.at(pose_at(7.0)), 3.0)
     _, told = seen_with(trust.evidence, trust.scene, camera, 0.0)

@@ -71,6 +71,9 @@ def evidence_of(scene: Scene, squared_error: Float[np.ndarray, "f bh bw"]) -> Ga
         weight[rows, k] = shown
         error[rows] += off
         directions[rows, k], away_m[rows, k] = _towards(gaussians, is_dynamic, camera)
+    for known, first in ((scene.static, 0), (scene.dynamic, len(scene.static))):
+        if known.filled is not None:  # put where no frame saw anything
+            weight[first : first + len(known)][known.filled] = 0
     sees = weight > _SEES * weight.amax(dim=1, keepdim=True).clamp(min=_LEAST_PX)
     number = sees.sum(dim=1).clamp(min=1)
     mean = (directions * sees[..., None]).sum(dim=1) / number[:, None]

@@ -16,8 +16,15 @@ def views(seed: int) -> Looks:
     features = rng.normal(size=(len(shift_m), 4, 5, len(RISING))).astype(np.float32)
     features[..., 0] += 2 * np.log1p(4 * np.abs(shift_m))[:, None, None]
     error = MOST / (1 + np.exp(5 - features[..., 0]))
-    held_out = (shift_m == 0).astype(float)
-    return Looks(features, error, shift_m, np.tile(np.arange(6.0), len(shift_m) // 6), held_out, 0 * shift_m)
+    return Looks(
+        features=features,
+        squared_error=error,
+        shift_m=shift_m,
+        away_m=np.abs(shift_m),
+        frame=np.tile(np.arange(6.0), len(shift_m) // 6),
+        novel=np.ones(len(shift_m), dtype=bool),
+        off=np.zeros(len(shift_m)),
+    )
 
 
 def test_a_network_finds_what_errors_follow_from() -> None:

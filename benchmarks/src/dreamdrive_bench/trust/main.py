@@ -68,15 +68,15 @@ def judged(looks: Sequence[Looks], networks: Sequence[ErrorNetwork]) -> dict[str
     """Correlations over all views but those that a fit has seen."""
     told, true, away, told_blocks, true_blocks, away_blocks = ([] for _ in range(6))
     for each, network in zip(looks, networks, strict=True):
-        counts = (each.shift_m != 0) | (each.held_out > 0)
+        counts = each.novel
         expected = expected_of(each, network)[counts]
-        off, shift_m = each.squared_error[counts], np.abs(each.shift_m[counts])
+        off, away_m = each.squared_error[counts], each.away_m[counts]
         told.append(psnr_db(expected))
         true.append(psnr_db(off))
-        away.append(shift_m)
+        away.append(away_m)
         told_blocks.append(expected.ravel())
         true_blocks.append(off.ravel())
-        away_blocks.append(np.repeat(shift_m, off[0].size))
+        away_blocks.append(np.repeat(away_m, off[0].size))
     if not told:
         return dict.fromkeys(
             ("views", "views_by_distance", "blocks", "blocks_by_distance", "of_one_distance")
@@ -114,7 +114,7 @@ def falls(looks: Looks, network: ErrorNetwork) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for side in (-1, 1):
         seen = [np.isclose(looks.shift_m, side * metres) for metres in SHIFTS_M]
-        frames = set(looks.frame[looks.shift_m != 0].tolist())
+        frames = set(looks.frame[looks.away_m > 0].tolist())
         path = (looks.shift_m == 0) & np.isin(looks.frame, sorted(frames))
         there = [(0.0, path), *((m, s) for m, s in zip(SHIFTS_M, seen, strict=True) if s.any())]
         metres = [m for m, _ in there]
