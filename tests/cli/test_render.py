@@ -12,6 +12,7 @@ from dreamdrive.stored import save_scene
 from tests.cli.conftest import Run
 from tests.cli.test_commands import driving, frames
 from tests.scene.scenes import make_scene
+from tests.trust.test_trust import street as wall
 
 
 @pytest.fixture
@@ -147,3 +148,33 @@ def test_pictures_of_colours_are_blurred(
         done = run("render", out, *words, *wrong)
         assert done.code == 2
         assert "--blur changes colours in pictures" in done.err
+
+
+def test_trust_is_told_of_drives_aside_and_keeps_them_near(run: Run, tmp_path: Path) -> None:
+    save_scene(wall(), tmp_path / "scene")
+    begin = ("render", tmp_path / "scene", "--fps", "5", "--format", "png", "-o", tmp_path / "made")
+    straight = run(*begin, "--trajectory", "forward")
+    assert straight.code == 0, straight
+    assert "PSNR to expect" not in straight.out
+    aside = run(*begin, "--trajectory", "shift", "--shift-m", "3")
+    assert aside.code == 0, aside
+    told = re.search(
+        r"PSNR to expect: ([\d.]+) dB on the recorded drive, ([\d.]+) dB 2 m aside; 3 dB", aside.out
+    )
+    assert told is not None, aside.out
+    assert float(told[1]) > float(told[2])
+    asked = path_of(tmp_path / "made")
+    bent = run(*begin, "--trajectory", "shift", "--shift-m", "3", "--stay-within-trust", "--show", "trust")
+    assert bent.code == 0, bent
+    assert np.abs(path_of(tmp_path / "made")[:, 0]).max() < np.abs(asked[:, 0]).max() - 0.5
+
+
+def test_trust_needs_a_scene_that_was_compared_with_its_frames(run: Run, out: Path) -> None:
+    result = run("render", out, "--trajectory", "stop", "--show", "trust")
+    assert result.code == 2
+    assert "off its frames" in result.err
+
+
+def path_of(folder: Path) -> np.ndarray:
+    note = json.loads((folder / "render.json").read_text())
+    return np.array(note["world_from_camera"])[:, :3, 3]

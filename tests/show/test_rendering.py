@@ -27,6 +27,8 @@ from dreamdrive.show.rendering import (
     write_drive,
 )
 from dreamdrive.splat.scene_view import SceneView, render_scene
+from dreamdrive.trust import SceneTrust
+from dreamdrive.vision.residual import BLOCK_PX
 from tests.scene.scenes import make_scene
 
 
@@ -191,3 +193,35 @@ def test_a_failure_half_way_leaves_nothing(scene: Scene, drive: Drive, tmp_path:
         with pytest.raises(KeyboardInterrupt):
             write_drive(tmp_path / name, scene, drive, options, stop)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_trust_fades_pictures_to_red_and_is_kept_in_arrays(
+    scene: Scene, drive: Drive, tmp_path: Path
+) -> None:
+    camera = scene.cameras[0]
+    blocks = len(scene.cameras), camera.height_px // BLOCK_PX, camera.width_px // BLOCK_PX
+    known = replace(scene, residual=np.full(blocks, 0.02, np.float16))
+    trust = SceneTrust.of(known)
+    for format in ("png", "npz"):
+        options = RenderOptions("trust", format)
+        write_drive(tmp_path / format, known, drive, options, nothing, trust)
+    seen = trust.view(camera.at(drive.path.world_from_camera[1]), float(drive.path.times_s[1]))
+    with np.load(tmp_path / "npz" / "0001.npz") as arrays:
+        np.testing.assert_allclose(arrays["trust"], seen.trust, rtol=1e-5)
+        assert set(arrays.files) == {"colour", "depth_m", "alpha", "trust"}
+    note = json.loads((tmp_path / "png" / "render.json").read_text())
+    assert note["expected_psnr_db"][1] == pytest.approx(seen.psnr_db, abs=1e-4)
+    picture = cv2.cvtColor(cv2.imread(str(tmp_path / "png" / "0001.png")), cv2.COLOR_BGR2RGB)
+    assert np.array_equal(picture, panels.trust_colours(seen.view.picture, seen.trust))
+
+
+def test_colours_of_trust() -> None:
+    image = np.full((20, 28, 3), 100, np.uint8)
+    trusted = panels.trust_colours(image, np.ones((2, 3)))
+    assert np.array_equal(trusted, image)
+    left = np.ones((2, 3))
+    left[:, 0] = 0
+    half = panels.trust_colours(image, left).astype(int)
+    assert (half[:, 0, 0] > 140).all()
+    assert (half[:, 0, 2] < 80).all()
+    assert np.array_equal(half[:, -1], image[:, -1])

@@ -11,8 +11,18 @@ from dreamdrive.scene.actor import Actor, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.scene import Scene
+from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.splat import render
-from dreamdrive.trust import RISING, SceneTrust, aside, error_network, fall_m, reach_m
+from dreamdrive.trust import (
+    FALL_DB,
+    RISING,
+    SceneTrust,
+    aside,
+    error_network,
+    fall_m,
+    reach_m,
+    within_trust,
+)
 from dreamdrive.trust.evidence import asked_views, evidence_of, seen_with
 from dreamdrive.trust.free_space import FreeSpace
 from dreamdrive.vision.residual import BLOCK_PX, blocks, residual_of
@@ -229,3 +239,20 @@ def test_residuals_are_of_blocks() -> None:
 def test_a_scene_without_frames_says_so() -> None:
     with pytest.raises(InputError, match="generate it again"):
         SceneTrust.of(replace(street(), residual=None))
+
+
+def test_a_drive_is_bent_to_where_it_can_be_believed(trust: SceneTrust) -> None:
+    recorded = trust.scene.trajectory
+    assert within_trust(trust, recorded, recorded) is recorded
+    poses = recorded.world_from_camera.copy()
+    poses[4:, 0, 3] += 4.0
+    asked = Trajectory(poses, recorded.times_s)
+    bent = within_trust(trust, asked, recorded)
+    np.testing.assert_array_equal(bent.times_s, asked.times_s)
+    np.testing.assert_allclose(bent.positions_m[:3], recorded.positions_m[:3], atol=1e-9)
+    assert 0 < bent.positions_m[-1, 0] < 3.9
+    for view, t_s in ((5, 0.5), (7, 0.7)):
+        camera = trust.scene.cameras[view]
+        least_db = trust.view(camera, t_s).psnr_db - FALL_DB
+        assert trust.view(camera.at(bent.world_from_camera[view]), t_s).psnr_db >= least_db - 0.01
+        assert trust.view(camera.at(asked.world_from_camera[view]), t_s).psnr_db < least_db

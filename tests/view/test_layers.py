@@ -8,11 +8,13 @@ import pytest
 
 from dreamdrive.errors import InputError
 from dreamdrive.run import stages_of
-from dreamdrive.show import depth_colours
+from dreamdrive.show import depth_colours, trust_colours
 from dreamdrive.splat import render_scene
 from dreamdrive.stored import load_scene
+from dreamdrive.trust import SceneTrust
 from dreamdrive.view.layers import LAYERS, Kept, Looking, layers_of
 from dreamdrive.view.recorded import RecordedFrames
+from dreamdrive.vision.residual import BLOCK_PX
 from tests.cli.test_commands import driving
 from tests.scene.scenes import make_scene
 
@@ -45,6 +47,20 @@ def test_what_a_scene_lacks_is_not_offered() -> None:
     assert layers_of(driving(make_scene()), NOWHERE) == ("colour", "depth", "static", "dynamic")
     empty = driving(make_scene(dynamic=0, full=False))
     assert layers_of(empty, NOWHERE) == ("colour", "depth", "static")
+
+
+def test_trust_is_offered_where_the_scene_knows_how_far_it_is_off() -> None:
+    scene = driving(make_scene())
+    camera, t_s = scene.cameras[1], float(scene.times_s[1])
+    blocks = len(scene.cameras), camera.height_px // BLOCK_PX, camera.width_px // BLOCK_PX
+    scene = replace(scene, residual=np.full(blocks, 0.02, np.float16))
+    assert "trust" in layers_of(scene, NOWHERE)
+    looking = Looking(NOWHERE)
+    seen = SceneTrust.of(scene).view(camera, t_s)
+    wanted = trust_colours(seen.view.picture, seen.trust)
+    assert np.array_equal(LAYERS["trust"].draw(looking, scene, camera, t_s), wanted)
+    assert looking.trust(scene) is looking.trust(scene)
+    assert looking.trust(scene.without(0)) is not looking.trust(scene)
 
 
 @pytest.mark.slow

@@ -40,6 +40,8 @@ class SampleFlags:
         cells: Cells of the labels each way, of 100 m.
         aside: Most that new paths are to the left or right of the recorded one in metres.
         turned: Most that they look to the left or right of the recorded direction in degrees.
+        least_trust: PSNR to expect of a sample's pictures in decibels, below which it is left out; without it
+            any will do.
         format: Of the pictures.
         seed: Of the paths.
     """
@@ -49,6 +51,7 @@ class SampleFlags:
     cells: Annotated[int, arg(metavar="N")] = 200
     aside: Annotated[float, arg(metavar="M")] = 1.5
     turned: Annotated[float, arg(metavar="DEG")] = 6.0
+    least_trust: Annotated[float | None, arg(metavar="DB", help_behavior_hint="")] = None
     format: Literal["jpg", "png"] = "jpg"
     seed: Annotated[int, arg(metavar="S")] = 0
 
@@ -84,7 +87,7 @@ def make(
 
     image, grid = ImageSize(height, width, cut), BevGrid(sample.cells, sample.cells)
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    paths = PathOptions(aside_m=sample.aside, turned_deg=sample.turned)
+    paths = PathOptions(sample.aside, sample.turned, least_psnr_db=sample.least_trust)
     made = _Maker(image, grid, paths, sample.per_scene, sample.seed)
     plans = [plan for source in sources for plan in made.plans(source, labels, dataset, scene)]
     start = time.perf_counter()
@@ -117,7 +120,7 @@ class _Maker:
         self, image: "ImageSize", grid: "BevGrid", path: "PathOptions", per_scene: int | None, seed: int
     ) -> None:
         self.image, self.grid, self.path, self.per_scene, self.seed = image, grid, path, per_scene, seed
-        self.left_out = {"as good as another one": 0, "too little of it is in the scene": 0}
+        self.left_out: Counter[str] = Counter()
         self.done = 0
 
     def plans(self, source: Path, labels: Path | None, dataset: str | None, scene: str | None) -> list[_Plan]:
@@ -158,8 +161,8 @@ class _Maker:
                 named[log.name] += len(places)
                 made = samples_of_scene(scene, log, places, self.image, self.grid, self.path, first)
             for sample in made:
-                if sample is None:
-                    self.left_out["too little of it is in the scene"] += 1
+                if isinstance(sample, str):
+                    self.left_out[sample] += 1
                 else:
                     self.done += 1
                     yield sample

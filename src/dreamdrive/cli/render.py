@@ -12,6 +12,7 @@ from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import parse_size
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
+from dreamdrive.cli.trust import believed, bent, trust_of
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, check_there
 from dreamdrive.names import Format, Show
@@ -31,6 +32,7 @@ def render(
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
     blur: bool = False,
+    stay_within_trust: bool = False,
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
     """Drive through a scene and write videos, pictures or arrays.
@@ -40,12 +42,14 @@ def render(
         trajectory: forward, left, right, stop, lane-left, lane-right, shift, or a file with a trajectory. It
             may be given several times.
         shift_m: How far shift goes to the right in metres; negative is to the left.
-        show: Everything, its depth, or what moves or what stands alone.
+        show: Everything, its depth, what moves or what stands alone, or how far it can be believed: red is
+            not to be.
         format: A video, or a folder with a picture or with exact arrays a frame.
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         fps: Frames a second; without it a file's own, and for the others 20 at least.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
+        stay_within_trust: Bend drives towards the recorded one where they would be 3 dB worse than that.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:
@@ -64,6 +68,9 @@ def render(
     options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
     scene = less(open_scene(out), without)
     drives = drives_of(scene, trajectory, shift_m, fps)
+    trust = trust_of(scene, drives, needed=show == "trust" or stay_within_trust)
+    if stay_within_trust and trust is not None:
+        drives = [bent(drive, trust) for drive in drives]
     if format == "mp4":
         for drive in drives:
             video_rate(drive, options)
@@ -71,7 +78,9 @@ def render(
     for drive, place in zip(drives, places(out, output, drives, options), strict=True):
         start, count = time.perf_counter(), len(drive.path)
         with Bars(console) as bars:
-            write_drive(place, scene, drive, options, partial(bars, "render", total=count))
+            write_drive(place, scene, drive, options, partial(bars, "render", total=count), trust)
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
         console.print(f"{place}: {rate}", soft_wrap=True, markup=False)
+    if trust is not None:
+        console.print(believed(trust), soft_wrap=True, markup=False)

@@ -6,7 +6,12 @@ from dreamdrive.registry import offer
 
 if TYPE_CHECKING:
     from dreamdrive.drive.aside import CAR_M as CAR_M, Room as Room, room_of as room_of
-    from dreamdrive.drive.drives import Drive as Drive, along as along, drives_of as drives_of
+    from dreamdrive.drive.drives import (
+        Drive as Drive,
+        along as along,
+        distance_m as distance_m,
+        drives_of as drives_of,
+    )
     from dreamdrive.drive.manoeuvres import (
         MANOEUVRES as MANOEUVRES,
         frame_rate as frame_rate,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         grid as grid,
         labelled as labelled,
         score_colours as score_colours,
+        trust_colours as trust_colours,
     )
     from dreamdrive.show.rendering import (
         RenderOptions as RenderOptions,

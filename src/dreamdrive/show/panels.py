@@ -4,7 +4,11 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from dreamdrive.vision.residual import BLOCK_PX
+
 Image = UInt8[np.ndarray, "h w 3"]
+_DOUBT = 214, 39, 40
+"""The colour of what is not to be believed at all."""
 
 
 def grid(images: dict[str, Image], columns: int = 2) -> UInt8[np.ndarray, "hg wg 3"]:
@@ -46,6 +50,23 @@ def depth_colours(depth_m: Float[np.ndarray, "h w"], near_m: float = 2.0, far_m:
     colours = cv2.cvtColor(cv2.applyColorMap(scaled, cv2.COLORMAP_TURBO), cv2.COLOR_BGR2RGB)
     colours[~(depth_m > 0)] = 0
     return colours
+
+
+def trust_colours(image: Image, trust: Float[np.ndarray, "bh bw"]) -> Image:
+    """A picture that fades to red where it is not to be believed.
+
+    Args:
+        image: The picture.
+        trust: In [0, 1] of blocks of ``BLOCK_PX`` pixels; what they leave over at the right and below is as
+            they are at their edge.
+    """
+    high, wide = image.shape[:2]
+    covered = cv2.resize(trust.astype(np.float32), None, fx=BLOCK_PX, fy=BLOCK_PX)
+    rest = (0, high - covered.shape[0]), (0, wide - covered.shape[1])
+    share = np.pad(covered, rest, mode="edge")[..., None]
+    grey = image.mean(axis=2, keepdims=True)
+    doubted = 0.45 * grey + 0.55 * np.array(_DOUBT, np.float32)
+    return np.rint(share * image + (1 - share) * doubted).astype(np.uint8)
 
 
 def to_bytes(image: Float[np.ndarray, "h w 3"]) -> Image:

@@ -25,6 +25,7 @@ from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.show import panels
 from dreamdrive.show.videos import write_png
 from dreamdrive.splat import SceneView, render_scene
+from dreamdrive.trust import SceneTrust, TrustedView
 
 NOTE = "render.json"
 """What lies beside pictures and arrays: calibration, poses and times."""
@@ -49,22 +50,38 @@ class RenderOptions:
 
 
 def write_drive(
-    path: Path, scene: Scene, drive: Drive, options: RenderOptions, progress: Callable[[int], None]
+    path: Path,
+    scene: Scene,
+    drive: Drive,
+    options: RenderOptions,
+    progress: Callable[[int], None],
+    trust: SceneTrust | None = None,
 ) -> None:
     """Render a drive and write it; the result appears when it is whole, in place of one from here.
 
-    A video holds colours; depth has those of ``drive.panels``. A folder holds one file a frame: ``NNNN.png``,
-    8-bit RGB or depth in 16 bits (see ``depth_png``), or ``NNNN.npz``: ``colour`` float32 (H, W, 3) in [0,
-    1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is nothing; ``alpha``
-    float32 (H, W), the share of the pixel that Gaussians cover. ``render.json`` beside them has calibration,
-    poses and times. One frame is held at a time. ``progress`` is called with the number of frames done.
+    A video holds colours; depth has those of ``drive.panels``, and pictures fade to red where they are not to
+    be believed if trust is to be shown, which is that of the scene. A folder holds one file a frame:
+    ``NNNN.png``, 8-bit RGB or depth in 16 bits (see ``depth_png``), or ``NNNN.npz``: ``colour`` float32 (H,
+    W, 3) in [0, 1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is
+    nothing; ``alpha`` float32 (H, W), the share of the pixel that Gaussians cover; ``trust`` float32 (H // 8,
+    W // 8), where it is shown, of blocks of pixels. ``render.json`` beside them has calibration, poses, times
+    and the PSNR to expect where trust is shown. One frame is held at a time.
+    ``progress`` is called with the number of frames done.
     """
     camera = view_camera(scene.cameras[0], options.size)
     part = options.show if options.show in ("dynamic", "static") else "all"
+    trust = (trust or SceneTrust.of(scene)) if options.show == "trust" else None
+    expected_db: list[float] = []
 
-    def views() -> Iterator[SceneView]:
+    def views() -> Iterator[SceneView | TrustedView]:
         for i, pose in enumerate(drive.path.world_from_camera):
-            yield render_scene(scene, camera.at(pose), float(drive.path.times_s[i]), part=part)
+            here, t_s = camera.at(pose), float(drive.path.times_s[i])
+            if trust is None:
+                yield render_scene(scene, here, t_s, part=part)
+            else:
+                seen = trust.view(here, t_s)
+                expected_db.append(seen.psnr_db)
+                yield seen
             progress(i + 1)
 
     if options.format == "mp4":
@@ -73,7 +90,10 @@ def write_drive(
     with new_folder(path, replace=True, kind="rendered drive") as folder:
         for i, view in enumerate(views()):
             _write_frame(folder / f"{i:04d}.{options.format}", view, options)
-        (folder / NOTE).write_text(json.dumps(_note(camera, drive.path, options), allow_nan=False) + "\n")
+        note = _note(camera, drive.path, options)
+        if expected_db:
+            note["expected_psnr_db"] = expected_db
+        (folder / NOTE).write_text(json.dumps(note, allow_nan=False) + "\n")
 
 
 def frames(
@@ -117,24 +137,28 @@ def depth_png(view: SceneView) -> UInt16[np.ndarray, "h w"]:
     return depth.astype(np.uint16)
 
 
-def _picture(view: SceneView, options: RenderOptions) -> UInt8[np.ndarray, "h w 3"]:
+def _picture(shown: SceneView | TrustedView, options: RenderOptions) -> UInt8[np.ndarray, "h w 3"]:
+    view = shown.view if isinstance(shown, TrustedView) else shown
     if options.show == "depth":
         return panels.depth_colours(view.depth_m.numpy())
-    return view.picture if options.blur is None else options.blur(view.picture)
+    picture = view.picture if options.blur is None else options.blur(view.picture)
+    return panels.trust_colours(picture, shown.trust) if isinstance(shown, TrustedView) else picture
 
 
-def _write_frame(path: Path, view: SceneView, options: RenderOptions) -> None:
+def _write_frame(path: Path, shown: SceneView | TrustedView, options: RenderOptions) -> None:
+    view = shown.view if isinstance(shown, TrustedView) else shown
     if path.suffix == ".npz":
         # Compressing would save a quarter of the space and take ten times as long.
-        colour, depth_m, alpha = view.colour.numpy(), view.depth_m.numpy(), view.alpha.numpy()
-        if options.show == "depth":
-            np.savez(path, depth_m=depth_m, alpha=alpha)
-        else:
-            np.savez(path, colour=colour, depth_m=depth_m, alpha=alpha)
+        arrays = {"depth_m": view.depth_m.numpy(), "alpha": view.alpha.numpy()}
+        if options.show != "depth":
+            arrays["colour"] = view.colour.numpy()
+        if isinstance(shown, TrustedView):
+            arrays["trust"] = shown.trust.astype(np.float32)
+        np.savez(path, allow_pickle=False, **arrays)
     elif options.show == "depth":
         write_picture(path, depth_png(view))
     else:
-        write_png(path, _picture(view, options))
+        write_png(path, _picture(shown, options))
 
 
 def _note(camera: Camera, drive: Trajectory, options: RenderOptions) -> dict[str, Any]:

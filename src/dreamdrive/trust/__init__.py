@@ -15,11 +15,14 @@ if TYPE_CHECKING:
         features_of as features_of,
     )
     from dreamdrive.trust.reach import (
+        FALL_DB as FALL_DB,
         SHIFTS_M as SHIFTS_M,
         aside as aside,
+        expected_db as expected_db,
         fall_m as fall_m,
         reach_m as reach_m,
     )
     from dreamdrive.trust.trust import SceneTrust as SceneTrust, TrustedView as TrustedView
+    from dreamdrive.trust.within import within_trust as within_trust
 
 __all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

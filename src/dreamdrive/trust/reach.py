@@ -22,11 +22,9 @@ def reach_m(trust: SceneTrust, side: int) -> float:
         trust: Of a scene.
         side: 1 for to the right, -1 for to the left.
     """
-    front = trust.scene.front
-    views = front[np.linspace(0, len(front) - 1, _PLACES + 2).round().astype(int)[1:-1]].tolist()
     told: list[float] = []
     for metres in (0.0, *SHIFTS_M):
-        told.append(float(np.mean([_expected_db(trust, view, side * metres) for view in views])))
+        told.append(expected_db(trust, side * metres))
         if told[-1] < told[0] - FALL_DB:
             break
     return fall_m((0.0, *SHIFTS_M), told) or SHIFTS_M[-1]
@@ -42,8 +40,12 @@ def fall_m(metres: Sequence[float], psnr_db: Sequence[float]) -> float | None:
     return None
 
 
-def _expected_db(trust: SceneTrust, view: int, right_m: float) -> float:
-    return trust.view(aside(trust.scene.cameras[view], right_m), float(trust.scene.times_s[view])).psnr_db
+def expected_db(trust: SceneTrust, right_m: float) -> float:
+    """PSNR to expect so far to the right of the recorded path, the mean over some of its views."""
+    scene, front = trust.scene, trust.scene.front
+    views = front[np.linspace(0, len(front) - 1, _PLACES + 2).round().astype(int)[1:-1]].tolist()
+    seen = [trust.view(aside(scene.cameras[view], right_m), float(scene.times_s[view])) for view in views]
+    return float(np.mean([each.psnr_db for each in seen]))
 
 
 def aside(camera: Camera, right_m: float) -> Camera:

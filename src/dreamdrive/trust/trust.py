@@ -69,8 +69,8 @@ class SceneTrust:
         """
         if scene.residual is None:
             raise InputError(
-                "trust needs a scene that knows how far it is off its frames, which generate writes since "
-                "0.2; generate it again"
+                "trust needs a scene that knows how far it is off its frames, which this one was never told; "
+                "generate it again"
             )
         squared = np.square(scene.residual.astype(np.float32))
         known = cls(scene, evidence_of(scene, squared), FreeSpace.of(scene), {})

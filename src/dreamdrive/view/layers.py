@@ -10,8 +10,9 @@ import numpy as np
 from dreamdrive.run import is_kept, kept_scores
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.scene import Scene
-from dreamdrive.show import Image, Scored, depth_colours, score_colours, score_image
+from dreamdrive.show import Image, Scored, depth_colours, score_colours, score_image, trust_colours
 from dreamdrive.splat import Moment, Part, SceneView, moment_of, render_scene
+from dreamdrive.trust import SceneTrust
 
 
 @dataclass
@@ -38,6 +39,7 @@ class Looking:
     kept: Kept
     _of: tuple[object, ...] = field(default=(), init=False)
     _moment: Moment | None = field(default=None, init=False)
+    _trust: SceneTrust | None = field(default=None, init=False)
 
     def at(self, scene: Scene, camera: Camera, t_s: float, part: Part = "all") -> SceneView:
         """What a camera sees."""
@@ -46,6 +48,12 @@ class Looking:
         if self._moment is None or not same:
             self._of, self._moment = of, moment_of(scene, t_s, part)
         return render_scene(scene, camera, t_s, part=part, moment=self._moment)
+
+    def trust(self, scene: Scene) -> SceneTrust:
+        """What is known of the recorded views, which takes seconds for each other scene."""
+        if self._trust is None or self._trust.scene is not scene:
+            self._trust = SceneTrust.of(scene)
+        return self._trust
 
 
 Draw = Callable[[Looking, Scene, Camera, float], Image]
@@ -85,11 +93,17 @@ def _scores(looking: Looking, scene: Scene, camera: Camera, t_s: float) -> Image
     return score_colours(score_image(scored, camera, nearest).numpy())
 
 
+def _trust(looking: Looking, scene: Scene, camera: Camera, t_s: float) -> Image:
+    seen = looking.trust(scene).view(camera, t_s)
+    return trust_colours(seen.view.picture, seen.trust)
+
+
 LAYERS: dict[str, Layer] = {
     "colour": Layer(_colour),
     "depth": Layer(_depth),
     "static": Layer(_static),
     "dynamic": Layer(_dynamic, lambda scene, kept: len(scene.dynamic) > 0),
+    "trust": Layer(_trust, lambda scene, kept: scene.residual is not None),
     "scores": Layer(_scores, lambda scene, kept: kept.has_scores),
 }
 """What the page offers, in its order."""

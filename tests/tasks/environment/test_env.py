@@ -1,6 +1,7 @@
 import copy
 import gc
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -452,3 +453,20 @@ def _in_memory() -> tuple[int, float]:
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return len(gc.get_objects()), pages * 4096 / 1e6
+
+
+def test_how_far_the_picture_can_be_believed_is_in_the_info() -> None:
+    street = scene(AHEAD)
+    camera = street.cameras[0]
+    blocks = len(street.cameras), camera.height_px // 8, camera.width_px // 8
+    known = replace(street, residual=np.full(blocks, 0.02, np.float16))
+    options = replace(AS_RECORDED, trust=True)
+    made = env(known, options=options)
+    _, on_path = made.reset(seed=0, options={"start_s": 0.5, "aside_m": 0.0})
+    _, aside = made.reset(seed=0, options={"start_s": 0.5, "aside_m": 3.0})
+    assert aside["expected_psnr_db"] < on_path["expected_psnr_db"] - 1
+    info = made.step(STRAIGHT)[-1]
+    assert info["expected_psnr_db"] > 0
+    assert "expected_psnr_db" not in env(known).reset(seed=0)[1]
+    with pytest.raises(InputError, match="off its frames"):
+        env(street, options=options).reset(seed=0)

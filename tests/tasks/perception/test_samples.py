@@ -21,6 +21,7 @@ from dreamdrive.tasks.perception import (
     samples_of_scene,
     span_of,
 )
+from dreamdrive.tasks.perception.of_scene import TOO_DOUBTFUL, TOO_LITTLE
 from tests.logs import ego, log
 
 IMAGE, GRID = ImageSize(24, 64, 12), BevGrid(40, 40)
@@ -116,7 +117,11 @@ def test_a_scene_is_seen_from_new_places(drive):
     span = span_of(scene, drive)
     assert span == pytest.approx((0.0, 0.9))
     places, _ = draw_places(drive, span, 4, options, seed=2)
-    made = [each for each in samples_of_scene(scene, drive, places, IMAGE, GRID, options) if each is not None]
+    made = [
+        each
+        for each in samples_of_scene(scene, drive, places, IMAGE, GRID, options)
+        if not isinstance(each, str)
+    ]
     assert len(made) == 4
     note, sample = made[0]
     assert (note.kind, note.prior) == ("rendered", None)
@@ -173,7 +178,25 @@ def test_what_the_scene_does_not_cover_is_left_out(drive):
     scene = scene_of(drive)
     empty = replace(scene, static=scene.static.select(torch.arange(5)))
     places, _ = draw_places(drive, (0.0, 0.9), 3, PathOptions(), seed=2)
-    assert list(samples_of_scene(empty, drive, places, IMAGE, GRID, PathOptions())) == [None] * 3
+    assert list(samples_of_scene(empty, drive, places, IMAGE, GRID, PathOptions())) == [TOO_LITTLE] * 3
+
+
+def test_what_cannot_be_believed_as_asked_is_left_out(drive):
+    scene = scene_of(drive)
+    camera = scene.cameras[0]
+    blocks = len(scene.cameras), camera.height_px // 8, camera.width_px // 8
+    known = replace(scene, residual=np.full(blocks, 0.02, np.float16))
+    places, _ = draw_places(drive, (0.0, 0.9), 2, PathOptions(), seed=2)
+
+    def made(scene: Scene, least_db: float) -> list[bool]:
+        options = PathOptions(least_covered=0.2, least_psnr_db=least_db)
+        found = samples_of_scene(scene, drive, places, IMAGE, GRID, options)
+        return [each == TOO_DOUBTFUL for each in found]
+
+    assert made(known, 5.0) == [False, False]
+    assert made(known, 60.0) == [True, True]
+    with pytest.raises(InputError, match="off its frames"):
+        made(scene, 20.0)
 
 
 def test_labels_of_another_drive_are_refused(drive):

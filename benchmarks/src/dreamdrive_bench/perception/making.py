@@ -106,7 +106,7 @@ def _rendered(
         log, scene = log_of(seed, places), load_scene(places.scene(seed) / "scene")
         drawn, _ = draw_places(log, span_of(scene, log), protocol.generated.per_street, path, seed)
         made = samples_of_scene(scene, log, drawn, network.image, network.grid, path)
-        yield from (each for each in made if each is not None)
+        yield from (each for each in made if not isinstance(each, str))
 
 
 def _warped(

@@ -17,6 +17,7 @@ from dreamdrive.tasks.environment.options import EnvironmentOptions
 from dreamdrive.tasks.environment.pictures import Pictures
 from dreamdrive.tasks.environment.rig import Mount, scene_rig
 from dreamdrive.tasks.environment.road import DrivableArea
+from dreamdrive.trust import SceneTrust
 
 Source = Scene | Path | str
 Cameras = str | Sequence[Mount]
@@ -30,6 +31,7 @@ class Loaded:
 
     course: Course
     pictures: Pictures | None = None
+    trust: SceneTrust | None = None
 
 
 class Courses:
@@ -68,6 +70,13 @@ class Courses:
         if loaded.pictures is None:
             loaded.pictures = self._drawn(loaded.course)
         return loaded.pictures
+
+    def trust(self, index: int) -> SceneTrust:
+        """How far views of a scene can be believed."""
+        loaded = self._load(index)
+        if loaded.trust is None:
+            loaded.trust = SceneTrust.of(loaded.course.scene)
+        return loaded.trust
 
     def clear(self) -> None:
         """Forget what was loaded."""

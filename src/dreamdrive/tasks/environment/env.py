@@ -254,6 +254,7 @@ class DreamDriveEnv(gymnasium.Env[Any, np.ndarray]):
     def _info(self, reward: Reward | None, hit: str, off_road: bool) -> dict[str, Any]:
         """What a log of an episode wants to know."""
         terms = {} if reward is None else {"reward": asdict(reward)}
+        trust = {"expected_psnr_db": self._expected_db()} if self._options.trust else {}
         return {
             "scene": self._course.name,
             "time_s": self._time_s,
@@ -264,8 +265,16 @@ class DreamDriveEnv(gymnasium.Env[Any, np.ndarray]):
             "aside_m": self._on_path.aside_m,
             "hit": hit,
             "off_road": off_road,
+            **trust,
             **terms,
         }
+
+    def _expected_db(self) -> float:
+        """Of a picture of the first camera; of actors as they were recorded."""
+        mount = self._courses.pictures(self._index).mounts[0]
+        world_from_ego = self._course.world_from_ego(self._state, self._on_path.along_m)
+        camera = mount.pinhole.at(world_from_ego @ mount.ego_from_camera)
+        return self._courses.trust(self._index).view(camera, self._time_s).psnr_db
 
 
 def _check_cameras(cameras: object) -> None:

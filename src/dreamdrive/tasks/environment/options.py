@@ -51,6 +51,8 @@ class EnvironmentOptions:
             to about a lane's width aside.
         road_margin_m: How far a corner of the car may be outside of the road of a map.
         keep: How many scenes are kept in memory.
+        trust: Whether ``info`` has ``expected_psnr_db``, the PSNR to expect of the first camera's picture; it
+            takes longer than the picture.
         ego: The own car.
         start: How episodes begin.
         reward: Weights.
@@ -65,6 +67,7 @@ class EnvironmentOptions:
     off_path_m: float = 4.0
     road_margin_m: float = 0.5
     keep: int = 4
+    trust: bool = False
     ego: EgoOptions = field(default_factory=EgoOptions)
     start: StartOptions = field(default_factory=StartOptions)
     reward: RewardOptions = field(default_factory=RewardOptions)

@@ -24,6 +24,7 @@ from dreamdrive.tasks.perception.network.inputs import BevSample, camera_from_le
 from dreamdrive.tasks.perception.of_log import annotation_of, boxes_at, in_order, road_map
 from dreamdrive.tasks.perception.options import ImageSize
 from dreamdrive.tasks.perception.raster import Annotation, bev_labels
+from dreamdrive.trust import SceneTrust
 
 NEAR_M = 70.0
 """Boxes that are farther from the car are outside of all labels."""
@@ -40,6 +41,7 @@ class PathOptions:
         apart_deg: ... and in direction than this ...
         apart_s: ... and in time than this are the same to a network: one of them is left out.
         least_covered: Share of the pixels below the horizon, of all pictures, that the scene has to cover.
+        least_psnr_db: PSNR to expect, in the mean over all pictures, see ``trust``; without it any will do.
     """
 
     aside_m: float = 1.5
@@ -48,7 +50,11 @@ class PathOptions:
     apart_deg: float = 1.0
     apart_s: float = 0.2
     least_covered: float = 0.6
+    least_psnr_db: float | None = None
 
+
+TOO_LITTLE, TOO_DOUBTFUL = "too little of it is in the scene", "less can be believed than is asked for"
+"""Why a place gives no sample."""
 
 _TRIES = 8
 """Draws of a place before it is left out."""
@@ -105,14 +111,15 @@ def samples_of_scene(
     grid: BevGrid,
     options: PathOptions,
     first: int = 0,
-) -> Iterator[tuple[SampleNote, BevSample] | None]:
-    """Render the cameras of the log at each place; None where too little is covered.
+) -> Iterator[tuple[SampleNote, BevSample] | str]:
+    """Render the cameras of the log at each place; where that gives no sample, say why.
 
     Of a scene whose street was drawn level, car and boxes stand on that street. Names of samples count from
     ``first``.
 
     Raises:
-        InputError: The scene was made of another drive, or the drive has no map.
+        InputError: The scene was made of another drive, or the drive has no map; or trust is asked for, and
+            the scene does not know how far it is off its frames.
     """
     link = _link(scene, log)
     map = road_map(log)
@@ -121,8 +128,22 @@ def samples_of_scene(
         log, places = _on_level(log, places, link.level_z_m)
     cameras = in_order(log)
     pinholes = [_pinhole(camera, image) for camera in cameras]
+    trust = None if options.least_psnr_db is None else SceneTrust.of(scene)
     for number, place in enumerate(places, first):
-        yield _sample(scene, log, map, link, scene_from_log, cameras, pinholes, place, number, grid, options)
+        rig = [
+            pinhole.at(scene_from_log @ place.world_from_ego @ camera.ego_from_camera)
+            for camera, pinhole in zip(cameras, pinholes, strict=True)
+        ]
+        if trust is not None and not _believed(trust, rig, place.time_s - link.start_s, options):
+            yield TOO_DOUBTFUL
+        else:
+            yield _sample(scene, log, map, link, rig, cameras, pinholes, place, number, grid, options)
+
+
+def _believed(trust: SceneTrust, rig: list[Camera], t_s: float, options: PathOptions) -> bool:
+    """Whether the pictures of all cameras are expected to be as good as is asked for."""
+    told_db = [trust.view(camera, t_s).psnr_db for camera in rig]
+    return bool(np.mean(told_db) >= (options.least_psnr_db or -np.inf))
 
 
 def _sample(
@@ -130,28 +151,27 @@ def _sample(
     log: Log,
     map: LogMap,
     link: OfLog,
-    scene_from_log: Float[np.ndarray, "4 4"],
+    rig: list[Camera],
     cameras: list[LogCamera],
     pinholes: list[Camera],
     place: Place,
     number: int,
     grid: BevGrid,
     options: PathOptions,
-) -> tuple[SampleNote, BevSample] | None:
+) -> tuple[SampleNote, BevSample] | str:
     pictures: list[UInt8[np.ndarray, "3 h w"]] = []
     views: list[View] = []
     covered: list[float] = []
     time_s = place.time_s - link.start_s
     moment = moment_of(scene, time_s)
-    for camera, pinhole in zip(cameras, pinholes, strict=True):
-        pose = place.world_from_ego @ camera.ego_from_camera
-        view = render_scene(scene, pinhole.at(scene_from_log @ pose), time_s, moment=moment)
+    for camera, pinhole, at in zip(cameras, pinholes, rig, strict=True):
+        view = render_scene(scene, at, time_s, moment=moment)
         alpha = view.alpha.numpy()
         covered.append(float(alpha[_below_horizon(pinhole.at(camera.ego_from_camera))].mean()))
         pictures.append(view.picture.transpose(2, 0, 1))
-        views.append((pinhole.at(pose), view.seen_depth_m))
+        views.append((pinhole.at(place.world_from_ego @ camera.ego_from_camera), view.seen_depth_m))
     if np.mean(covered) < options.least_covered:
-        return None
+        return TOO_LITTLE
     boxes = _boxes(log, place, views)
     extrinsics = [
         camera_from_level_ego(place.world_from_ego @ camera.ego_from_camera, place.world_from_ego)
