@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dreamdrive.trust import MOST, RISING, SHIFTS_M
+from dreamdrive.trust import MOST, RISING, SHIFTS_M, ErrorNetwork
 from dreamdrive_bench.trust.calibrate import calibrated
 from dreamdrive_bench.trust.looks import Looks
 from dreamdrive_bench.trust.main import falls, judged
@@ -27,9 +27,12 @@ def views(seed: int) -> Looks:
     )
 
 
-def test_a_network_finds_what_errors_follow_from() -> None:
-    streets = [views(0), views(1)]
-    network = calibrated(streets)
+@pytest.fixture(scope="module")
+def network() -> ErrorNetwork:
+    return calibrated([views(0), views(1)])
+
+
+def test_a_network_finds_what_errors_follow_from(network: ErrorNetwork) -> None:
     found = judged([views(2)], [network])
     assert found["blocks"] > 0.95
     assert found["views"] > found["views_by_distance"] > 0.5
@@ -40,9 +43,7 @@ def test_a_network_finds_what_errors_follow_from() -> None:
     assert all(row["told_m"] == pytest.approx(row["is_m"], rel=0.3) for row in rows)
 
 
-def test_errors_of_views_that_no_fit_has_seen_count() -> None:
-    streets = [views(0), views(1)]
-    network = calibrated(streets)
+def test_errors_of_views_that_no_fit_has_seen_count(network: ErrorNetwork) -> None:
     scene = views(2)
     worse = Looks(
         **{**vars(scene), "squared_error": 2 * scene.squared_error, "off": np.full(len(scene.off), np.log(2))}
