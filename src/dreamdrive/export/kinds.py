@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from dreamdrive.files.kinds import (
     COLMAP_KIND,
@@ -19,6 +19,9 @@ from dreamdrive.files.kinds import (
 )
 from dreamdrive.files.output import check_ending, check_free, check_new_file
 from dreamdrive.registry import loaded
+
+if TYPE_CHECKING:
+    from dreamdrive.scene.scene import Scene
 
 Place = str | Callable[..., Any]
 """A function, or where it is as ``module:name``, so that it is loaded when it is called."""
@@ -72,6 +75,13 @@ def function(place: Place) -> Callable[..., Any]:
     return cast("Callable[..., Any]", loaded(place)) if isinstance(place, str) else place
 
 
+def _always(sentence: str) -> Callable[["Scene", Path], str]:
+    """What is left out of every scene."""
+    return lambda scene, path: sentence
+
+
+_DRIVE = "the drive, no Gaussians: boxes are of actors of which kind and size are known"
+_CAMERAS = "frames, pinholes and centres of what stands: no Gaussians, no sky, nothing of what moves"
 PLY = Export(
     name="ply",
     about="what viewers of 3D Gaussians read",
@@ -88,6 +98,7 @@ NUSCENES = Export(
     world="dreamdrive.export.nuscenes.nuscenes:world_to_nuscenes",
     takes=frozenset({"name", "trajectory", "blur", "labels"}),
     folder=NUSCENES_KIND,
+    left_out=_always(f"nuScenes holds {_DRIVE}; a map comes with --labels."),
 )
 NCORE = Export(
     name="ncore",
@@ -97,6 +108,7 @@ NCORE = Export(
     takes=frozenset({"clip", "geometry", "trajectory", "blur"}),
     folder=NCORE_KIND,
     need="dreamdrive.export.ncore.words:need_ncore",
+    left_out=_always(f"NCore holds {_DRIVE}."),
 )
 MCAP = Export(
     name="mcap",
@@ -106,6 +118,7 @@ MCAP = Export(
     takes=frozenset({"clip", "trajectory", "blur"}),
     ending=".mcap",
     need="dreamdrive.export.mcap.file:need_foxglove",
+    left_out=_always(f"MCAP holds {_DRIVE}."),
 )
 COLMAP = Export(
     name="colmap",
@@ -113,6 +126,7 @@ COLMAP = Export(
     scene="dreamdrive.export.cameras.colmap:scene_to_colmap",
     takes=frozenset({"clip", "trajectory", "blur"}),
     folder=COLMAP_KIND,
+    left_out=_always(f"COLMAP holds {_CAMERAS}."),
 )
 NERFSTUDIO = Export(
     name="nerfstudio",
@@ -120,6 +134,7 @@ NERFSTUDIO = Export(
     scene="dreamdrive.export.cameras.nerfstudio:scene_to_nerfstudio",
     takes=frozenset({"clip", "trajectory", "blur"}),
     folder=NERFSTUDIO_KIND,
+    left_out=_always(f"transforms.json holds {_CAMERAS}."),
 )
 TUM = Export(
     name="tum",
@@ -127,6 +142,7 @@ TUM = Export(
     scene="dreamdrive.export.cameras.tum:scene_to_tum",
     takes=frozenset({"trajectory"}),
     ending=".txt",
+    left_out=_always("TUM holds the path of the first camera, no calibration."),
 )
 DEPTH = Export(
     name="depth",

@@ -82,6 +82,8 @@ def _look_at_world(case: Case, knowledge: str, runs: Path) -> Looks:
     for place, cameras in _places(case.seed):
         clear = clearance_m(made.boxes, cameras) >= NEAR_M
         counted = [k for k in frames if clear[k]]
+        if not counted:
+            continue
         times_s = [float(made.times_s[k]) for k in counted]
         for k, true in zip(counted, made.views([cameras[k] for k in counted], times_s), strict=True):
             # The focal length is the scene's own: with another one the same pixels would show other things.
