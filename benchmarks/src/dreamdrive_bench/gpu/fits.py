@@ -19,6 +19,7 @@ from dreamdrive.progress import Work
 from dreamdrive.run.report.held_out import score_scene
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
+from dreamdrive.street_network import NO_KNOWLEDGE
 from dreamdrive_bench.gpu.figures import Figures
 from dreamdrive_bench.gpu.pack import load_pack, name_of
 
@@ -96,7 +97,7 @@ def measure(figures: Figures, pack: Path, cases: tuple[Case, ...] = CASES) -> No
                 clips[size] = clip, geometry, {"geometry": geometry}
             options = QUALITIES[quality]
             if figures.pretended:
-                options = shortened(options, 2)
+                options = replace(shortened(options, 2), knowledge=NO_KNOWLEDGE)
             told = fitted(figures, *clips[size], replace(options, device=device))
             told = {"size": name_of(size), "quality": quality, "fit_of_its_process": number + 1} | told
             figures.put("fits", [*figures.values["fits"], told])

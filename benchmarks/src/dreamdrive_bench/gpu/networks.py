@@ -24,11 +24,12 @@ _SCHEDULE = {"beta_start": 0.00085, "beta_end": 0.012, "beta_schedule": "scaled_
 def measure(figures: Figures) -> None:
     """All of them, the largest first."""
     video_models.measure(figures)
-    for name, temporal in (("magicdrive", False), ("magicdrive-t", True)):
-        with figures.attempt(name):
-            _magicdrive(figures, name, temporal)
+    with figures.attempt("magicdrive"):
+        _magicdrive(figures, "magicdrive", temporal=False)
     with figures.attempt("dust3r"):
         _dust3r(figures)
+    with figures.attempt("magicdrive-t"):
+        _magicdrive(figures, "magicdrive-t", temporal=True)
 
 
 def magicdrive_configs(*, temporal: bool, tiny: bool) -> tuple[dict[str, Any], dict[str, Any]]:

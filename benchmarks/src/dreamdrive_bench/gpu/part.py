@@ -52,8 +52,9 @@ def _tests(figures: Figures) -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     lines = (done.stdout + done.stderr).strip().splitlines()
     figures.put("command", f"pytest {' '.join(command[4:])}")
-    figures.put("code", done.returncode)
-    figures.put("said", lines[-1:] if done.returncode == 0 else lines[-12:])
+    figures.put("summary", lines[-1:] if done.returncode == 0 else lines[-12:])
+    if done.returncode:
+        raise RuntimeError(f"pytest ended with {done.returncode}")
 
 
 def _steps(figures: Figures) -> None:

@@ -18,7 +18,7 @@ SIGMA = 10.0
 
 def size_of(figures: Figures) -> tuple[int, int]:
     """Width and height of the frames."""
-    return (128, 64) if figures.pretended else (1024, 576)
+    return (64, 64) if figures.pretended else (1024, 576)
 
 
 @torch.inference_mode()
@@ -71,7 +71,7 @@ def _step(figures: Figures, engine: Engine, latents: torch.Tensor) -> None:
         made[:] = [denoise(engine.velocity(seen), SIGMA * latents, SIGMA, scale, mask)]
 
     name = f"step, {str(engine.network('unet').dtype)[6:]}"
-    figures.put(kind.name, name, figures.timed(step, again=3))
+    figures.put(kind.name, name, figures.timed(step, again=1 if figures.pretended else 3))
     figures.put(kind.name, "finite", bool(torch.isfinite(made[0]).all()))
 
 

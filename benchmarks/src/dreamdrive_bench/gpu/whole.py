@@ -33,12 +33,12 @@ class Part:
 
 
 PARTS = (
-    Part("networks", 150),
+    Part("networks", 170),
     Part("kernels", 75, ("core", "gsplat")),
     Part("fits", 150, ("core", "gsplat")),
     Part("steps", 75, ("core", "gsplat")),
     Part("generate", 75),
-    Part("profile", 50, ("core", "gsplat")),
+    Part("profile", 60, ("core", "gsplat")),
 )
 TWO_CORES = Part("two_cores", 200)
 """Beside the parts after the fits: these compute on the GPU and hardly on cores."""
