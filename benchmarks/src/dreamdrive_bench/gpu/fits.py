@@ -16,7 +16,7 @@ from dreamdrive.compute.device import computing_on
 from dreamdrive.names import DeviceName, QualityName
 from dreamdrive.options import QUALITIES, Options
 from dreamdrive.progress import Work
-from dreamdrive.run.report.held_out import score_scene
+from dreamdrive.run import score_scene
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.street_network import NO_KNOWLEDGE
