@@ -8,6 +8,12 @@ where these disagree the two did not do the same work, and the exit code is 1.
 
 ``--fit`` makes a scene of 24 frames of PandaSet on the CPU and on the GPU: seconds of both fits, and what
 frames that were held out show of them.
+
+``--all`` measures everything about a GPU in one call of ``--minutes``, a process for each part: networks of
+published size with random weights, tests of the kernels, fits of a packed clip, the rows above, a generated
+clip, a profile. Kernels are compiled meanwhile, with ``--core`` the core as well. What fails is noted, and
+the rest goes on. ``--pack`` is the folder with the clip; where it does not exist it is made first, which
+takes pycolmap and minutes of two cores. ``--pretend`` tries all of it without a GPU, everything tiny.
 """
 
 import argparse
@@ -24,10 +30,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from dreamdrive.generate import generate
 from dreamdrive.names import DeviceName
-from dreamdrive.options import QUALITIES
-from dreamdrive.scene.control import Control
 from dreamdrive.scene.gaussians import SH_C0
 from dreamdrive.splat import NEAR_M, load_gsplat, rasterize, why_unusable
 from dreamdrive_bench.common.options import parser_of, size_of
@@ -193,6 +196,10 @@ def print_row(row: dict[str, Any]) -> None:
 
 def fitted(device: DeviceName) -> dict[str, Any]:
     """Seconds of static and joint fit of 24 frames of PandaSet, and the held-out frames in decibels."""
+    from dreamdrive.generate import generate  # here: the rows need none of what it brings along
+    from dreamdrive.options import QUALITIES
+    from dreamdrive.scene.control import Control
+
     control = Control(
         DATA / "clips/pandaset_002/front_camera", frames="20:68:2", fps=10, size=(480, 270), hold_out=8
     )
@@ -210,12 +217,33 @@ def options_of() -> argparse.Namespace:
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each figure")
     parser.add_argument("--fit", action="store_true", help="a scene of PandaSet, on the CPU and the GPU")
+    parser.add_argument("--all", action="store_true", help="everything, in one call")
+    parser.add_argument("--only", nargs="+", default=[], metavar="PART", help="of --all, these parts alone")
+    parser.add_argument("--pack", type=Path, metavar="FOLDER", help="the clip of --all; made if absent")
+    parser.add_argument("--core", action="store_true", help="with --all, compile the core of this checkout")
+    parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="that --all may take")
+    parser.add_argument("--pretend", action="store_true", help="with --all, no GPU and everything tiny")
     return parser.parse_args()
+
+
+def everything(options: argparse.Namespace) -> int:
+    """``--all``, and the pack that it takes."""
+    from dreamdrive_bench.gpu.recorded import make_pack
+    from dreamdrive_bench.gpu.whole import run_all
+
+    if options.pack and not options.pack.exists():
+        make_pack(options.pack)
+    if not options.all:
+        return 0
+    how = {"pretend": options.pretend, "core": options.core, "only": options.only}
+    return run_all(options.json or Path("gpu.json"), options.pack, minutes=options.minutes, **how)
 
 
 def main() -> int:
     """Measure all sizes with all numbers of Gaussians; 1 where the two did not do the same work."""
     options = options_of()
+    if options.all or options.pack:
+        return everything(options)
     trouble = why_unusable()
     if trouble is not None:
         sys.exit(f"gpu measures a GPU, and none can be used: {trouble}")

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pycolmap
 from jaxtyping import Bool, Float
 
 from dreamdrive.geometry.evidence import Features
@@ -38,33 +38,42 @@ class SparseModel:
         return np.isfinite(self.world_from_camera[:, 0, 0])
 
 
+@cache
+def _colmap() -> Any:
+    """The module pycolmap; loaded at first use, as cameras that are known need none of it."""
+    import pycolmap
+
+    return pycolmap
+
+
 def match(database: Path, features: Sequence[Features], camera: Camera, seed: int) -> None:
     """Write features, pair matches and two-view geometries into a new COLMAP database.
 
     Features are in order of time; pairs are verified with the pinhole of the working size.
     """
-    with _quiet(), pycolmap.Database.open(str(database)) as store:
+    with _quiet(), _colmap().Database.open(str(database)) as store:
         native = _native_camera(camera)
         store.write_camera(native, use_camera_id=True)
-        rig = pycolmap.Rig(rig_id=1)
+        rig = _colmap().Rig(rig_id=1)
         rig.add_ref_sensor(native.sensor_id)
         store.write_rig(rig, use_rig_id=True)
         for index, found in enumerate(features):
-            image = pycolmap.Image(name=f"{index:05d}", camera_id=1, image_id=index + 1)
+            image = _colmap().Image(name=f"{index:05d}", camera_id=1, image_id=index + 1)
             store.write_image(image, use_image_id=True)
-            frame = pycolmap.Frame(frame_id=index + 1, rig_id=1)
+            frame = _colmap().Frame(frame_id=index + 1, rig_id=1)
             frame.add_data_id(image.data_id)
             store.write_frame(frame, use_frame_id=True)
             store.write_keypoints(index + 1, found.keypoints_px)
             store.write_descriptors(
-                index + 1, pycolmap.FeatureDescriptors(pycolmap.FeatureExtractorType.SIFT, found.descriptors)
+                index + 1,
+                _colmap().FeatureDescriptors(_colmap().FeatureExtractorType.SIFT, found.descriptors),
             )
     _verify_pairs(database, camera, seed)
 
 
 def rematch(database: Path, camera: Camera, seed: int) -> None:
     """Verify the stored pair matches again with another camera."""
-    with _quiet(), pycolmap.Database.open(str(database)) as store:
+    with _quiet(), _colmap().Database.open(str(database)) as store:
         store.update_camera(_native_camera(camera))
         store.clear_two_view_geometries()
     _verify_pairs(database, camera, seed)
@@ -75,7 +84,7 @@ def map_globally(database: Path, count: int, seed: int) -> SparseModel | None:
 
     It starts at random positions of the seed. The largest model, or None when no model comes out.
     """
-    options = pycolmap.GlobalPipelineOptions()
+    options = _colmap().GlobalPipelineOptions()
     options.num_threads = 1
     options.random_seed = seed
     mapper = options.mapper
@@ -85,12 +94,12 @@ def map_globally(database: Path, count: int, seed: int) -> SparseModel | None:
     mapper.bundle_adjustment.refine_extra_params = False
     mapper.bundle_adjustment.ceres.solver_options.num_threads = 1
     mapper.global_positioning.use_gpu = False
-    return _largest(pycolmap.global_mapping, database, options, count)
+    return _largest(_colmap().global_mapping, database, options, count)
 
 
 def map_incrementally(database: Path, count: int, seed: int) -> SparseModel | None:
     """Incremental mapping with the thresholds of a forward drive; the second choice."""
-    options = pycolmap.IncrementalPipelineOptions()
+    options = _colmap().IncrementalPipelineOptions()
     options.num_threads = 1
     options.random_seed = seed
     options.multiple_models = False
@@ -105,7 +114,7 @@ def map_incrementally(database: Path, count: int, seed: int) -> SparseModel | No
     mapper.filter_max_reproj_error = 2.0
     mapper.abs_pose_refine_focal_length = False
     mapper.abs_pose_refine_extra_params = False
-    return _largest(pycolmap.incremental_mapping, database, options, count)
+    return _largest(_colmap().incremental_mapping, database, options, count)
 
 
 def adjust(
@@ -121,13 +130,13 @@ def adjust(
     twice and drops poor observations after each; otherwise it is done once, briefly, and all are kept, so
     that costs can be compared.
     """
-    native = pycolmap.Reconstruction(model.native)
+    native = _colmap().Reconstruction(model.native)
     lens = model.lens.copy()
     if focal_px is not None:
         lens[:2] = focal_px
     camera = native.cameras[1]
     if free_focal or free_radial or lens[4] != 0:
-        camera.model = pycolmap.CameraModelId.SIMPLE_RADIAL
+        camera.model = _colmap().CameraModelId.SIMPLE_RADIAL
         camera.params = [float(lens[:2].mean()), *lens[2:].tolist()]
     else:
         camera.params = lens[:4].tolist()
@@ -136,7 +145,7 @@ def adjust(
 
 
 def _native_camera(camera: Camera) -> Any:
-    native = pycolmap.Camera(
+    native = _colmap().Camera(
         model="PINHOLE",
         width=camera.width_px,
         height=camera.height_px,
@@ -148,24 +157,24 @@ def _native_camera(camera: Camera) -> Any:
 
 
 def _verify_pairs(database: Path, camera: Camera, seed: int) -> None:
-    matching = pycolmap.FeatureMatchingOptions()
+    matching = _colmap().FeatureMatchingOptions()
     matching.num_threads = 1
     matching.use_gpu = False
-    pairing = pycolmap.SequentialPairingOptions()
+    pairing = _colmap().SequentialPairingOptions()
     pairing.overlap = OVERLAP
     pairing.quadratic_overlap = True
     pairing.num_threads = 1
-    verification = pycolmap.TwoViewGeometryOptions()
+    verification = _colmap().TwoViewGeometryOptions()
     verification.detect_watermark = False
     verification.ransac.max_error = MATCH_ERROR_PX_AT_640 * camera.width_px / 640
     verification.ransac.random_seed = seed
     with _quiet():
-        pycolmap.match_sequential(
+        _colmap().match_sequential(
             database,
             matching_options=matching,
             pairing_options=pairing,
             verification_options=verification,
-            device=pycolmap.Device.cpu,
+            device=_colmap().Device.cpu,
         )
 
 
@@ -185,36 +194,36 @@ def _largest(
 
 
 def _adjust_in_place(native: Any, free_focal: bool, free_radial: bool, drop_outliers: bool) -> None:
-    options = pycolmap.BundleAdjustmentOptions()
+    options = _colmap().BundleAdjustmentOptions()
     options.refine_focal_length = free_focal
     options.refine_extra_params = free_radial
     options.print_summary = False
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_type = _colmap().LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = ROBUST_SCALE_PX
     options.ceres.solver_options.num_threads = 1
     options.ceres.solver_options.max_num_iterations = 100 if drop_outliers else 25
     options.ceres.solver_options.function_tolerance = 1e-7
     with _quiet():
         for _ in range(2 if drop_outliers else 1):
-            config = pycolmap.BundleAdjustmentConfig()
+            config = _colmap().BundleAdjustmentConfig()
             for image in native.reg_image_ids():
                 config.add_image(image)
-            config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-            pycolmap.create_default_bundle_adjuster(options, config, native).solve()
+            config.fix_gauge(_colmap().BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+            _colmap().create_default_bundle_adjuster(options, config, native).solve()
             if drop_outliers:
-                pycolmap.ObservationManager(native).filter_all_points3D(FILTER_ERROR_PX, FILTER_ANGLE_DEG)
+                _colmap().ObservationManager(native).filter_all_points3D(FILTER_ERROR_PX, FILTER_ANGLE_DEG)
         native.update_point_3d_errors()
 
 
 @contextmanager
 def _quiet() -> Generator[None, None, None]:
     """Keep COLMAP's own log off the terminal; what matters is returned."""
-    level = pycolmap.logging.minloglevel
-    pycolmap.logging.minloglevel = 3
+    level = _colmap().logging.minloglevel
+    _colmap().logging.minloglevel = 3
     try:
         yield
     finally:
-        pycolmap.logging.minloglevel = level
+        _colmap().logging.minloglevel = level
 
 
 def _read(native: Any, count: int) -> SparseModel:
@@ -244,7 +253,7 @@ def _read(native: Any, count: int) -> SparseModel:
 
 
 def _lens(camera: Any) -> np.ndarray:
-    radial = camera.params[3] if camera.model == pycolmap.CameraModelId.SIMPLE_RADIAL else 0.0
+    radial = camera.params[3] if camera.model == _colmap().CameraModelId.SIMPLE_RADIAL else 0.0
     focal = camera.focal_length_x, camera.focal_length_y
     return np.array([*focal, camera.principal_point_x, camera.principal_point_y, radial])
 

@@ -11,7 +11,6 @@ from torch import Tensor
 from dreamdrive.data.cameras.intrinsics import Calibration, calibration
 from dreamdrive.data.cameras.lens import SourceLens, Undistorter
 from dreamdrive.data.frames.size import Sizing
-from dreamdrive.data.photo import leading_frames
 from dreamdrive.errors import InputError
 from dreamdrive.scene.camera import Camera
 
@@ -106,6 +105,8 @@ def read_leading(
     Of a video, the frames nearest to the times of the model's rate are taken, ``count`` at most; ``size`` is
     width and height of the result. A lens in the calibration file is taken out of the frames.
     """
+    from dreamdrive.data.photo import leading_frames  # here: it brings the decoder of videos along
+
     check_size(size)
     raw, said = leading_frames(path, count, rate_hz)
     source = raw[0].size
