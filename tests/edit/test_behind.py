@@ -3,13 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import torch
 
 from dreamdrive.edit import Recolour, Remove, edited
 from dreamdrive.edit.behind import filled_behind
-from dreamdrive.scene.actor import Actor, Track
+from dreamdrive.scene.actor import Actor, ActorBox, Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.scene import Scene
@@ -92,6 +93,32 @@ def test_a_hole_is_filled_from_around_it_where_it_is(wall: Gaussians, tmp_path: 
     assert torch.equal(read, after.static.filled)
     edge = render_scene(after, CAMERA, 0.0).colour[:, :8] - render_scene(before, CAMERA, 0.0).colour[:, :8]
     assert edge.abs().max() < 1 / 255
+
+
+def test_what_a_view_shows_beside_the_actor_stays(wall: Gaussians) -> None:
+    """Both in the hole of the first view and beside it in the second, which is further to the right."""
+    off = wall.means[:, :2].abs().amax(dim=1) > 0.9
+    pose = np.eye(4)
+    pose[0, 3] = 1.5
+    aside = CAMERA.at(pose)
+    before = replace(scene(wall.select(off)), cameras=(CAMERA, aside))
+    after = edited(before, [Remove(0)])
+    gone = render_scene(before, aside, 0.1).dynamic_share - render_scene(after, aside, 0.1).dynamic_share
+    beyond = cv2.dilate((gone > 0.01).numpy().astype(np.uint8), np.ones((5, 5))) == 0
+    change = render_scene(after, aside, 0.1).colour - render_scene(before, aside, 0.1).colour
+    assert change.abs().amax(dim=-1).numpy()[beyond].max() < 1 / 255
+
+
+def test_what_stood_inside_the_actor_goes_too(wall: Gaussians) -> None:
+    """A view that saw half of it through the actor is not enough to keep it."""
+    before = scene(Gaussians.concatenate(wall, board(5.2, (0.2, 0.2), WHITE, 0.2)))
+    thin = replace(before.dynamic, logit_opacities=torch.full((len(before.dynamic),), -1.0))
+    (actor,) = before.actors
+    box = ActorBox(np.array([2.0, 1.0, 2.0]), np.array([0.0, 0.0, 1.0]))
+    track = replace(actor.track, positions_m=np.array([[0.0, 1.0, 5.0]] * 2))
+    with_box = replace(before, dynamic=thin, actors=(replace(actor, box=box, track=track),))
+    after = edited(with_box, [Remove(0)])
+    np.testing.assert_allclose(middle(after), GREEN, atol=0.05)
 
 
 def test_where_nobody_leaves_a_place_nothing_is_filled(wall: Gaussians) -> None:

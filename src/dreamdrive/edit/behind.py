@@ -1,7 +1,7 @@
 """The street behind what is taken away: what no frame saw of it goes, and holes are filled from around."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -10,18 +10,61 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from dreamdrive.compute.threads import one_torch_thread
-from dreamdrive.edit.shadow import LEAST_WEIGHT, UNSEEN, shade_of, without_shade
+from dreamdrive.edit.doubles import without_doubles
+from dreamdrive.edit.shadow import (
+    LEAST_WEIGHT,
+    REACH_M,
+    UNSEEN,
+    beside,
+    places_beside,
+    shade_of,
+    within,
+    without_shade,
+)
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import SH_C0, Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat import moment_of, render, render_scene
+from dreamdrive.splat import SceneView, moment_of, render_scene, shares
 
 HOLE_ALPHA, COVERED_ALPHA = 0.4, 0.1
 """Pixels with less of the street are a hole where the actor covered that much of them."""
+LEFT_ALPHA, RIM_PX = 0.01, 5
+"""Of a pixel, from which on it shows the actor, and how far around such pixels the splat's filter reaches."""
+TOUCH_PX = 1e-4
+"""What a Gaussian may add to a view beyond these, in pixels: nothing that can be seen."""
+SLIGHT_PX = 0.2
+"""As much of one in the shadow, or inside an actor. With 0.03 the shadow stays (0.3 to 1 dB of what changes
+on drawn streets), with 1 twice as many pixels change where nothing should."""
 VIEWS = 6
 """Recorded views that holes are filled from; what one of them filled the next does not fill again."""
 _AROUND_PX, _LEAST_PX = 5.0, 12
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What each static Gaussian adds to each view, in pixels (V, N), and where an actor left (V, H, W).
+
+    ``there`` is with the actors where they were, ``away`` without, ``beyond`` without and outside ``left``,
+    ``aside`` that outside their shadows too.
+    """
+
+    there: Float[Tensor, "v n"]
+    away: Float[Tensor, "v n"]
+    beyond: Float[Tensor, "v n"]
+    aside: Float[Tensor, "v n"]
+    left: tuple[Bool[np.ndarray, "h w"], ...]
+
+    @property
+    def best(self) -> Float[Tensor, " n"]:
+        """The most that one would add to any view."""
+        return self.away.amax(dim=0)
+
+    @property
+    def hidden(self) -> Bool[Tensor, " n"]:
+        """Which ones views would show, and have seen through the actors alone."""
+        unseen = self.there.amax(dim=0) < UNSEEN * self.best
+        return (self.best > LEAST_WEIGHT) & unseen & (self.beyond.amax(dim=0) < TOUCH_PX)
 
 
 @one_torch_thread()
@@ -30,24 +73,26 @@ def filled_behind(before: Scene, after: Scene) -> Scene:
 
     Only the recorded views tell where something was hidden. Of what never moved, Gaussians that all of them
     saw through the actors alone are taken out; what then is a hole in a view is filled with colours and
-    depths from beside it (colours by Telea 2004), at its place in space, and marked as filled. The shadow of
-    who leaves is taken off, as far as it lies on road that no frame saw in the light.
+    depths from beside it (colours by Telea 2004), at its place in space, and marked as filled, as far as no
+    view shows it beside what was hidden. The shadow of who leaves is taken off, as far as it lies on road
+    that no frame saw in the light. Smaller actors inside one who leaves go with it.
     """
     leave = [actor for actor in before.actors if _leaves(actor, after)]
     if not leave:
         return after
+    after = without_doubles(before, after, leave)
     views = [i for i in before.front.tolist() if not before.held_out[i]]
-    there, away = (torch.stack([_weights(s, before, view) for view in views]) for s in (before, after))
-    best = away.amax(dim=0)
-    made = _lit(before, after, leave, views, there, best)
-    unseen = (best > LEAST_WEIGHT) & (there.amax(dim=0) < UNSEEN * best)
-    made = replace(made, static=made.static.select(torch.nonzero(~unseen).squeeze(1)))
+    seen = _seen(before, after, leave, views)
+    made = _lit(before, after, leave, views, seen)
+    away = seen.hidden | _ghosts(before, leave, views, seen)
+    made = replace(made, static=made.static.select(~away))
+    street = len(made.static)
     chosen = views[:: max(1, len(views) // VIEWS)]
     for view in chosen[::-1]:  # from the last on: it is the nearest to what lies behind
         added = _fill(before, made, view)
         if added is not None:
             made = made.with_standing(added)
-    return made
+    return _clipped(made, street, views, seen.left)
 
 
 def _leaves(actor: Actor, after: Scene) -> bool:
@@ -60,31 +105,74 @@ def _leaves(actor: Actor, after: Scene) -> bool:
     return True
 
 
-def _lit(
-    before: Scene,
-    after: Scene,
-    leave: Sequence[Actor],
-    views: Sequence[int],
-    seen: Float[Tensor, "v n"],
-    most: Float[Tensor, " n"],
-) -> Scene:
+def _seen(before: Scene, after: Scene, leave: Sequence[Actor], views: Sequence[int]) -> _Seen:
+    there, away, left = [], [], []
+    for view in views:
+        camera, t_s = before.cameras[view], float(before.times_s[view])
+        was = render_scene(before, camera, t_s)
+        gone = (was.dynamic_share - render_scene(after, camera, t_s).dynamic_share).abs() > LEFT_ALPHA
+        left.append(cv2.dilate(gone.numpy().astype(np.uint8), np.ones((RIM_PX, RIM_PX))) > 0)
+        shaded = left[-1] | _road_beside(leave, camera, was, t_s, before.up)
+        there.append(_weights(before, before, view)[:, 0])
+        away.append(_weights(after, before, view, ~left[-1], ~shaded))
+    every = torch.stack(away)
+    return _Seen(torch.stack(there), every[..., 0], every[..., 1], every[..., 2], tuple(left))
+
+
+def _road_beside(
+    leave: Sequence[Actor], camera: Camera, seen: SceneView, t_s: float, up: Float[np.ndarray, "3"]
+) -> Bool[np.ndarray, "h w"]:
+    """Pixels of a view that show road where the shadow of an actor may be."""
+    rows, columns = np.indices((camera.height_px, camera.width_px)) + 0.5
+    points = camera.lift(np.column_stack([columns.ravel(), rows.ravel(), seen.depth_m.numpy().ravel()]))
+    found = np.zeros(len(points), dtype=bool)
+    for actor in leave:
+        if actor.box is not None:
+            found |= beside(places_beside(points, actor, t_s, up), actor, REACH_M)
+    return found.reshape(camera.height_px, camera.width_px)
+
+
+def _lit(before: Scene, after: Scene, leave: Sequence[Actor], views: Sequence[int], seen: _Seen) -> Scene:
     """``after`` with the shadows of those who leave off the road; without a box none is found."""
     made, times_s = after, before.times_s[list(views)].tolist()
+    aside = seen.aside.amax(dim=0) >= SLIGHT_PX
     for actor in leave:
-        shade = None if actor.box is None else shade_of(before, actor, times_s, seen, most)
-        made = made if shade is None else without_shade(made, shade)
+        if actor.box is not None:
+            shade = shade_of(before, actor, times_s, seen.there, seen.best)
+            made = made if shade is None else without_shade(made, shade.less(aside.numpy()))
     return made
 
 
-def _weights(scene: Scene, recorded: Scene, view: int) -> Float[Tensor, " n"]:
-    """What each static Gaussian adds to a view, in pixels: the gradient of a channel that all share."""
-    camera, t_s = recorded.cameras[view], float(recorded.times_s[view])
-    gaussians, _ = moment_of(scene, t_s)
-    with torch.enable_grad():
-        ones = torch.ones(len(gaussians), 1, requires_grad=True)
-        render(gaussians, camera, channels=ones, sh_degree=0).channels.sum().backward()
-    assert ones.grad is not None
-    return ones.grad[: len(scene.static), 0]
+def _ghosts(before: Scene, leave: Sequence[Actor], views: Sequence[int], seen: _Seen) -> Bool[Tensor, " n"]:
+    """What never moved inside the box of one who leaves: where a thing drives nothing can stand."""
+    means = before.static.means.double().numpy()
+    found = np.zeros(len(means), dtype=bool)
+    for actor in leave:
+        for t_s in before.times_s[list(views)].tolist():
+            if actor.box is not None and actor.track.first_s <= t_s <= actor.track.last_s:
+                found |= within(places_beside(means, actor, t_s, before.up), actor)
+    return torch.from_numpy(found) & (seen.beyond.amax(dim=0) < SLIGHT_PX)
+
+
+def _weights(
+    scene: Scene, recorded: Scene, view: int, *masks: Bool[np.ndarray, "h w"]
+) -> Float[Tensor, "n k"]:
+    """What each static Gaussian adds to a view in pixels, to all of it and to each mask."""
+    camera = recorded.cameras[view]
+    gaussians, _ = moment_of(scene, float(recorded.times_s[view]))
+    every = np.ones((camera.height_px, camera.width_px), dtype=bool)
+    of = torch.from_numpy(np.stack([every, *masks], axis=-1).astype(np.float32))
+    return shares(gaussians, camera, of)[: len(scene.static)]
+
+
+def _clipped(made: Scene, first: int, views: Sequence[int], left: Sequence[Bool[np.ndarray, "h w"]]) -> Scene:
+    """Less those static Gaussians from row ``first`` on that a view shows beside what was hidden."""
+    if first == len(made.static):
+        return made
+    kept = torch.ones(len(made.static), dtype=torch.bool)
+    for view, mask in zip(views, left, strict=True):
+        kept[first:] &= _weights(made, made, view, ~mask)[first:, 1] < TOUCH_PX
+    return replace(made, static=made.static.select(kept))
 
 
 @torch.no_grad()

@@ -38,13 +38,20 @@ class Shade:
     rows: Int[np.ndarray, " n"]
     share: Float[np.ndarray, " n"]
 
+    def less(self, others: Bool[np.ndarray, " m"]) -> "Shade":
+        """Without those of a mask of the static Gaussians."""
+        kept = ~others[self.rows]
+        return Shade(self.rows[kept], self.share[kept])
 
-def places_beside(scene: Scene, actor: Actor, t_s: float) -> Float[np.ndarray, "n 3"]:
-    """Where the static Gaussians are, ahead of, left of and above the middle of the bottom of an actor."""
+
+def places_beside(
+    points: Float[np.ndarray, "n 3"], actor: Actor, t_s: float, up: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "n 3"]:
+    """Where points are, ahead of, left of and above the middle of the bottom of an actor."""
     assert actor.box is not None
-    at, up = actor.track.at(np.array([t_s])), scene.up
+    at = actor.track.at(np.array([t_s]))
     ahead = actor.box.pointing(float(at.yaw_rad[0]), up)
-    away_m = scene.static.means.double().numpy() - at.positions_m[0]
+    away_m = points - at.positions_m[0]
     return away_m @ np.stack([ahead, np.cross(up, ahead), up], axis=1)
 
 
@@ -53,6 +60,14 @@ def beside(places_m: Float[np.ndarray, "n 3"], actor: Actor, reach_m: float) -> 
     assert actor.box is not None
     half_m = actor.box.size_m[:2] / 2 + reach_m
     return (np.abs(places_m[:, :2]) < half_m).all(axis=1) & (np.abs(places_m[:, 2]) < _LOW_M)
+
+
+def within(places_m: Float[np.ndarray, "n 3"], actor: Actor) -> Bool[np.ndarray, " n"]:
+    """Which places are well inside an actor, above the road."""
+    assert actor.box is not None
+    length_m, width_m, height_m = actor.box.size_m
+    inside = np.abs(places_m[:, :2]) < 0.45 * np.array([length_m, width_m])
+    return inside.all(axis=1) & (places_m[:, 2] > _LOW_M) & (places_m[:, 2] < height_m)
 
 
 def shade_of(
@@ -71,7 +86,8 @@ def shade_of(
         seen: What each static Gaussian adds to each view, in pixels.
         most: What it would add to the best of them with the actor away.
     """
-    places_m = np.stack([places_beside(scene, actor, t_s) for t_s in times_s])
+    means = scene.static.means.double().numpy()
+    places_m = np.stack([places_beside(means, actor, t_s, scene.up) for t_s in times_s])
     zone = np.stack([beside(each, actor, REACH_M) for each in places_m])
     full = torch.maximum(seen.amax(dim=0), most).numpy()
     alone = (full > LEAST_WEIGHT) & ((seen.numpy() * ~zone).max(axis=0) < UNSEEN * full)
@@ -80,7 +96,7 @@ def shade_of(
     if min(len(rows), len(light)) < _LEAST:
         return None
     bright = _bright(scene.static)
-    flat = scene.static.means.double().numpy() @ (np.eye(3) - np.outer(scene.up, scene.up))
+    flat = means @ (np.eye(3) - np.outer(scene.up, scene.up))
     own, others = (_smooth(flat[each], bright[each], flat[rows]) for each in (rows, light))
     share = own / np.maximum(others, 1e-3)
     dark = share < DARK

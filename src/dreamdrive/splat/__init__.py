@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         stage_seconds as stage_seconds,
         threads as threads,
     )
+    from dreamdrive.splat.shares import shares as shares
     from dreamdrive.splat.ssim import (
         C1 as C1,
         C2 as C2,

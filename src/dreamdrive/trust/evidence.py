@@ -11,7 +11,7 @@ from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat import SceneView, moment_of, render, render_scene
+from dreamdrive.splat import SceneView, moment_of, render_scene, shares
 from dreamdrive.vision.residual import BLOCK_PX
 
 MOST_VIEWS = 16
@@ -125,19 +125,13 @@ def _rows(scene: Scene, t_s: float) -> Int[Tensor, " m"]:
 def _shares(
     gaussians: Gaussians, camera: Camera, squared_error: Float[np.ndarray, "bh bw"]
 ) -> tuple[Float[Tensor, " m"], Float[Tensor, " m"]]:
-    """What each Gaussian adds to a view in pixels, and that times the error there.
-
-    It is the gradient of channels that all share.
-    """
+    """What each Gaussian adds to a view in pixels, and that times the error there."""
     off = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
     spread = squared_error.repeat(BLOCK_PX, axis=0).repeat(BLOCK_PX, axis=1)
     off[: spread.shape[0], : spread.shape[1]] = spread
-    with torch.enable_grad():
-        ones = torch.ones(len(gaussians), 2, requires_grad=True)
-        drawn = render(gaussians, camera, channels=ones, sh_degree=0).channels
-        (drawn[..., 0].sum() + (drawn[..., 1] * torch.from_numpy(off)).sum()).backward()
-    assert ones.grad is not None
-    return ones.grad[:, 0], ones.grad[:, 1]
+    told = torch.from_numpy(np.stack([np.ones_like(off), off], axis=-1))
+    weight, error = shares(gaussians, camera, told).unbind(1)
+    return weight, error
 
 
 def _towards(
