@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from dreamdrive.cli.terminal.arguments import GeometryName, PriorName
 from dreamdrive.cli.terminal.asked import asked
-from dreamdrive.cli.terminal.machine import STARTED_S, stop_like_an_interruption, use_all_cores
+from dreamdrive.cli.terminal.machine import STARTED_S, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.files.given import check_given
 from dreamdrive.files.output import check_place
@@ -132,7 +132,6 @@ def generate(
     use_all_cores()
     from dreamdrive.generate import generate as make
 
-    stop_like_an_interruption()
     console = Console(highlight=False, soft_wrap=True, markup=False)
     loading_s = time.perf_counter() - STARTED_S
     with Bars(console) as bars:

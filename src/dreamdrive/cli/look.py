@@ -11,7 +11,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.terminal.arguments import parse_size
-from dreamdrive.cli.terminal.machine import stop_like_an_interruption, use_all_cores
+from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import check_given
@@ -70,7 +70,6 @@ def look(
     from dreamdrive.show import draw_look
     from dreamdrive.street_network import load_knowledge, look as see, write_look
 
-    stop_like_an_interruption()
     network = load_knowledge(knowledge)
     given = _read(input, frames, wanted, intrinsics, hfov)
     _check_memory(given)

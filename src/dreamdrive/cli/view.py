@@ -9,7 +9,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
-from dreamdrive.cli.terminal.machine import Terminated, stop_like_an_interruption, use_all_cores
+from dreamdrive.cli.terminal.machine import Terminated, use_all_cores
 from dreamdrive.cli.terminal.tables import print_table
 from dreamdrive.errors import InputError, installing
 from dreamdrive.files.given import SCENE, check_there
@@ -83,7 +83,6 @@ def _check(out: Path, port: int, during: bool, output: Path) -> None:
 
 def _serve(viewer: "Viewer", watch: "RunWatch | None", console: Console) -> None:
     """Until somebody asks it to end."""
-    stop_like_an_interruption()  # pycolmap, which runs read with, has put its own in place
     try:
         while True:
             if watch is not None and watch.look():

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -80,3 +82,17 @@ def test_two_frames_are_refused_with_a_reason(clip: Clip) -> None:
     outcome = run(make_clip(straight([0.5])))
     assert outcome.settled is None
     assert "too few" in outcome.reasons[0]
+
+
+def test_a_request_to_terminate_stays_ours() -> None:
+    """In a process of its own: pycolmap puts its handler in place when it is loaded."""
+    code = """
+import os, signal, sys
+signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(7))
+from dreamdrive.geometry.cameras.sfm import _colmap
+_colmap()
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 7, done.stderr
+    assert not done.stderr

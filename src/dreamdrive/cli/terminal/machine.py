@@ -34,10 +34,7 @@ class Terminated(KeyboardInterrupt):
 
 
 def stop_like_an_interruption() -> None:
-    """Let a request to terminate, or a terminal that goes away, end the work as Ctrl-C does.
-
-    To be called again after pycolmap is imported: it installs a handler that prints the stack and dies.
-    """
+    """Let a request to terminate, or a terminal that goes away, end the work as Ctrl-C does."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         _asked.append(number)

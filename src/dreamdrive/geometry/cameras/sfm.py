@@ -1,5 +1,7 @@
 """Structure from motion of one camera with pycolmap, one thread, seeded."""
 
+import signal
+import threading
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -40,9 +42,15 @@ class SparseModel:
 
 @cache
 def _colmap() -> Any:
-    """The module pycolmap; loaded at first use, as cameras that are known need none of it."""
+    """The module pycolmap; loaded at first use, as cameras that are known need none of it.
+
+    It puts a handler in place by which a request to terminate prints the stack and dies: ours comes back.
+    """
+    ours = signal.getsignal(signal.SIGTERM)
     import pycolmap
 
+    if callable(ours) and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, ours)
     return pycolmap
 
 
