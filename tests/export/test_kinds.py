@@ -9,7 +9,7 @@ from tests.cli.test_commands import driving
 from tests.scene.scenes import make_scene
 
 
-@pytest.mark.parametrize("name", EXPORTS.names)
+@pytest.mark.parametrize("name", list(EXPORTS))
 def test_every_export_says_what_it_does_not_hold(name: str) -> None:
     left_out = EXPORTS.choose(name).left_out
     assert left_out is not None

@@ -73,9 +73,8 @@ def fitted(street: Any, name: str, device: torch.device) -> Any:
     )
 
 
-@pytest.mark.parametrize(
-    "name", [n if n == "hybrid" else pytest.param(n, marks=pytest.mark.slow) for n in REPRESENTATIONS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REPRESENTATIONS)
 def test_every_representation_has_the_same_losses_off_the_cpu(street, losses, name: str) -> None:
     here = fitted(street, name, CPU)
     expected = losses[2:]

@@ -21,7 +21,7 @@ def steps_of(clip: Clip) -> tuple[list[int], int]:
     return [done for done, _ in seen], total
 
 
-@pytest.mark.parametrize("looked", [False, True])
+@pytest.mark.parametrize("looked", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_drive_takes_all_steps(looked: bool) -> None:
     clip = make_clip(straight([0.5] * 7))
     if looked:

@@ -49,7 +49,7 @@ def render(
         fps: Frames a second; without it a file's own, and for the others 20 at least.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
-        stay_within_trust: Bend drives towards the recorded one where they would be 3 dB worse than that.
+        stay_within_trust: Bend drives towards the recorded one where less than 22 dB is to be expected.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:

@@ -23,6 +23,6 @@ if TYPE_CHECKING:
         reach_m as reach_m,
     )
     from dreamdrive.trust.trust import SceneTrust as SceneTrust, TrustedView as TrustedView
-    from dreamdrive.trust.within import within_trust as within_trust
+    from dreamdrive.trust.within import LEAST_DB as LEAST_DB, within_trust as within_trust
 
 __all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

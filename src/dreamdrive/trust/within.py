@@ -1,5 +1,7 @@
 """A drive that stays where a scene can be believed."""
 
+import math
+
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d
@@ -7,14 +9,18 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.trust.reach import FALL_DB
-from dreamdrive.trust.trust import SceneTrust
+from dreamdrive.trust.trust import HALF_RMS, SceneTrust
 
+LEAST_DB = -20 * math.log10(HALF_RMS)
+"""PSNR at which trust is one half: 22 dB."""
 _PLACES = 16
 _HALVINGS = 6
 
 
 def within_trust(trust: SceneTrust, path: Trajectory, recorded: Trajectory) -> Trajectory:
-    """A drive drawn towards the recorded one, so far that it is nowhere ``FALL_DB`` worse than that.
+    """A drive drawn towards the recorded one, so far that less than one half is believed nowhere.
+
+    Where the recorded drive itself is hardly better, it is held to ``FALL_DB`` below that.
 
     At some places, evenly in time, the largest share of the way from the nearest recorded pose to that of the
     drive is sought by halving; between them it is the least of both, smoothed. Times stay.
@@ -27,7 +33,7 @@ def within_trust(trust: SceneTrust, path: Trajectory, recorded: Trajectory) -> T
     near = _nearest(path, recorded)
     rows = np.unique(np.linspace(0, len(path) - 1, min(_PLACES, len(path))).round().astype(int))
     poses, times_s = path.world_from_camera, path.times_s
-    shares = np.array([_share(trust, near[row], poses[row], times_s[row]) for row in rows])
+    shares = np.array([_share(trust, near[row], poses[row], float(times_s[row])) for row in rows])
     if (shares == 1).all():
         return path
     # A place between two of those that were tried is held to the worse of them.
@@ -43,9 +49,9 @@ def _share(
     camera = trust.scene.cameras[0]
 
     def expected_db(share: float) -> float:
-        return trust.view(camera.at(_between(near, pose, share)), float(t_s)).psnr_db
+        return trust.view(camera.at(_between(near, pose, share)), t_s).psnr_db
 
-    least_db = expected_db(0.0) - FALL_DB
+    least_db = min(LEAST_DB, expected_db(0.0) - FALL_DB)
     if expected_db(1.0) >= least_db:
         return 1.0
     low, high = 0.0, 1.0
