@@ -150,6 +150,7 @@ def test_pictures_of_colours_are_blurred(
         assert "--blur changes colours in pictures" in done.err
 
 
+@pytest.mark.slow
 def test_trust_is_told_of_drives_aside_and_keeps_them_near(run: Run, tmp_path: Path) -> None:
     save_scene(wall(), tmp_path / "scene")
     begin = ("render", tmp_path / "scene", "--fps", "5", "--format", "png", "-o", tmp_path / "made")
