@@ -42,10 +42,10 @@ def believed(trust: "SceneTrust") -> str:
 
     path_db, beside_db = expected_db(trust, 0.0), min(expected_db(trust, m) for m in (-_BESIDE_M, _BESIDE_M))
     ends = {word: reach_m(trust, side) for word, side in (("left", -1), ("right", 1))}
-    words = " and ".join(f"{_from(metres, SHIFTS_M[-1])} to the {word}" for word, metres in ends.items())
+    words = " and from ".join(f"{_from(metres, SHIFTS_M[-1])} to the {word}" for word, metres in ends.items())
     return (
         f"PSNR to expect: {path_db:.1f} dB on the recorded drive, {beside_db:.1f} dB {_BESIDE_M:g} m aside; "
-        f"{FALL_DB:g} dB less than on it {words}"
+        f"{FALL_DB:g} dB less from {words} on"
     )
 
 
