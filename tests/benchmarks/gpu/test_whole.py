@@ -50,7 +50,7 @@ def test_a_part_is_stopped_at_its_limit_and_the_next_goes_on(tmp_path, monkeypat
     monkeypatch.setattr(whole, "PART", [sys.executable, "-c", code])
     out, begin = tmp_path / "gpu.json", time.monotonic()
     assert whole.run_all(out, None, minutes=1, pretend=True, core=False) == 1
-    assert time.monotonic() - begin < 10
+    assert time.monotonic() - begin < 30
     told = json.loads(out.read_text())["parts"]
     assert told["networks"]["a"] == 1
     assert "were over" in told["networks"]["stopped"]
@@ -109,7 +109,7 @@ def test_rows_of_a_pretended_gpu_are_a_scene(tmp_path):
 @pytest.mark.slow
 def test_all_parts_of_a_pretended_gpu(packed, tmp_path):
     out = tmp_path / "gpu.json"
-    assert whole.run_all(out, packed[0], minutes=8, pretend=True, core=False) == 0
+    assert whole.run_all(out, packed[0], minutes=20, pretend=True, core=False) == 0
     parts = json.loads(out.read_text())["parts"]
     assert set(parts) == {"networks", "kernels", "fits", "two_cores", "steps", "generate", "profile"}
     networks = parts["networks"]

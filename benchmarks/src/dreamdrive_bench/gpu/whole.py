@@ -21,6 +21,7 @@ PART = [sys.executable, "-m", "dreamdrive_bench.gpu.part"]
 COMPILE = [sys.executable, "-c", "from dreamdrive.splat import load_gsplat; load_gsplat()"]
 _PAUSE_S = 0.25
 _LINES = 8
+_PRETENDED = 4
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,8 @@ def _run_parts(
 
     def started(part: Part, **how: Any) -> Job:
         command = [*PART, part.name, "--json", str(schedule.folder / f"{part.name}.json"), *more]
-        return schedule.start(part.name, command, part.limit_s, **how)
+        # Where a GPU is pretended, cores do what the limits are not meant for.
+        return schedule.start(part.name, command, part.limit_s * (_PRETENDED if pretend else 1), **how)
 
     for part in wanted:
         schedule.wait([compiled[name] for name in part.after if name in compiled])
