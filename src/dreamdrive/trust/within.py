@@ -5,7 +5,6 @@ import math
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d
-from scipy.spatial.transform import Rotation, Slerp
 
 from dreamdrive.scene.trajectory import Trajectory
 from dreamdrive.trust.reach import FALL_DB
@@ -70,8 +69,5 @@ def _nearest(path: Trajectory, recorded: Trajectory) -> Float[np.ndarray, "t 4 4
 def _between(
     one: Float[np.ndarray, "4 4"], other: Float[np.ndarray, "4 4"], share: float
 ) -> Float[np.ndarray, "4 4"]:
-    pose = np.eye(4)
-    turns = Slerp([0, 1], Rotation.from_matrix(np.stack([one[:3, :3], other[:3, :3]])))
-    pose[:3, :3] = turns(share).as_matrix()
-    pose[:3, 3] = (1 - share) * one[:3, 3] + share * other[:3, 3]
-    return pose
+    way = Trajectory(np.stack([one, other]), np.array([0.0, 1.0]))
+    return way.at(np.array([share]))[0]

@@ -129,21 +129,21 @@ def samples_of_scene(
     cameras = in_order(log)
     pinholes = [_pinhole(camera, image) for camera in cameras]
     trust = None if options.least_psnr_db is None else SceneTrust.of(scene)
+    least_db = options.least_psnr_db if options.least_psnr_db is not None else -np.inf
     for number, place in enumerate(places, first):
         rig = [
             pinhole.at(scene_from_log @ place.world_from_ego @ camera.ego_from_camera)
             for camera, pinhole in zip(cameras, pinholes, strict=True)
         ]
-        if trust is not None and not _believed(trust, rig, place.time_s - link.start_s, options):
+        if trust is not None and _expected_db(trust, rig, place.time_s - link.start_s) < least_db:
             yield TOO_DOUBTFUL
         else:
             yield _sample(scene, log, map, link, rig, cameras, pinholes, place, number, grid, options)
 
 
-def _believed(trust: SceneTrust, rig: list[Camera], t_s: float, options: PathOptions) -> bool:
-    """Whether the pictures of all cameras are expected to be as good as is asked for."""
-    told_db = [trust.view(camera, t_s).psnr_db for camera in rig]
-    return bool(np.mean(told_db) >= (options.least_psnr_db or -np.inf))
+def _expected_db(trust: SceneTrust, rig: list[Camera], t_s: float) -> float:
+    """PSNR to expect, the mean over the pictures of all cameras."""
+    return float(np.mean([trust.view(camera, t_s).psnr_db for camera in rig]))
 
 
 def _sample(
