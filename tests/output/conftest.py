@@ -1,6 +1,7 @@
 """A server that runs commands, and their inputs, once for all tests of this folder."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -30,8 +31,10 @@ class Server:
 @pytest.fixture(scope="session")
 def server() -> Iterator[Server]:
     arguments = [sys.executable, "-m", "tests.output.server"]
+    # As commands have it, which set it before torch is there: beside others threads that spin take ten times as long.
+    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
     with subprocess.Popen(
-        arguments, cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        arguments, cwd=ROOT, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"

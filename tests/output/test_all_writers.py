@@ -19,14 +19,12 @@ from tests.cli.test_commands_document import Help, commands, help_of
 from tests.files.test_output import tree
 from tests.output.conftest import Server
 from tests.output.server import Call, Came
-from tests.output.writers import WRITERS, Writer
+from tests.output.writers import FURTHER_MOMENTS, WRITERS, Writer
 
 __all__ = ["help_of"]
 Tree = dict[str, bytes | str | None]
 _PRIVATE = ".dreamdrive-"
 _LOCK = ".dreamdrive.lock"
-_MOMENTS, _FURTHER_MOMENTS = 20, 6
-"""Moments at which a command is stopped; and at which each further format of it is, through the same door."""
 ELSEWHERE = {("evaluate perception", "json"), ("view", "output")}
 """A second place that a command writes to, by what the others write JSON with; and what the page writes when
 somebody asks for it, by what render, plan and edit write with (``tests/view/test_saving.py``)."""
@@ -46,7 +44,7 @@ class Desk:
     def moments(self) -> int:
         """At how many moments it is stopped."""
         first = next(each for each in WRITERS.values() if name_of(each) == name_of(self.writer))
-        return _MOMENTS if self.writer is first else _FURTHER_MOMENTS
+        return self.writer.moments if self.writer is first else FURTHER_MOMENTS
 
     @property
     def place(self) -> Path:

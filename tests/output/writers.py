@@ -31,7 +31,8 @@ class Writer:
 
     ``ending`` is that of a file, and empty of a folder. With ``force`` what an earlier run left is replaced.
     A run ``goes_on`` in a folder where an earlier one stopped. Files that are not the same in each run are
-    ``loose``.
+    ``loose``. It is stopped at so many ``moments``; each further format of a command, which goes through the
+    same door, at ``FURTHER_MOMENTS``.
     """
 
     command: str
@@ -39,6 +40,7 @@ class Writer:
     force: tuple[str, ...] = ()
     goes_on: bool = False
     loose: tuple[str, ...] = ()
+    moments: int = 20
 
     @property
     def words(self) -> list[str]:
@@ -46,6 +48,7 @@ class Writer:
         return [*self.command.split(), *self.force]
 
 
+FURTHER_MOMENTS = 6
 _SMALL = "--frames 0:2 --size 64x40"
 _FORCE = ("--force",)
 WRITERS = {
@@ -112,6 +115,7 @@ WRITERS = {
     "train photo": Writer(
         "train photo --streets 1 --each 1 --steps 1 --batch 1 -o OUT",
         goes_on=True,
+        moments=8,  # a run takes ten seconds: it starts another process
     ),
 }
 
