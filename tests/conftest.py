@@ -9,6 +9,8 @@ from hypothesis import settings
 
 from tests.limit import Limit
 
+# As commands have it, before torch is there: beside another worker threads that spin take ten times as long.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 # The same examples every time, so many, and what else runs on the machine is no failure of a test.
 settings.register_profile("the same everywhere", max_examples=50, derandomize=True, deadline=None)
 settings.load_profile("the same everywhere")

@@ -1,7 +1,6 @@
 """A server that runs commands, and their inputs, once for all tests of this folder."""
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -31,10 +30,8 @@ class Server:
 @pytest.fixture(scope="session")
 def server() -> Iterator[Server]:
     arguments = [sys.executable, "-m", "tests.output.server"]
-    # As commands have it, which set it before torch is there: beside others threads that spin take ten times as long.
-    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
     with subprocess.Popen(
-        arguments, cwd=ROOT, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        arguments, cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
