@@ -11,7 +11,6 @@ Without a clip the built-in street is used, small and as a draft: about a minute
 """
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -40,10 +39,7 @@ def main() -> None:
 
     # The camera of the middle frame, one metre to the right: axes are x right, y down, z forward, in metres.
     middle = len(scene.cameras) // 2
-    camera = scene.cameras[middle]
-    pose = camera.world_from_camera.copy()
-    pose[:3, 3] += pose[:3, 0]
-    view = render_scene(scene, replace(camera, world_from_camera=pose), float(scene.times_s[middle]))
+    view = render_scene(scene, scene.cameras[middle].moved(right_m=1.0), float(scene.times_s[middle]))
 
     picture = np.rint(view.colour.numpy() * 255).astype(np.uint8)
     path = given.out.parent / f"{given.out.name}_one_metre_right.png"

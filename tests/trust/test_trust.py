@@ -1,6 +1,7 @@
 """What was seen well is trusted more than what was not: from aside, up close, behind, fitted badly."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,8 +19,8 @@ from dreamdrive.trust import (
     LEAST_DB,
     RISING,
     SceneTrust,
-    aside,
     error_network,
+    expected_db,
     fall_m,
     reach_m,
     within_trust,
@@ -81,7 +82,7 @@ def trust() -> SceneTrust:
 
 
 def test_the_farther_aside_the_less_it_is_trusted(trust: SceneTrust) -> None:
-    told = [trust.view(aside(trust.scene.cameras[3], metres), 0.3).psnr_db for metres in (0, 0.5, 1, 2, 4)]
+    told = [trust.view(trust.scene.cameras[3].moved(metres), 0.3).psnr_db for metres in (0, 0.5, 1, 2, 4)]
     assert told == sorted(told, reverse=True)
     assert told[0] > told[-1] + 3
 
@@ -141,7 +142,7 @@ def test_what_was_filled_in_counts_as_never_seen() -> None:
 
 
 def test_angles_and_closeness_of_a_view(trust: SceneTrust) -> None:
-    camera = aside(CAMERA.at(pose_at(7.0)), 3.0)
+    camera = CAMERA.at(pose_at(7.0)).moved(3.0)
     _, told = seen_with(trust.evidence, trust.scene, camera, 0.0)
     error, unseen, angle, closer, _ = told[HIGH // 2, WIDE // 2].tolist()
     # In the middle is what is straight ahead, 3 m to the right: seen from the path under atan(3 / 14).
@@ -184,7 +185,7 @@ def test_no_view_looked_behind_or_beside() -> None:
     space = FreeSpace.of(scene)
     on_path = space.hidden(scene.cameras[3], render(scene.static, scene.cameras[3]).expected_depth_m())
     assert float(on_path.mean()) < 0.05
-    beside = aside(scene.cameras[0], 6.0)
+    beside = scene.cameras[0].moved(6.0)
     depth_m = render(scene.static, beside).expected_depth_m()
     far = space.hidden(beside, depth_m)
     # To the right nothing was looked into until far ahead.
@@ -215,7 +216,8 @@ def test_more_of_what_counts_against_a_block_never_helps() -> None:
 def test_where_a_drive_is_no_longer_good(trust: SceneTrust) -> None:
     assert fall_m((0, 1, 2), (30.0, 28.0, 24.0)) == pytest.approx(1.25)
     assert fall_m((0, 1, 2), (30.0, 29.0, 28.0)) is None
-    left, right = reach_m(trust, -1), reach_m(trust, 1)
+    expected = partial(expected_db, trust)
+    left, right = reach_m(expected, -1), reach_m(expected, 1)
     assert 0.05 < right < 8
     assert left == pytest.approx(right, rel=0.2)  # the wall is as wide to both sides
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,8 +41,9 @@ def believed(trust: "SceneTrust") -> str:
     """What to expect on the recorded drive and beside it, and where that is no longer good."""
     from dreamdrive.trust import FALL_DB, SHIFTS_M, expected_db, reach_m
 
-    path_db, beside_db = expected_db(trust, 0.0), min(expected_db(trust, m) for m in (-_BESIDE_M, _BESIDE_M))
-    ends = {word: reach_m(trust, side) for word, side in (("left", -1), ("right", 1))}
+    expected = cache(partial(expected_db, trust))
+    path_db, beside_db = expected(0.0), min(expected(-_BESIDE_M), expected(_BESIDE_M))
+    ends = {word: reach_m(expected, side) for word, side in (("left", -1), ("right", 1))}
     words = " and from ".join(f"{_from(metres, SHIFTS_M[-1])} to the {word}" for word, metres in ends.items())
     return (
         f"PSNR to expect: {path_db:.1f} dB on the recorded drive, {beside_db:.1f} dB {_BESIDE_M:g} m aside; "

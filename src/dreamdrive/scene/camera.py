@@ -98,6 +98,12 @@ class Camera:
         """The same pinhole at another pose."""
         return replace(self, world_from_camera=np.asarray(world_from_camera, dtype=np.float64))
 
+    def moved(self, right_m: float = 0.0, down_m: float = 0.0, ahead_m: float = 0.0) -> "Camera":
+        """The same view from so far along its own axes."""
+        pose = self.world_from_camera.copy()
+        pose[:3, 3] += pose[:3, :3] @ [right_m, down_m, ahead_m]
+        return self.at(pose)
+
     def resized(self, width_px: int, height_px: int) -> "Camera":
         """The same view sampled on another pixel grid."""
         sx, sy = width_px / self.width_px, height_px / self.height_px

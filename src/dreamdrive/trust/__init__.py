@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from dreamdrive.trust.reach import (
         FALL_DB as FALL_DB,
         SHIFTS_M as SHIFTS_M,
-        aside as aside,
         expected_db as expected_db,
         fall_m as fall_m,
         reach_m as reach_m,

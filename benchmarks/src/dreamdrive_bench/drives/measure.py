@@ -93,11 +93,9 @@ def sheet_of(
     rows = []
     for frame in [i for held in held_out for i in (held - 1, held)]:
         camera, t_s = geometry.cameras[frame], float(clip.times_s[frame])
-        away = camera.world_from_camera.copy()
-        away[:3, 3] += ASIDE_M * away[:3, 0]
         moving = 255 * np.repeat(shares[frame][..., None] >= 0.5, 3, 2)
         mask = (0.5 * clip.frames[frame] + 0.5 * moving).astype(np.uint8)
-        views = [_bytes(render_scene(scene, each, t_s).colour) for each in (camera, camera.at(away))]
+        views = [_bytes(render_scene(scene, each, t_s).colour) for each in (camera, camera.moved(ASIDE_M))]
         rows.append(np.hstack([clip.frames[frame], *views, mask, _depth(geometry.depth_m[frame])]))
     return np.vstack(rows)
 

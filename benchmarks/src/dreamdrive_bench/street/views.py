@@ -26,10 +26,10 @@ def true_cameras(seed: int, view: str) -> list[Camera]:
     made = world_of(seed)
     if view.startswith("shift"):
         metres = float(view.removeprefix("shift_"))
-        offset = np.array([metres * _free_side(made, metres), 0.0, 0.0])
-        return [_moved(camera, offset) for camera in made.cameras]
+        right_m = metres * _free_side(made, metres)
+        return [camera.moved(right_m) for camera in made.cameras]
     if view == "raise_1":
-        return [_moved(camera, np.array([0.0, -1.0, 0.0])) for camera in made.cameras]
+        return [camera.moved(down_m=-1.0) for camera in made.cameras]
     if view == "yaw_10":
         cos, sin = np.cos(np.deg2rad(10)), np.sin(np.deg2rad(10))
         turn = np.eye(4)
@@ -85,18 +85,11 @@ def true_frames(seed: int, view: str, folder: Path) -> UInt8[np.ndarray, "f h w 
     return frames
 
 
-def _moved(camera: Camera, offset_m: Float[np.ndarray, "3"]) -> Camera:
-    pose = camera.world_from_camera.copy()
-    pose[:3, 3] += pose[:3, :3] @ offset_m
-    return camera.at(pose)
-
-
 def _free_side(made: DriveTruth, metres: float) -> int:
     """1 for right, -1 for left."""
 
     def worth(side: int) -> tuple[int, float]:
-        offset = np.array([side * metres, 0.0, 0.0])
-        clear = clearance_m(made.boxes, [_moved(camera, offset) for camera in made.cameras])
+        clear = clearance_m(made.boxes, [camera.moved(side * metres) for camera in made.cameras])
         return -int((clear < NEAR_M).sum()), float(clear.min())
 
     return 1 if worth(1) > worth(-1) else -1

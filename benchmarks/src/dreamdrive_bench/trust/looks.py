@@ -18,7 +18,7 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
 from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.street_network import weights_of
-from dreamdrive.trust import SHIFTS_M, SceneTrust, aside, features_of, seen_with
+from dreamdrive.trust import SHIFTS_M, SceneTrust, features_of, seen_with
 from dreamdrive.vision.residual import residual_of
 from dreamdrive_bench.common.machine import COMMIT
 from dreamdrive_bench.drives.drive import Drive
@@ -96,7 +96,7 @@ def _places(seed: int) -> list[tuple[tuple[float, float], list[Camera]]]:
     """Cameras of all frames beside the path, above it, and turned: ``shift_m`` and ``away_m`` of each."""
     cameras = world_of(seed).cameras
     shifts_m = [side * metres for metres in SHIFTS_M if metres <= _FARTHEST_M for side in (-1, 1)]
-    from_aside = [((m, abs(m)), [aside(camera, m) for camera in cameras]) for m in shifts_m]
+    from_aside = [((m, abs(m)), [camera.moved(m) for camera in cameras]) for m in shifts_m]
     others = [((math.nan, away_m), true_cameras(seed, view)) for view, away_m in _OTHERS]
     return [*from_aside, *others]
 

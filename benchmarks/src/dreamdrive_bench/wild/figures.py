@@ -72,6 +72,4 @@ def _view(scene: Scene, camera: Camera, t_s: float) -> tuple[Picture, float]:
 
 
 def _aside(scene: Scene, frame: int, right_m: float) -> tuple[Picture, float]:
-    pose = scene.cameras[frame].world_from_camera.copy()
-    pose[:3, 3] += right_m * pose[:3, 0]
-    return _view(scene, scene.cameras[frame].at(pose), float(scene.times_s[frame]))
+    return _view(scene, scene.cameras[frame].moved(right_m), float(scene.times_s[frame]))
