@@ -26,7 +26,9 @@ from dreamdrive_bench.headline import standing_out
 
 FILM = ROOT / "docs/images/film.webp"
 MOST_BYTES = 2_000_000
-_PANEL_PX, _RATE_HZ = 320, 8
+RATE_HZ = 8
+"""Pictures a second of films."""
+_PANEL_PX = 320
 
 
 def main() -> None:
@@ -86,7 +88,7 @@ def write(path: Path, frames: list[Image]) -> None:
         with new_file(path) as partial:
             pictures[0].save(
                 partial, "WEBP", save_all=True, append_images=pictures[1:], loop=0, quality=quality,
-                duration=1000 // _RATE_HZ, method=4,
+                duration=1000 // RATE_HZ, method=4,
             )  # fmt: skip
         if path.stat().st_size <= MOST_BYTES:
             return

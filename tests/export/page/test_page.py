@@ -47,12 +47,6 @@ def _drawn(page: "Page", camera: Camera, t_s: float) -> tuple[np.ndarray, np.nda
     return np.array(got["rgb"], np.uint8).reshape(*shape, 3), np.array(got["alpha"]).reshape(shape)
 
 
-def _aside(camera: Camera, right_m: float) -> Camera:
-    pose = camera.world_from_camera.copy()
-    pose[:3, 3] += right_m * pose[:3, 0]
-    return camera.at(pose)
-
-
 @pytest.mark.page
 @pytest.mark.slow
 def test_a_browser_draws_what_the_program_draws(finished: Path, tmp_path: Path) -> None:
@@ -65,7 +59,7 @@ def test_a_browser_draws_what_the_program_draws(finished: Path, tmp_path: Path) 
     with opened(tmp_path / "a.html", "t=0&plain", (camera.width_px, camera.height_px)) as page:
         for t_s in times_s.tolist():
             here = camera.at(scene.trajectory.at(np.array([t_s]))[0])
-            for view in (here, _aside(here, 1.0)):
+            for view in (here, here.moved(right_m=1.0)):
                 seen = render_scene(scene, view, t_s)
                 picture, alpha = _drawn(page, view, t_s)
                 assert _psnr(picture, seen.picture) > 40
@@ -80,7 +74,7 @@ def test_the_address_says_when_and_from_where(finished: Path, tmp_path: Path) ->
     scene = load_scene(finished / "scene")
     export(scene, "html", tmp_path / "a.html")
     t_s = float(scene.times_s[2])
-    view = _aside(scene.cameras[2], 1.0)
+    view = scene.cameras[2].moved(right_m=1.0)
     with opened(tmp_path / "a.html", f"t={t_s}&right=1&plain", (view.width_px, view.height_px)) as page:
         page.wait_for_function("document.getElementById('clock').textContent")
         shot = np.array(cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR))[..., ::-1]

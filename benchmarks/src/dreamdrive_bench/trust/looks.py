@@ -2,24 +2,20 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from dreamdrive.build import build_scene
 from dreamdrive.files.digest import digest, file_digest
 from dreamdrive.files.output import new_file
-from dreamdrive.options import QUALITIES
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.clip import Clip
-from dreamdrive.scene.scene import Scene
 from dreamdrive.scene.similarity import fit_similarity
-from dreamdrive.stored import load_scene, save_scene
 from dreamdrive.street_network import weights_of
 from dreamdrive.trust import SHIFTS_M, SceneTrust, features_of, seen_with
 from dreamdrive.vision.residual import residual_of
+from dreamdrive_bench.common.drafts import draft_of
 from dreamdrive_bench.common.machine import COMMIT
 from dreamdrive_bench.drives.drive import Drive
 from dreamdrive_bench.street.case import FRAMES, Case, case_digest, clip_of, world_of
@@ -73,7 +69,7 @@ def of_drive(drive: Drive, knowledge: str, runs: Path) -> Looks:
 
 def _look_at_world(case: Case, knowledge: str, runs: Path) -> Looks:
     made = world_of(case.seed)
-    scene = _scene_of(clip_of(case), knowledge, runs / f"scene-{case.seed}")
+    scene = draft_of(clip_of(case), knowledge, runs / f"scene-{case.seed}")
     similarity = fit_similarity(scene.cameras, made.cameras)
     seen = _Seen(SceneTrust.of(scene))
     for k, camera in enumerate(scene.cameras):
@@ -103,7 +99,7 @@ def _places(seed: int) -> list[tuple[tuple[float, float], list[Camera]]]:
 
 def _look_at_drive(drive: Drive, knowledge: str, runs: Path) -> Looks:
     clip = drive.clip()
-    scene = _scene_of(clip, knowledge, runs / f"scene-{drive.name}")
+    scene = draft_of(clip, knowledge, runs / f"scene-{drive.name}")
     seen = _Seen(SceneTrust.of(scene))
     for k in np.flatnonzero(scene.held_out).tolist():
         seen.add(scene.cameras[k], k, (0.0, 0.0), clip.frames[k])
@@ -132,13 +128,6 @@ class _Seen:
     def looks(self) -> Looks:
         """All of them."""
         return Looks(**{f.name: np.array([row[f.name] for row in self._rows]) for f in fields(Looks)})
-
-
-def _scene_of(clip: Clip, knowledge: str, folder: Path) -> Scene:
-    if not folder.exists():
-        built = build_scene(clip, replace(QUALITIES["draft"], knowledge=knowledge))
-        save_scene(built.scene, folder)
-    return load_scene(folder)
 
 
 def _kept(path: Path, key: str, make: Callable[[], Looks]) -> Looks:
