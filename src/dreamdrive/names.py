@@ -6,7 +6,8 @@ QualityName = Literal["draft", "standard", "high"]
 MethodName = Literal["dreamdrive", "paper"]
 TrafficName = Literal["still", "flow"]
 RepresentationName = Literal["static", "deformable", "hexplane", "vibration", "hybrid"]
-DeviceName = Literal["cpu", "cuda"]
+DeviceName = str
+"""``cpu``, ``cuda`` or ``cuda:N``; ``compute.device.computing_on`` refuses what is none."""
 Stage = Literal["prior", "look", "geometry", "initialise", "static", "score", "group", "fit"]
 Show = Literal["colour", "depth", "dynamic", "static", "trust"]
 Format = Literal["mp4", "png", "npz"]

@@ -8,10 +8,13 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode, return_and_correct_aliasing
 from torch.utils._pytree import tree_leaves, tree_map
 from torch.utils.backend_registration import _setup_privateuseone_for_python_backend
+
+from dreamdrive.splat import BACKENDS, reference
 
 _setup_privateuseone_for_python_backend("pretended")
 DEVICE = torch.device("pretended:0")
@@ -79,3 +82,26 @@ def pretending() -> Generator[torch.device, None, None]:
             yield DEVICE
     finally:
         torch._C._set_only_lift_cpu_tensors(False)
+
+
+def splat_there(patch: pytest.MonkeyPatch) -> None:
+    """Off the CPU the reference splats."""
+    patch.setattr(reference, "check_device", lambda tensors, kind: None)
+    patch.setattr(reference, "check_pose", lambda pose: None)
+    patch.setitem(BACKENDS, "gsplat", reference.rasterize_reference)
+
+
+def copies_to_the_cpu(patch: pytest.MonkeyPatch) -> list[torch.Size]:
+    """Grows by the shape of each tensor that is copied from the device, but for single numbers."""
+    seen: list[torch.Size] = []
+    really = computed
+
+    def counted(func: Any, args: Any, kwargs: Any) -> Any:
+        result = really(func, args, kwargs)
+        from_there = any(isinstance(value, Elsewhere) for value in args)
+        if from_there and isinstance(result, torch.Tensor) and not isinstance(result, Elsewhere):
+            seen.append(result.shape)
+        return result
+
+    patch.setitem(globals(), "computed", counted)
+    return seen

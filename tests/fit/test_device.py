@@ -12,8 +12,7 @@ from dreamdrive.fit import DensifySettings, FitOptions, Parts, SeedOptions, fit,
 from dreamdrive.fit.trainer import Trainer
 from dreamdrive.motion import REPRESENTATIONS, Tracks
 from dreamdrive.options import QUALITIES
-from dreamdrive.splat import BACKENDS, reference
-from tests.fit.pretended import DEVICE, Elsewhere, pretending
+from tests.fit.pretended import DEVICE, Elsewhere, pretending, splat_there
 from tests.streets import small_street, street_clip, true_geometry
 
 STEPS = 25
@@ -43,9 +42,7 @@ def losses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         return loss
 
     monkeypatch.setattr(Trainer, "step", listening)
-    monkeypatch.setattr(reference, "check_device", lambda tensors, kind: None)
-    monkeypatch.setattr(reference, "check_pose", lambda pose: None)
-    monkeypatch.setitem(BACKENDS, "gsplat", reference.rasterize_reference)
+    splat_there(monkeypatch)
     return told
 
 

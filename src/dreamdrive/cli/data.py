@@ -4,10 +4,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
 from dreamdrive.cli.terminal.arguments import DataSetName, commands_of
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.terminal.tables import print_table
 from dreamdrive.errors import InputError
@@ -35,7 +35,7 @@ def list_(
     """
     from dreamdrive.data.table import DATASETS
 
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     if path is None:
         rows = [(name, DATASETS.choose(name).about) for name in DATASETS]
         for name, about in rows:
@@ -65,7 +65,7 @@ def check(
     names = logs.names(path)
     if scene is not None:
         names = (choose_scene(names, scene, path),)
-    console, rows = Console(highlight=False, soft_wrap=True, markup=False), list[tuple[str, ...]]()
+    console, rows = plain(), list[tuple[str, ...]]()
     said: dict[str, list[str]] = {}
     with Bars(console) as bars:
         for number, name in enumerate(names):
@@ -140,7 +140,7 @@ def show(
         raise InputError(f"--step {step}: {log.name} has the labelled times 0 to {len(log.times_s) - 1}")
     above = draw_layout(layout_of_log(log), float(log.times_s[-1]))
     write_png(output, draw_log(log, row, above))
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     for sentence in (*log.notes, *log.problems):
         console.print(sentence)
     console.print(str(output))

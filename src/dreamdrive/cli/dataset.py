@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
 from dreamdrive.cli.scene import open_scene
-from dreamdrive.cli.terminal.arguments import DataSetName, commands_of, parse_size
+from dreamdrive.cli.terminal.arguments import DataSetName, DeviceFlag, commands_of, parse_size
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
@@ -42,6 +42,7 @@ class SampleFlags:
         turned: Most that they look to the left or right of the recorded direction in degrees.
         least_trust: PSNR to expect of a sample's pictures in decibels, below which it is left out; without it
             any will do.
+        device: Where pictures of scenes are drawn; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md).
         format: Of the pictures.
         seed: Of the paths.
     """
@@ -52,6 +53,7 @@ class SampleFlags:
     aside: Annotated[float, arg(metavar="M")] = 1.5
     turned: Annotated[float, arg(metavar="DEG")] = 6.0
     least_trust: Annotated[float | None, arg(metavar="DB", help_behavior_hint="")] = None
+    device: DeviceFlag = "cpu"
     format: Literal["jpg", "png"] = "jpg"
     seed: Annotated[int, arg(metavar="S")] = 0
 
@@ -83,15 +85,17 @@ def make(
         check_there(path, f"{SCENE}, or {DATASET}")
     check_free(out, force, SAMPLES_KIND)
     use_all_cores()
+    from dreamdrive.compute.device import computing_on
+    from dreamdrive.splat import why_unusable
     from dreamdrive.tasks.perception import BevGrid, ImageSize, PathOptions, write_bev_set
 
     image, grid = ImageSize(height, width, cut), BevGrid(sample.cells, sample.cells)
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     paths = PathOptions(sample.aside, sample.turned, least_psnr_db=sample.least_trust)
     made = _Maker(image, grid, paths, sample.per_scene, sample.seed)
     plans = [plan for source in sources for plan in made.plans(source, labels, dataset, scene)]
     start = time.perf_counter()
-    with Bars(console) as bars:
+    with computing_on(sample.device, why_unusable), Bars(console) as bars:
         write_bev_set(
             made.samples(plans),
             out,
@@ -147,6 +151,7 @@ class _Maker:
 
     def samples(self, plans: list[_Plan]) -> Iterator[tuple["SampleNote", "BevSample"]]:
         """All of them, one after the other."""
+        from dreamdrive.compute.device import chosen_device
         from dreamdrive.tasks.perception import draw_places, samples_of_log, samples_of_scene, span_of
 
         named: Counter[str] = Counter()
@@ -159,7 +164,8 @@ class _Maker:
                 self.left_out["as good as another one"] += near
                 first = named[log.name]  # several scenes may be of one drive
                 named[log.name] += len(places)
-                made = samples_of_scene(scene, log, places, self.image, self.grid, self.path, first)
+                there = scene.on(chosen_device())
+                made = samples_of_scene(there, log, places, self.image, self.grid, self.path, first)
             for sample in made:
                 if isinstance(sample, str):
                     self.left_out[sample] += 1

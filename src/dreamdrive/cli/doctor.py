@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.compute.machine import available_cores, free_bytes
 from dreamdrive.data.table import DATASETS
@@ -46,12 +47,12 @@ def doctor() -> None:
             f"less than {_NEEDED_BYTES / 1e9:.0f} GB of memory is free: use fewer frames or a smaller --size"
         )
     table.add_row("GPU", _gpu())
-    console = Console()
-    console.print(table)
+    console = plain()
+    console.print(table, soft_wrap=False)
     _backends(console)
     missing += trouble
     for line in missing:
-        console.print(f"missing: {line}", soft_wrap=True)
+        console.print(f"missing: {line}")
     if missing:
         raise InputError(f"{len(missing)} thing{'s are' if len(missing) > 1 else ' is'} missing, see above")
     console.print("everything that generate needs is there")
@@ -79,9 +80,9 @@ def _backends(console: Console) -> None:
                 lines = ["cannot be used", str(error)]
             except ImportError:
                 return  # what dreamdrive itself needs is missing, which is told below
-            console.print(f"\n {what} {name}: {lines[0]}", highlight=False, soft_wrap=True)
+            console.print(f"\n {what} {name}: {lines[0]}")
             for line in lines[1:]:
-                console.print(f"   {line}", highlight=False, soft_wrap=True)
+                console.print(f"   {line}")
     _choices(console)
     console.print()
 
@@ -90,14 +91,14 @@ def _choices(console: Console) -> None:
     """Which prior an input is given to where none is named."""
     from dreamdrive.prior import auto_prior
 
-    console.print("\n without --prior", highlight=False)
+    console.print("\n without --prior")
     for what, path in (
         ("a recording", None),
         ("a photo", Path("photo.jpg")),
         ("a layout", Path("layout.json")),
     ):
         choice = auto_prior(path)
-        console.print(f"   {what}: {choice.name}, as {choice.why}", highlight=False, soft_wrap=True)
+        console.print(f"   {what}: {choice.name}, as {choice.why}")
 
 
 def _about(entry: "Backend | DataSet | Export") -> list[str]:

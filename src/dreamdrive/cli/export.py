@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
 from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import ExportName, parse_times
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS, Export, function
@@ -103,7 +103,7 @@ def export(
     check_there(labels, DATASET, "--labels")
     chosen.check(output, force)
     said = _written(chosen, to, out, output, force, asked)
-    Console(highlight=False, markup=False, soft_wrap=True).print("\n".join([str(output), *said]))
+    plain().print("\n".join([str(output), *said]))
 
 
 def _check_asked(chosen: Export, asked: _Asked) -> None:
@@ -123,7 +123,7 @@ def _written(chosen: Export, to: str, out: Path, output: Path, force: bool, aske
     from dreamdrive.run import stages_of
 
     pictures = "clip" in chosen.takes
-    with Bars(Console()) as bars:
+    with Bars(plain()) as bars:
         how: dict[str, Any] = {"replace": force, "progress": partial(bars, to)}
         if asked.blur:
             how["blur"] = blurring()

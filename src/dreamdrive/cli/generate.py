@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from dreamdrive.cli.terminal.arguments import GeometryName, PriorName
+from dreamdrive.cli.terminal.arguments import DEVICES, GeometryName, PriorName
 from dreamdrive.cli.terminal.asked import asked
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import STARTED_S, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.files.given import check_given
@@ -80,7 +81,7 @@ class FitFlags:
     method: MethodName = "dreamdrive"
     representation: Annotated[RepresentationName | None, arg(help_behavior_hint="(default: hybrid)")] = None
     options: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
-    device: Annotated[DeviceName | None, arg(help_behavior_hint="(default: cpu)")] = None
+    device: Annotated[DeviceName | None, arg(metavar=DEVICES, help_behavior_hint="(default: cpu)")] = None
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def generate(
     use_all_cores()
     from dreamdrive.generate import generate as make
 
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     loading_s = time.perf_counter() - STARTED_S
     with Bars(console) as bars:
         outcome = make(

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import check_given, check_there
 from dreamdrive.files.kinds import IMPORTED_KIND
@@ -48,7 +48,7 @@ def import_splats(
     read = read_splat_scene(file, cameras=cameras, up=up)
     with new_folder(output, replace=force, kind=IMPORTED_KIND) as folder:
         save_scene(read.scene, folder / "scene")
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console = plain()
     console.print(f"{output} holds {len(read.scene.static)} Gaussians.")
     if read.dropped:
         console.print(f"{read.dropped} of the file cannot be drawn (NaN, or far beyond bounds): left out.")

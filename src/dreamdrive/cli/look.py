@@ -7,10 +7,10 @@ from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.terminal.arguments import parse_size
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
@@ -73,7 +73,7 @@ def look(
     network = load_knowledge(knowledge)
     given = _read(input, frames, wanted, intrinsics, hfov)
     _check_memory(given)
-    console, start = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
+    console, start = plain(), time.perf_counter()
     with Bars(console) as bars:
         seen = see(
             given.frames,

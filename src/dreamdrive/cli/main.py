@@ -30,6 +30,7 @@ from dreamdrive.cli.plan import plan
 from dreamdrive.cli.prior import prior
 from dreamdrive.cli.render import render
 from dreamdrive.cli.terminal.arguments import REGISTRY
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import Terminated, asked_to_end, stop_like_an_interruption
 from dreamdrive.cli.view import view
 from dreamdrive.errors import InputError
@@ -74,7 +75,7 @@ def main() -> None:
 
     Exit codes: 0 done, 2 the user's mistake (the message alone on stderr), 130 interrupted, 143 terminated.
     """
-    errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    errors = plain(stderr=True)
     # What is imported stays: to look through it for garbage again and again, and once more at the end, takes
     # a second of three.
     gc.set_threshold(_GARBAGE)
@@ -119,7 +120,7 @@ def _run(errors: Console) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     if sys.argv[1:] == ["--version"]:
-        Console(highlight=False).print(f"dreamdrive {dreamdrive.__version__}")
+        plain().print(f"dreamdrive {dreamdrive.__version__}")
         return
     said = RichHandler(console=errors, show_time=False, show_path=False)
     logging.basicConfig(level="WARNING", format="%(message)s", handlers=[said])

@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
@@ -62,7 +62,7 @@ def plan(
     after = _moved(planned, instant, method)
     drive = path_of_plan(after.plan, instant, now_s, _RATE_HZ)
     folder = out / "video" / f"plan_{name}" if output is None else output
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console = plain()
     with Bars(console) as bars:
         said = partial(bars, "plan", total=len(drive))
         write_planned(

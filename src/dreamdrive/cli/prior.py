@@ -3,16 +3,16 @@
 from pathlib import Path
 from typing import Annotated
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, Positional, arg
 
-from dreamdrive.cli.terminal.arguments import PriorName, commands_of, parse_action, parse_size
+from dreamdrive.cli.terminal.arguments import DeviceFlag, PriorName, commands_of, parse_action, parse_size
 from dreamdrive.cli.terminal.asked import asked
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import CLIP, check_there
-from dreamdrive.names import DeviceName, DtypeName
+from dreamdrive.names import DtypeName
 
 _ASKED = ("frames", "fps", "size", "intrinsics", "hfov_deg", "trajectory", "action", "prompt", "steps")
 """What a prior alone is asked for."""
@@ -37,19 +37,17 @@ def convert(
     _check_packages()
     from dreamdrive.prior.vista.convert import convert as run
 
-    console = Console(highlight=False)
+    console = plain()
     with Bars(console) as bars:
         made = run(
             file, folder, dtype, replace=force, progress=lambda done, total: bars("convert", done, total)
         )
     kind = made.stored.kind
-    console.print(
-        f"{folder}: {kind.title}, for --prior {kind.name} --weights {folder}", soft_wrap=True, markup=False
-    )
+    console.print(f"{folder}: {kind.title}, for --prior {kind.name} --weights {folder}")
     for note in made.notes:
-        console.print(note, soft_wrap=True, markup=False)
+        console.print(note)
     for what, count in made.ignored.items():
-        console.print(f"left out, not needed: {what}, {count} tensors", soft_wrap=True)
+        console.print(f"left out, not needed: {what}, {count} tensors")
 
 
 def sample(
@@ -59,7 +57,7 @@ def sample(
     asked: asked("prior sample", *_ASKED),  # pyright: ignore[reportInvalidTypeForm]
     prior: Annotated[PriorName | None, arg(help_behavior_hint="")] = None,
     weights: Annotated[str | None, arg(metavar="PATH|NAME", help_behavior_hint="")] = None,
-    device: DeviceName = "cpu",
+    device: DeviceFlag = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
     force: bool = False,
 ) -> None:
@@ -80,7 +78,7 @@ def sample(
     from dreamdrive.compute.device import computing_on
     from dreamdrive.run import sample as run
 
-    console = Console(highlight=False)
+    console = plain()
     with computing_on(device), Bars(console) as bars:
         clip = run(
             control,
@@ -92,9 +90,9 @@ def sample(
         )
     width, height = clip.size
     cameras = f" of {len(clip.rig)} cameras" if len(clip.rig) > 1 else ""
-    console.print(f"{out}: {len(clip)} frames{cameras}, {width}x{height}", soft_wrap=True, markup=False)
+    console.print(f"{out}: {len(clip)} frames{cameras}, {width}x{height}")
     for note in clip.provenance.get("notes", []):
-        console.print(note, soft_wrap=True, markup=False)
+        console.print(note)
     options = [f"--fps {1 / clip.interval_s:g}", f"--size {width}x{height}"]
     options += [
         f"--{option} {out / name}"
@@ -107,7 +105,7 @@ def sample(
         if (out / name).is_file()
     ]
     go_on = f"dreamdrive generate {out} -o OUT {' '.join(options)}"
-    console.print(f"to go on: {go_on}", soft_wrap=True, markup=False)
+    console.print(f"to go on: {go_on}")
 
 
 def features(
@@ -121,7 +119,7 @@ def features(
     sigma: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.3)")] = None,
     channels: Annotated[int | None, arg(metavar="C", help_behavior_hint="(default: 16)")] = None,
     action: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
-    device: DeviceName = "cpu",
+    device: DeviceFlag = "cpu",
     seed: Annotated[int, arg(metavar="S")] = 0,
 ) -> None:
     """Take the features of a recorded clip from the network of Vista or Stable Video Diffusion.
@@ -148,7 +146,7 @@ def features(
     from dreamdrive.run import clip_features
 
     options = {"block": block, "sigma": sigma, "channels": channels}
-    console = Console(highlight=False)
+    console = plain()
     with computing_on(device), Bars(console) as bars:
         made = clip_features(
             clip,
@@ -164,7 +162,7 @@ def features(
     for name, array in made.arrays.items():
         count, rows, columns, kept = array.shape
         words = f"{name}, {count} frames of {columns}x{rows}, {kept} channels"
-        console.print(f"{out}: {words}", soft_wrap=True, markup=False)
+        console.print(f"{out}: {words}")
 
 
 def _check_packages() -> None:

@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from rich.console import Console
 from tyro.conf import Positional, UseAppendAction, arg
 
 from dreamdrive.cli.scene import blurring, less, open_scene
-from dreamdrive.cli.terminal.arguments import parse_size
+from dreamdrive.cli.terminal.arguments import DeviceFlag, parse_size
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.trust import believed, bent, trust_of
@@ -33,6 +33,7 @@ def render(
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
     blur: bool = False,
     stay_within_trust: bool = False,
+    device: DeviceFlag = "cpu",
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
 ) -> None:
     """Drive through a scene and write videos, pictures or arrays.
@@ -50,6 +51,8 @@ def render(
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
         stay_within_trust: Bend drives towards the recorded one where less than 22 dB is to be expected.
+        device: Where pictures are drawn; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md). Trust is told on
+            the CPU.
         output: The video or folder, of several trajectories a folder for all; without it OUT/video.
     """
     if not trajectory:
@@ -62,8 +65,10 @@ def render(
         raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
     check_there(out, SCENE)
     use_all_cores()
+    from dreamdrive.compute.device import computing_on
     from dreamdrive.drive import drives_of
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
+    from dreamdrive.splat import why_unusable
 
     options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
     scene = less(open_scene(out), without)
@@ -74,13 +79,13 @@ def render(
     if format == "mp4":
         for drive in drives:
             video_rate(drive, options)
-    console = Console()
+    console = plain()
     for drive, place in zip(drives, places(out, output, drives, options), strict=True):
         start, count = time.perf_counter(), len(drive.path)
-        with Bars(console) as bars:
-            write_drive(place, scene, drive, options, partial(bars, "render", total=count), trust)
+        with computing_on(device, why_unusable) as where, Bars(console) as bars:
+            write_drive(place, scene.on(where), drive, options, partial(bars, "render", total=count), trust)
         seconds = time.perf_counter() - start
         rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
-        console.print(f"{place}: {rate}", soft_wrap=True, markup=False)
+        console.print(f"{place}: {rate}")
     if trust is not None:
-        console.print(believed(trust), soft_wrap=True, markup=False)
+        console.print(believed(trust))

@@ -9,6 +9,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import Terminated, use_all_cores
 from dreamdrive.cli.terminal.tables import print_table
 from dreamdrive.errors import InputError, installing
@@ -44,7 +45,7 @@ def view(
         during: The folder is one that generate is still working on, or is about to: show what there is.
         output: Folder for what is saved on the page.
     """
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     if out is None:
         _list(console)
         return

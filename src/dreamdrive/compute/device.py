@@ -1,7 +1,8 @@
 """The device that computes: the CPU, or a CUDA device where the user asks for one."""
 
+import re
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import torch
 from torch import Tensor
@@ -39,26 +40,37 @@ def chosen_device() -> torch.device:
     return _chosen
 
 
-@contextmanager
-def computing_on(
-    name: str, why_unusable: Callable[[], str | None] = why_no_cuda
-) -> Generator[torch.device, None, None]:
-    """Let networks run on a device, in the whole process.
+def device_of(name: str, why_unusable: Callable[[], str | None] = why_no_cuda) -> torch.device:
+    """The device of a name: "cpu", "cuda", or one GPU of several, "cuda:1".
 
     Args:
-        name: "cpu" or "cuda".
+        name: See above.
         why_unusable: What keeps CUDA from being used, or None.
 
     Raises:
         InputError: There is no such device here.
     """
+    if re.fullmatch(r"cpu|cuda(:\d{1,3})?", name) is None:
+        raise InputError(f"--device {name}: expected cpu, cuda, or one GPU of several such as cuda:1")
+    there = torch.device(name)
+    if there.type == "cuda":
+        if (trouble := why_unusable()) is not None:
+            raise InputError(f"--device {name}: {trouble}, or leave --device out for the CPU")
+        if (there.index or 0) >= torch.cuda.device_count():
+            raise InputError(f"--device {name}: torch finds {torch.cuda.device_count()}, counted from cuda:0")
+    return there
+
+
+@contextmanager
+def computing_on(
+    name: str, why_unusable: Callable[[], str | None] = why_no_cuda
+) -> Generator[torch.device, None, None]:
+    """Let networks run on a device, in the whole process; arguments and errors are those of ``device_of``."""
     global _chosen
-    if name not in ("cpu", "cuda"):
-        raise InputError(f"--device {name}: expected cpu or cuda")
-    if name == "cuda" and (trouble := why_unusable()) is not None:
-        raise InputError(f"--device cuda: {trouble}, or leave --device out for the CPU")
-    before, _chosen = _chosen, torch.device(name)
+    there = device_of(name, why_unusable)
+    before, _chosen = _chosen, there
     try:
-        yield _chosen
+        with torch.cuda.device(there.index or 0) if there.type == "cuda" else nullcontext():
+            yield _chosen
     finally:
         _chosen = before

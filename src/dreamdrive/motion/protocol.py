@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -105,6 +106,10 @@ class Motion(nn.Module, ABC):
     def refined(self, actor: int, track: Track) -> Track:
         """The track that an actor has now, at the times of the one that it started with."""
         return track
+
+    def on(self, device: torch.device) -> "Motion":
+        """A copy on a device."""
+        return deepcopy(self).to(device)
 
     def steered(self, actor: int, track: Track) -> "Motion":
         """A copy in which an actor follows another track.

@@ -44,7 +44,7 @@ class Exposure:
         if self.camera is None:
             return self.transforms, self.times_s
         own = np.flatnonzero(self.camera == camera)
-        return self.transforms[own], self.times_s[own]
+        return self.transforms[torch.from_numpy(own).to(self.transforms.device)], self.times_s[own]
 
 
 def transform_colour(image: Float[Tensor, "h w 3"], affine: Float[Tensor, "3 4"]) -> Float[Tensor, "h w 3"]:

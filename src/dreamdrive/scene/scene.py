@@ -53,6 +53,10 @@ class SceneMotion(Protocol):
         """A copy with a rigid actor more, canonically at the origin, on a track, and its index; likewise."""
         ...
 
+    def on(self, device: torch.device) -> "SceneMotion":
+        """A copy on a device."""
+        ...
+
     def state_dict(self) -> dict[str, Tensor]:
         """What it has learned, by name."""
         ...
@@ -127,6 +131,22 @@ class Scene:
             raise ValueError(
                 f"scene: numbers of cameras, times, held-out marks (and rig indices) differ: {counts}"
             )
+
+    def on(self, device: torch.device | str) -> "Scene":
+        """The scene with all its tensors on a device, where it is rendered then."""
+        there = torch.device(device)
+        if self.static.means.device == there:
+            return self
+        return replace(
+            self,
+            static=self.static.to(there),
+            dynamic=self.dynamic.to(there),
+            deformation=None if self.deformation is None else self.deformation.on(there),
+            sky=None if self.sky is None else replace(self.sky, texture=self.sky.texture.to(there)),
+            exposure=None
+            if self.exposure is None
+            else replace(self.exposure, transforms=self.exposure.transforms.to(there)),
+        )
 
     @property
     def moves_per_frame(self) -> bool:

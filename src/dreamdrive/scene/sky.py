@@ -31,9 +31,11 @@ class Sky:
 
     def grid(self, camera: Camera) -> Float[Tensor, "h w 2"]:
         """Where each pixel of a camera looks in the texture, in [-1, 1]; serves many textures."""
-        rotation = torch.tensor(camera.world_from_camera[:3, :3], dtype=self.texture.dtype)
-        x = (torch.arange(camera.width_px, dtype=self.texture.dtype) + 0.5 - camera.cx_px) / camera.fx_px
-        y = (torch.arange(camera.height_px, dtype=self.texture.dtype) + 0.5 - camera.cy_px) / camera.fy_px
+        dtype, device = self.texture.dtype, self.texture.device
+        rotation = torch.tensor(camera.world_from_camera[:3, :3], dtype=dtype, device=device)
+        columns = torch.arange(camera.width_px, dtype=dtype, device=device)
+        rows = torch.arange(camera.height_px, dtype=dtype, device=device)
+        x, y = (columns + 0.5 - camera.cx_px) / camera.fx_px, (rows + 0.5 - camera.cy_px) / camera.fy_px
         across, down, ahead = (
             row[0] * x[None, :] + row[1] * y[:, None] + row[2] for row in rotation.unbind(0)
         )

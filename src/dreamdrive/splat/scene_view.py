@@ -21,7 +21,7 @@ Moment = tuple[Gaussians, Tensor]
 
 @dataclass(frozen=True)
 class SceneView:
-    """One finished view.
+    """One finished view, on the CPU wherever the scene is.
 
     Attributes:
         colour: RGB (H, W, 3) in [0, 1], with sky and exposure.
@@ -69,7 +69,7 @@ def render_scene(
     """Render a scene at ``t_s`` from any camera; no gradients.
 
     Args:
-        scene: What to render.
+        scene: What to render; on the device of its tensors, with one copy to the CPU.
         camera: Pinhole with its pose in the scene's world.
         t_s: Time in seconds.
         exposure: Whether to apply the recording's exposure at this time.
@@ -79,7 +79,9 @@ def render_scene(
         moment: What ``moment_of`` says of this time and part, for whoever renders several cameras at once.
     """
     gaussians, is_dynamic = moment_of(scene, t_s, part) if moment is None else moment
-    marked = is_dynamic[:, None] if channels is None else torch.cat([is_dynamic[:, None], channels], dim=-1)
+    marked = is_dynamic[:, None]
+    if channels is not None:
+        marked = torch.cat([marked, channels.to(marked.device)], dim=-1)
     drawn = render(gaussians, camera, channels=marked)
     colour = drawn.colour
     if scene.sky is not None and part != "dynamic":
@@ -89,13 +91,20 @@ def render_scene(
         if part == "dynamic":
             # Black stays black: the exposure's offset counts for what is in front of it.
             colour = colour - (1 - drawn.alpha)[..., None] * scene.exposure.at(t_s, of_rig)[:, 3]
-    return SceneView(
-        colour=colour.clamp(0, 1),
-        alpha=drawn.alpha,
-        depth_m=drawn.expected_depth_m(),
-        dynamic_share=drawn.channels[..., 0],
-        channels=drawn.channels[..., 1:],
-    )
+    return _view(colour.clamp(0, 1), drawn.alpha, drawn.expected_depth_m(), drawn.channels)
+
+
+def _view(
+    colour: Float[Tensor, "h w 3"],
+    alpha: Float[Tensor, "h w"],
+    depth_m: Float[Tensor, "h w"],
+    channels: Float[Tensor, "h w c"],
+) -> SceneView:
+    """All of it on the CPU: each copy from another device waits for it, so that it is one."""
+    if not colour.is_cpu:
+        whole = torch.cat([colour, alpha[..., None], depth_m[..., None], channels], dim=-1).cpu()
+        colour, alpha, depth_m, channels = whole[..., :3], whole[..., 3], whole[..., 4], whole[..., 5:]
+    return SceneView(colour, alpha, depth_m, channels[..., 0], channels[..., 1:])
 
 
 @torch.no_grad()
@@ -106,6 +115,6 @@ def moment_of(scene: Scene, t_s: float, part: Part = "all") -> Moment:
     else:
         gaussians = scene.static_at(t_s) if part == "static" else scene.at(t_s)
         static = len(scene.static)
-    mark = torch.ones(len(gaussians), dtype=gaussians.means.dtype)
+    mark = gaussians.means.new_ones(len(gaussians))
     mark[:static] = 0
     return gaussians, mark

@@ -62,7 +62,7 @@ class SceneTrust:
 
     @classmethod
     def of(cls, scene: Scene) -> "SceneTrust":
-        """Look at the recorded views again, which takes as long as to render them thrice.
+        """Look at the recorded views again, on the CPU, which takes as long as to render them thrice.
 
         Raises:
             InputError: The scene was not compared with its frames.
@@ -72,7 +72,7 @@ class SceneTrust:
                 "trust needs a scene that knows how far it is off its frames, which this one was never told; "
                 "generate it again"
             )
-        squared = np.square(scene.residual.astype(np.float32))
+        scene, squared = scene.on("cpu"), np.square(scene.residual.astype(np.float32))
         known = cls(scene, evidence_of(scene, squared), FreeSpace.of(scene), {})
         held_out = np.flatnonzero(scene.held_out)
         every = max(1, math.ceil(len(held_out) / _MOST_CHECKS))

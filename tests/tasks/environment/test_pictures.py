@@ -9,8 +9,10 @@ from dreamdrive.scene.actor import Track
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene, set_threads, threads
+from dreamdrive.tasks.environment import pictures as module
 from dreamdrive.tasks.environment.pictures import PictureOptions, Pictures, Shifted
 from dreamdrive.tasks.environment.rig import mount, scene_rig
+from tests.fit.pretended import copies_to_the_cpu, pretending, splat_there
 from tests.tasks.environment.scenes import AHEAD, ONCOMING, scene, splats, two_cameras
 from tests.tasks.environment.test_rig import FRONT
 
@@ -154,3 +156,26 @@ def test_threads_are_those_of_the_core() -> None:
 def test_options_of_no_use_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match="expected"):
         PictureOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("least_weight", [0.0, 0.02])
+def test_on_another_device_they_are_nearly_the_same(
+    least_weight: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, options = two_cameras(scene(AHEAD, ONCOMING)), PictureOptions(least_weight=least_weight)
+    late = (Shifted(0, 0.5, True), Shifted(1, 0.0, False))
+    splat_there(monkeypatch)
+    copies = copies_to_the_cpu(monkeypatch)
+    with pretending() as device:
+        monkeypatch.setattr(module, "device_of", lambda name, why: device)
+        there = pictures(made, options, only_front=False)
+        there.leave_out([ego_at(0.0), ego_at(8.0)])
+        copies.clear()
+        found = [there.draw(1.0, ego_at(8.0), shifted) for shifted in ((), late)]
+        assert copies == [(40, 64, 3)] * 4
+    monkeypatch.undo()
+    here = pictures(made, options, only_front=False)
+    here.leave_out([ego_at(0.0), ego_at(8.0)])
+    for pictures_there, shifted in zip(found, ((), late), strict=True):
+        off = here.draw(1.0, ego_at(8.0), shifted).astype(int) - pictures_there
+        assert abs(off).max() <= 1

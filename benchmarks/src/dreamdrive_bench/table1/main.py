@@ -32,13 +32,12 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from dreamdrive.errors import InputError
 from dreamdrive.evaluate import Toolbox, WeightFiles, open_toolbox
-from dreamdrive.names import DeviceName
 from dreamdrive.options import QUALITIES
 from dreamdrive.run import program_digest
 from dreamdrive.scene.control import Control
@@ -86,7 +85,7 @@ def options_of() -> argparse.ArgumentParser:
     add("--stride", type=int, default=2, metavar="N", help="pictures from one window to the next")
     add("--resamples", type=int, default=200, metavar="N", help="of the scenes, behind intervals")
     add("--quality", choices=QUALITIES, default="draft")
-    add("--device", choices=get_args(DeviceName), default="cpu")
+    add("--device", metavar="cpu|cuda|cuda:N", default="cpu")
     return parser
 
 

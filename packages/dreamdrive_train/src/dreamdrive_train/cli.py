@@ -4,15 +4,14 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, UseAppendAction, arg
 
-from dreamdrive.cli.terminal.arguments import commands_of
+from dreamdrive.cli.terminal.arguments import DeviceFlag, commands_of
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import asked_to_stop, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import WANTED, check_there
-from dreamdrive.names import DeviceName
 
 
 def street(
@@ -28,7 +27,7 @@ def street(
     batch: Annotated[int, arg(metavar="N")] = 8,
     rate: Annotated[float, arg(metavar="R")] = 2e-3,
     licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
-    device: DeviceName = "cpu",
+    device: DeviceFlag = "cpu",
 ) -> None:
     """Train the street network on folders of records.
 
@@ -71,7 +70,7 @@ def street(
 
     options = TrainingOptions(steps=steps, seed=seed, rate=rate, loader=LoaderOptions(batch=batch))
     training = StreetTraining(data, out, options, validate, weights, encoder, init, licence)
-    console = Console(highlight=False)
+    console = plain()
     with only_run(out), computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
         figures = run(
             training, device=where, stop=stop, progress=lambda done, total: bars("street", done, total)
@@ -79,9 +78,9 @@ def street(
     if figures is None:
         stop.end()
         return
-    console.print(f"{out / WEIGHTS}: {steps} steps", soft_wrap=True, markup=False)
+    console.print(f"{out / WEIGHTS}: {steps} steps")
     for name, value in figures.items():
-        console.print(f"{name}: {value:.4g}", soft_wrap=True, markup=False)
+        console.print(f"{name}: {value:.4g}")
 
 
 def _weights(words: tuple[str, ...]) -> dict[str, float]:
@@ -153,7 +152,7 @@ def photo(
             else "nothing to train on; give --pictures DIR, --streets N or both"
         )
     options = PhotoTraining(steps=steps, seed=seed, rate=rate, batch=batch)
-    console = Console(highlight=False)
+    console = plain()
     with only_run(out), asked_to_stop() as stop, Bars(console) as bars:
         claim_folder(out, "training")
         pairs = make_pairs(
@@ -171,7 +170,7 @@ def photo(
     if weights is None or pairs is None:
         stop.end()
         return
-    console.print(f"{weights}: {steps} steps on {len(pairs)} pairs", soft_wrap=True, markup=False)
+    console.print(f"{weights}: {steps} steps on {len(pairs)} pairs")
 
 
 _Train = commands_of({"street": street, "photo": photo})

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, arg
 
 from dreamdrive.cli.terminal.arguments import commands_of, parse_size
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.compute.machine import free_bytes
@@ -69,7 +69,7 @@ def make(
     street = draw_street(seed, drawn) if layout is None else read_layout(layout)
     wrong = None if corrupt is None else corruption.parse_corruption(corrupt, street.seed)
     world = World(street)
-    console, start = Console(), time.perf_counter()
+    console, start = plain(), time.perf_counter()
     with Bars(console) as bars:
         drives: dict[Mount, DriveTruth] = {
             mount: drive(
@@ -91,7 +91,7 @@ def make(
             for mount, made in drives.items()
         }
     write_world(drives, out, corruption=wrong, replace=force)
-    console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s", soft_wrap=True)
+    console.print(f"{out}: {count} frames in {seconds:.1f} s, {count / seconds:.1f} frames/s")
 
 
 def _check_numbers(frames: int, fps: float, seed: int, size: tuple[int, int]) -> None:

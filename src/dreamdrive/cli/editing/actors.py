@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.tables import fixed, print_table
 from dreamdrive.files.given import SCENE, check_there
@@ -36,7 +36,7 @@ def actors(
     check_there(out, SCENE)
     if output is not None:
         check_ending(output, ".png")
-    scene, console = open_scene(out), Console(highlight=False, soft_wrap=True, markup=False)
+    scene, console = open_scene(out), plain()
     if not scene.actors:
         console.print("nothing in this scene moves on a track")
         return

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, check_given, check_there
 from dreamdrive.files.kinds import EDITED_KIND
@@ -86,7 +86,7 @@ def edit(
         raise InputError(_NOTHING)
     scene = open_scene(out)
     made = package.write_edited(scene, before.and_then(new), output, replace=force)
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain()
     known = {actor.id for actor in scene.actors}
     for actor in made.actors:
         if actor.id not in known:

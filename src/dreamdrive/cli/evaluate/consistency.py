@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.files.given import CLIP, check_given, check_there
 
@@ -41,7 +41,7 @@ def consistency(
     asked = None if trajectory is None else read_trajectory(trajectory)
     clip = read_clip(video, fps=fps, intrinsics=intrinsics, hfov_deg=hfov)
     known = clip.known.focal
-    console = Console()
+    console = plain()
     with console.status("looking for the path and following the pixels"):
         figures = evaluate_consistency(
             clip.frames, clip.times_s, clip.rig[0], asked, calibrated=known, valid=clip.valid
@@ -49,10 +49,10 @@ def consistency(
     title = f"{figures.frames} frames, {figures.width_px} px wide"
     print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     for note in figures.notes:
-        console.print(note, soft_wrap=True, highlight=False)
+        console.print(note)
     if json is not None:
         write_json(json, figures)
-        console.print(f"{json}", soft_wrap=True)
+        console.print(f"{json}")
 
 
 def _rows(figures: "Consistency") -> list[tuple[str, str, str]]:

@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.files.given import SCENE, WORLD, check_there
@@ -35,14 +35,14 @@ def decomposition(
     from dreamdrive.evaluate import evaluate_decomposition, read_truth
 
     scene = open_scene(out)
-    console = Console()
+    console = plain()
     with console.status("drawing the truth and looking at the scene"):
         figures = evaluate_decomposition(scene, read_truth(scene, world))
     title = f"{figures.frames} frames, {figures.width_px} px wide"
     print_table(console, title, ("figure", "value", "unit"), _rows(figures))
     if json is not None:
         write_json(json, figures)
-        console.print(f"{json}", soft_wrap=True)
+        console.print(f"{json}")
 
 
 def _rows(figures: "Decomposition") -> list[tuple[str, str, str]]:

@@ -8,6 +8,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, TRUTH, check_there
@@ -43,7 +44,7 @@ def geometry(
     from dreamdrive.evaluate import draw_geometry_errors, evaluate_geometry, read_geometry_truth
     from dreamdrive.show import write_png
 
-    console = Console()
+    console = plain()
     with console.status("reading the truth and comparing"):
         estimate, missing = open_estimate(out)
         known = read_geometry_truth(truth, estimate)
@@ -53,14 +54,14 @@ def geometry(
     if figures.depth is not None:
         _print_depth(console, figures.depth)
     for note in (*missing, *figures.notes):
-        console.print(note, soft_wrap=True, highlight=False)
+        console.print(note)
     if json is not None:
         write_json(json, {**asdict(figures), "notes": [*missing, *figures.notes]})
-        console.print(f"{json}", soft_wrap=True)
+        console.print(f"{json}")
     if picture is not None:
         median = figures.depth and figures.depth.median_scale
         write_png(picture, draw_geometry_errors(estimate, known, median or 1.0))
-        console.print(f"{picture}", soft_wrap=True)
+        console.print(f"{picture}")
 
 
 def _rows(figures: "GeometryFigures") -> list[tuple[str, str, str]]:

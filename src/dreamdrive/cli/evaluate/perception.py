@@ -4,15 +4,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from rich.console import Console
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
+from dreamdrive.cli.terminal.arguments import DeviceFlag
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import asked_to_stop, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import check_there
-from dreamdrive.names import DeviceName
 
 if TYPE_CHECKING:
     import torch
@@ -71,7 +71,7 @@ def perception(
     validation: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="SET")] = (),
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     training: OmitArgPrefixes[TrainingFlags] = TrainingFlags(),
-    device: DeviceName = "cpu",
+    device: DeviceFlag = "cpu",
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> None:
     """Train Cross-View Transformers on sets of samples and compare what they see.
@@ -102,7 +102,7 @@ def perception(
     from dreamdrive.tasks.perception import BevSet, read_trials
 
     reals, made, tests = ([BevSet.open(path) for path in paths] for paths in (real, synthetic, validation))
-    console = Console(highlight=False, soft_wrap=True)
+    console = plain()
     with computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
         regime = _regime(where, training)
         trials = read_trials(mode, reals, made, tests, out, regime, device=where, stop=stop, progress=bars)

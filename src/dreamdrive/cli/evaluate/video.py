@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from rich.console import Console
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
+from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.terminal.tables import check_endings, interval, number, print_table, write_json
@@ -86,13 +87,13 @@ def evaluate_video(
     from dreamdrive.evaluate import VideoSettings, WeightFiles, evaluate_video as run
 
     wanted, files = VideoSettings(**vars(settings)), WeightFiles(**vars(weights))
-    console = Console(highlight=False)
+    console = plain()
     with Bars(console) as bars:
         report = run(real, fake, wanted, files, bars)
     show(console, report)
     if json is not None:
         write_json(json, {"version": __version__, **asdict(report)})
-        console.print(f"figures: {json}", soft_wrap=True)
+        console.print(f"figures: {json}")
 
 
 def show(console: Console, report: "VideoReport") -> None:
@@ -115,9 +116,7 @@ def show(console: Console, report: "VideoReport") -> None:
                 for name, figure in report.distances.items()
             ],
         )
-        console.print(
-            "floor: one half of the real set to the other; compare with 'of halves'", soft_wrap=True
-        )
+        console.print("floor: one half of the real set to the other; compare with 'of halves'")
     if report.likenesses:
         print_table(
             console,
@@ -129,4 +128,4 @@ def show(console: Console, report: "VideoReport") -> None:
             ],
         )
     for name, why in report.not_computed.items():
-        console.print(f"not computed: {name}: {why}", soft_wrap=True, markup=False)
+        console.print(f"not computed: {name}: {why}")

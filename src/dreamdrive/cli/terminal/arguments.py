@@ -9,13 +9,14 @@ from operator import or_
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin
 
-from tyro.conf import Suppress, subcommand
+from tyro.conf import Suppress, arg, subcommand
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from dreamdrive.data.table import DATASETS
 from dreamdrive.errors import InputError
 from dreamdrive.export import EXPORTS
 from dreamdrive.geometry import BACKENDS
+from dreamdrive.names import DeviceName
 from dreamdrive.prior import PRIORS
 from dreamdrive.scene.control import (
     Action,
@@ -34,6 +35,8 @@ EXAMPLES = (
     "ahead=4,8,12,16 right=0,0,0,1",
     "goal=0.5,0.55",
 )
+DEVICES = "cpu|cuda|cuda:N"
+DeviceFlag = Annotated[DeviceName, arg(metavar=DEVICES)]
 _MAKE: dict[frozenset[str], Callable[[Any], Action]] = {
     frozenset({"command"}): lambda given: Command(_direction(given["command"])),
     frozenset({"speed", "wheel"}): lambda given: Steering(_four(given["speed"]), _four(given["wheel"])),

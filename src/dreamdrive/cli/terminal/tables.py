@@ -24,7 +24,7 @@ def print_table(console: Console, title: str, columns: Sequence[str], rows: Sequ
     for row in rows:
         table.add_row(*row)
     width = max(console.width, Measurement.get(console, wide, table).maximum)
-    Console(file=console.file, width=width, highlight=False).print(table)
+    Console(file=console.file, width=width, highlight=False, markup=False, emoji=False).print(table)
 
 
 def number(value: float | None) -> str:

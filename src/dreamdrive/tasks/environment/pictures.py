@@ -9,13 +9,15 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
+from dreamdrive.compute.device import device_of
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.errors import InputError
+from dreamdrive.names import DeviceName
 from dreamdrive.scene.actor import Track
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
-from dreamdrive.splat import seen_by, set_threads
+from dreamdrive.splat import seen_by, set_threads, why_unusable
 from dreamdrive.tasks.environment.rig import Mount
 
 _LEAST_ALPHA = 1 / 255
@@ -32,11 +34,13 @@ class PictureOptions:
         least_weight: Gaussians that never have so much of a pixel, seen near the recorded path, are left out.
         cache_mb: Memory for what moves at times that come again in the next episode.
         threads: Of the compiled core, in the whole process; several environments want one each.
+        device: Where they are drawn: "cpu", "cuda" or "cuda:1".
     """
 
     least_weight: float = 0.02
     cache_mb: float = 128.0
     threads: int | None = None
+    device: DeviceName = "cpu"
 
     def __post_init__(self) -> None:
         if not 0 <= self.least_weight <= 0.5 or not 0 <= self.cache_mb < 1e6:
@@ -81,7 +85,9 @@ class Pictures:
     def __init__(self, scene: Scene, mounts: Sequence[Mount], options: PictureOptions) -> None:
         if options.threads is not None:
             set_threads(options.threads)
-        self._scene, self.mounts, self._options = scene, tuple(mounts), options
+        self.mounts, self._options = tuple(mounts), options
+        self._scene = scene = scene.on(device_of(options.device, why_unusable))
+        self._device = scene.static.means.device
         self._last_s = float(scene.times_s.max())
         self._first_s = float(scene.times_s.min())
         self._dynamic = replace(scene.dynamic, features=None)
@@ -99,17 +105,19 @@ class Pictures:
         least = self._options.least_weight
         if least == 0 or not self._standing:
             return
+        # Once, so that the CPU does it: its core alone tells of weights.
+        standing = [each.cpu() for each in self._buffers(self._standing)]
         seen = torch.zeros(self._standing, dtype=torch.bool)
         most = torch.zeros(self._standing)
         for pose in poses:
             for camera in self._cameras(pose):
                 with torch.no_grad(), one_torch_thread():
-                    view = seen_by(camera, *self._buffers(self._standing), inspect=True)
+                    view = seen_by(camera, *standing, inspect=True)
                 assert view.weight_most is not None
                 seen |= view.visible
                 most = torch.maximum(most, view.weight_most)
         keep = torch.nonzero(~seen | (most >= least)).squeeze(1)
-        self._fill(self._scene.static_at(self._first_s).select(keep))
+        self._fill(self._scene.static_at(self._first_s).select(keep.to(self._device)))
 
     def draw(
         self, time_s: float, world_from_ego: Float[np.ndarray, "4 4"], shifted: Sequence[Shifted] = ()
@@ -143,7 +151,7 @@ class Pictures:
             standing.logit_opacities.sigmoid(),
             standing.sh,
         )
-        self._buffer = tuple(torch.zeros(count, *value.shape[1:]) for value in values)
+        self._buffer = tuple(value.new_zeros(count, *value.shape[1:]) for value in values)
         self._write(0, values)
 
     def _write(self, first: int, values: Sequence[Tensor]) -> None:
@@ -169,7 +177,9 @@ class Pictures:
         if not shifted:
             return [self._cached(time_s)]
         assert self._dynamic.actor is not None
-        elsewhere = torch.isin(self._dynamic.actor, torch.tensor([each.actor for each in shifted]))
+        elsewhere = torch.isin(
+            self._dynamic.actor, torch.tensor([each.actor for each in shifted], device=self._device)
+        )
         parts = [self._moved(self._scene, time_s, torch.nonzero(~elsewhere).squeeze(1))]
         for each in shifted:
             if each.there:
@@ -190,7 +200,7 @@ class Pictures:
         if time_s in self._kept:
             self._kept.move_to_end(time_s)
             return self._kept[time_s]
-        found = self._moved(self._scene, time_s, torch.arange(len(self._dynamic)))
+        found = self._moved(self._scene, time_s, torch.arange(len(self._dynamic), device=self._device))
         self._kept[time_s] = found
         most = self._options.cache_mb * 1e6
         while sum(len(each.rows) for each in self._kept.values()) * _BYTES > most and self._kept:
@@ -213,7 +223,7 @@ class Pictures:
         """Which of what moves a life span leaves more of than the least weight."""
         dynamic = self._dynamic
         if dynamic.lifespan is None:
-            return torch.ones(len(dynamic), dtype=torch.bool)
+            return torch.ones(len(dynamic), dtype=torch.bool, device=self._device)
         centre_s, deviation_s = dynamic.lifespan.unbind(-1)
         share = torch.exp(-0.5 * ((time_s - centre_s) / deviation_s.clamp(min=1e-6)) ** 2)
         least = max(self._options.least_weight, _LEAST_ALPHA)
@@ -226,4 +236,4 @@ class Pictures:
             colour = colour + (1 - view.alpha)[..., None] * self._scene.sky.colour(camera)
         if self._scene.exposure is not None:
             colour = self._scene.exposure.apply(colour, time_s, mount.of_rig)
-        return colour.clamp(0, 1).mul(255).round().to(torch.uint8).numpy()
+        return colour.clamp(0, 1).mul(255).round().to(torch.uint8).cpu().numpy()
