@@ -126,7 +126,7 @@ def _told(status: int, notes: "Notes", start: float, child: int) -> Came:
 
 def _left(group: int) -> bool:
     """Whether processes that a command started are still there, a while after its end."""
-    for _ in range(100):
+    for _ in range(500):
         try:
             os.killpg(group, 0)
         except ProcessLookupError:
