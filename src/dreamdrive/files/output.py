@@ -45,8 +45,7 @@ def new_file(path: Path) -> Generator[Path, None, None]:
     A link is followed: the file that it leads to is replaced.
     """
     with _private(path) as (place, private):
-        if place.exists() and not place.is_file():
-            raise InputError(f"{path} is no regular file, and is not replaced; choose another name")
+        check_regular(path)
         yield private / place.name
         os.replace(private / place.name, place)
 
@@ -204,6 +203,13 @@ def check_new_file(path: Path, replace: bool) -> None:
         raise InputError(
             f"{path} exists already; choose another place or ask for it to be replaced (--force)"
         )
+
+
+def check_regular(path: Path) -> None:
+    """Fail before the work where ``new_file`` would fail after it, as what is there is no file."""
+    place = _place(path)
+    if place.exists() and not place.is_file():
+        raise InputError(f"{path} is no regular file, and is not replaced; choose another name")
 
 
 def check_place(out: Path, source: Path | None) -> None:

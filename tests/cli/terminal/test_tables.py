@@ -2,11 +2,14 @@
 
 import io
 import json
+import os
 from pathlib import Path
 
+import pytest
 from rich.console import Console
 
-from dreamdrive.cli.terminal.tables import interval, number, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, interval, number, print_table, write_json
+from dreamdrive.errors import InputError
 
 
 def test_a_table_is_never_cut() -> None:
@@ -37,3 +40,11 @@ def test_what_is_not_finite_is_null(tmp_path: Path) -> None:
         "a": [1, None],
         "b": {"c": [None, "x", None]},
     }
+
+
+@pytest.mark.parametrize(("name", "why"), [("a.txt", "ends in .json"), ("pipe.json", "no regular file")])
+def test_a_place_that_cannot_be_is_refused_before_the_work(name: str, why: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.json")
+    with pytest.raises(InputError, match=why):
+        check_files(json=tmp_path / name)
+    check_files(json=tmp_path / "new.json", picture=tmp_path / "new.png")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from dreamdrive.cli.terminal.console import plain
-from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, fixed, print_table, write_json
 from dreamdrive.files.given import CLIP, check_given, check_there
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def consistency(
         fps: Rate of the frames, where the video does not tell it rightly.
         json: Write the figures to this file as well.
     """
-    check_endings(json=json)
+    check_files(json=json)
     check_there(video, CLIP)
     check_given(trajectory=trajectory, intrinsics=intrinsics)
     from dreamdrive.data import read_clip, read_trajectory

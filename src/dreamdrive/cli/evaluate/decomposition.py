@@ -8,7 +8,7 @@ from tyro.conf import Positional, arg
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
-from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, fixed, print_table, write_json
 from dreamdrive.files.given import SCENE, WORLD, check_there
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def decomposition(
         world: The folder that world make wrote, or a layout, which is drawn again as the scene saw it.
         json: Write the figures to this file as well.
     """
-    check_endings(json=json)
+    check_files(json=json)
     check_there(out, SCENE)
     check_there(world, WORLD)
     use_all_cores()

@@ -9,7 +9,7 @@ from tyro.conf import Positional, arg
 
 from dreamdrive.cli.scene import open_scene
 from dreamdrive.cli.terminal.console import plain
-from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, TRUTH, check_there
 from dreamdrive.files.paths import inside
@@ -38,7 +38,7 @@ def geometry(
         json: Write the figures to this file as well.
         picture: Draw errors of depth and both paths into this PNG.
     """
-    check_endings(json=json, picture=picture)
+    check_files(json=json, picture=picture)
     check_there(out, SCENE)
     check_there(truth, TRUTH)
     from dreamdrive.evaluate import draw_geometry_errors, evaluate_geometry, read_geometry_truth

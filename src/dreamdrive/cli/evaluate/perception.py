@@ -10,7 +10,7 @@ from dreamdrive.cli.terminal.arguments import DeviceFlag
 from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import asked_to_stop, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
-from dreamdrive.cli.terminal.tables import check_endings, fixed, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, fixed, print_table, write_json
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import check_there
 
@@ -87,7 +87,7 @@ def perception(
         device: Where networks are trained.
         json: Write the figures to this file as well.
     """
-    check_endings(json=json)
+    check_files(json=json)
     training.check()
     if missing := [
         flag

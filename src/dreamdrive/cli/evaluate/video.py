@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from dreamdrive.cli.terminal.console import plain
 from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
-from dreamdrive.cli.terminal.tables import check_endings, interval, number, print_table, write_json
+from dreamdrive.cli.terminal.tables import check_files, interval, number, print_table, write_json
 from dreamdrive.files.given import CLIPS, check_there
 from dreamdrive.names import Covariance, Resize, Stlpips
 
@@ -79,7 +79,7 @@ def evaluate_video(
         settings: How clips are compared.
         json: Write all figures and settings there.
     """
-    check_endings(json=json)
+    check_files(json=json)
     for path in (real, fake):
         check_there(path, CLIPS)
     use_all_cores()

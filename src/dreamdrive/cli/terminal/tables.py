@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from dreamdrive.files.output import check_ending, new_file
+from dreamdrive.files.output import check_ending, check_regular, new_file
 
 _UNLIMITED = 1000
 """Characters that no table is wide."""
@@ -42,11 +42,12 @@ def interval(low: float | None, high: float | None) -> str:
     return "-" if low is None or high is None else f"{number(low)} to {number(high)}"
 
 
-def check_endings(*, json: Path | None, picture: Path | None = None) -> None:
-    """Refuse names of other kinds of files before the work: whoever gives one may lose a letter."""
+def check_files(*, json: Path | None, picture: Path | None = None) -> None:
+    """Refuse before the work what a figure's file cannot be, and names of other kinds: of a letter, say."""
     for path, ending in ((json, ".json"), (picture, ".png")):
         if path is not None:
             check_ending(path, ending)
+            check_regular(path)
 
 
 def write_json(path: Path, values: object) -> None:
