@@ -28,7 +28,7 @@ MOST_HZ = 25.0
 """Pictures a second while the time runs."""
 _MOVING_QUALITY, _RESTING_QUALITY, _BESIDE_PX = 75, 88, 420
 _SAME_M, _SAME = 0.02, 1e-3
-_LOOK_M, _MOST_TRIES = 10.0, 20
+_LOOK_M, _MOST_TRIES, _AGAIN_S = 10.0, 60, 1.0
 
 
 @dataclass
@@ -44,6 +44,7 @@ class Page:
     lines: Lines = field(init=False)
     _looking: Looking = field(init=False)
     _pace: PictureSize = field(default_factory=PictureSize, init=False)
+    _own: tuple[np.ndarray, np.ndarray] = field(init=False)
     _placed: tuple[np.ndarray, np.ndarray] | None = field(default=None, init=False)
     _confirmed: bool = field(default=False, init=False)
     _tries: int = field(default=0, init=False)
@@ -54,6 +55,7 @@ class Page:
     def __post_init__(self) -> None:
         scene = self.shared.scene
         self.talk, self.session = Talk(self.client), Session(scene)
+        self._own = np.array(self.client.camera.position), _ahead(self.client.camera)
         self._looking = Looking(self.shared.kept)
         self.recorded = RecordedFrames(self.shared.kept, scene)
         with self.talk.lock, self.client.atomic():
@@ -114,10 +116,12 @@ class Page:
             if by_hand and self.session.drive != FREE:
                 self.session.follow(FREE)
                 self.time_panel.tell()
-            # A browser that has just opened may forget where it was put.
-            lost = self.session.drive != FREE and not self._confirmed and self._tries <= _MOST_TRIES
-            if resized or by_hand or lost:
+            if resized or by_hand or self._is_lost():
                 self.refresh()
+
+    def _is_lost(self) -> bool:
+        """Whether the browser has yet to tell that it is where a drive has put it."""
+        return self.session.drive != FREE and not self._confirmed and self._tries <= _MOST_TRIES
 
     def _is_by_hand(self, camera: CameraHandle) -> bool:
         """Whether the mouse has moved it, and not the drive.
@@ -129,10 +133,9 @@ class Page:
             return True
         if self._placed is None:
             return False
-        place, ahead = self._placed
-        there = np.allclose(camera.position, place, atol=_SAME_M) and np.allclose(
-            _ahead(camera), ahead, atol=_SAME
-        )
+        if _is_at(camera, *self._own):  # a slow browser may forget where it was put, and begin again
+            self._confirmed = False
+        there = _is_at(camera, *self._placed)
         by_hand, self._confirmed = self._confirmed and not there, self._confirmed or there
         return by_hand
 
@@ -190,6 +193,17 @@ class Page:
                 frames.ask(self, self._draw, max(0.0, 1 / MOST_HZ - took_s))
             elif not resting and not frames.asks(self):
                 frames.ask(self, partial(self._draw, True), REST_S)
+            elif self._is_lost() and not frames.asks(self):
+                frames.ask(self, self._put_again, _AGAIN_S)
+
+    def _put_again(self) -> None:
+        """Tell the browser once more where its camera is; what it shows is there already."""
+        with self.talk.lock:
+            pose = self.session.pose()
+            if self._open and pose is not None and self._is_lost():
+                with self.client.atomic():
+                    self._place(pose)
+                self.shared.frames.ask(self, self._put_again, _AGAIN_S)
 
     def _give_up(self, why: str) -> None:
         """Go back to what every scene has."""
@@ -228,6 +242,12 @@ class Page:
             self.lines.at(t_s)
             self.lines.show_views(self.time_panel.shows_views)
             self.time_panel.at(t_s, frame)
+
+
+def _is_at(camera: CameraHandle, place: Float[np.ndarray, "3"], ahead: Float[np.ndarray, "3"]) -> bool:
+    return np.allclose(camera.position, place, atol=_SAME_M) and np.allclose(
+        _ahead(camera), ahead, atol=_SAME
+    )
 
 
 def _ahead(camera: CameraHandle) -> Float[np.ndarray, "3"]:
