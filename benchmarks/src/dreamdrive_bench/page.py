@@ -182,42 +182,35 @@ def shown(browser: Browser, address: str, scene: Scene, desk: Path, images: Path
     """What can be done with the page, filmed; and two screenshots."""
     page = opened(browser, address, WINDOWS[-1], Stream())
     page.wait_for_timeout(4 * _REST_MS)  # until the notice has faded
-    reel = Reel(page)
-    frames = reel.take(3.0, lambda: _play(page, scene))
-    frames += reel.take(3.0, lambda: _drag(page, scene))
+    frames = filmed(page, 3.0, lambda: _play(page, scene))
+    frames += filmed(page, 3.0, lambda: _drag(page, scene))
     _shot(page, images / "view_actor.jpg")
-    frames += reel.take(2.0, lambda: _layers(page))
-    frames += reel.take(3.0, lambda: _path(page))
+    frames += filmed(page, 2.0, lambda: _layers(page))
+    frames += filmed(page, 3.0, lambda: _path(page))
     _shot(page, images / "view_path.jpg")
-    frames += reel.take(2.5, lambda: _along(page, scene))
-    frames += reel.take(1.5, lambda: _render(page, desk))
+    frames += filmed(page, 2.5, lambda: _along(page, scene))
+    frames += filmed(page, 1.5, lambda: _render(page, desk))
     film.write(images / "view.webp", frames)
 
 
-@dataclass
-class Reel:
-    """Films a page."""
+def filmed(page: Page, seconds: float, act: Callable[[], None]) -> list[Image]:
+    """So many seconds of film of what is done, however long it takes."""
+    taken: list[tuple[float, bytes]] = []
+    session = page.context.new_cdp_session(page)
 
-    page: Page
+    def keep(event: dict[str, Any]) -> None:
+        taken.append((event["metadata"]["timestamp"], base64.b64decode(event["data"])))
+        with suppress(Error):  # one that comes after the end
+            session.send("Page.screencastFrameAck", {"sessionId": event["sessionId"]})
 
-    def take(self, seconds: float, act: Callable[[], None]) -> list[Image]:
-        """So many seconds of film of what is done, however long it takes."""
-        taken: list[tuple[float, bytes]] = []
-        session = self.page.context.new_cdp_session(self.page)
-
-        def keep(event: dict[str, Any]) -> None:
-            taken.append((event["metadata"]["timestamp"], base64.b64decode(event["data"])))
-            with suppress(Error):  # one that comes after the end
-                session.send("Page.screencastFrameAck", {"sessionId": event["sessionId"]})
-
-        session.on("Page.screencastFrame", keep)
-        session.send("Page.startScreencast", {"format": "jpeg", "quality": 92})
-        act()
-        session.send("Page.stopScreencast")
-        session.detach()
-        told_s = np.array([at_s for at_s, _ in taken])  # a picture comes where something changes
-        wanted_s = np.linspace(told_s[0], told_s[-1], round(seconds * film.RATE_HZ))
-        return [_picture(taken[k][1]) for k in np.searchsorted(told_s, wanted_s, side="right") - 1]
+    session.on("Page.screencastFrame", keep)
+    session.send("Page.startScreencast", {"format": "jpeg", "quality": 92})
+    act()
+    session.send("Page.stopScreencast")
+    session.detach()
+    told_s = np.array([at_s for at_s, _ in taken])  # a picture comes where something changes
+    wanted_s = np.linspace(told_s[0], told_s[-1], round(seconds * film.RATE_HZ))
+    return [_picture(taken[k][1]) for k in np.searchsorted(told_s, wanted_s, side="right") - 1]
 
 
 def _picture(encoded: bytes) -> Image:
@@ -226,11 +219,16 @@ def _picture(encoded: bytes) -> Image:
 
 
 def _play(page: Page, scene: Scene) -> None:
+    _through(page, scene)
+    page.get_by_role("slider").first.press("Home")
+    page.wait_for_timeout(_REST_MS)
+
+
+def _through(page: Page, scene: Scene) -> None:
+    """Let the time run to the end."""
     page.get_by_role("button", name="Play").click()
     page.wait_for_timeout(1000 * float(scene.times_s[-1] - scene.times_s[0]) + _REST_MS)
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("slider").first.press("Home")
-    page.wait_for_timeout(_REST_MS)
 
 
 def _drag(page: Page, scene: Scene) -> None:
@@ -271,9 +269,7 @@ def _path(page: Page) -> None:
 
 def _along(page: Page, scene: Scene) -> None:
     _choose(page, "Camera", "path")
-    page.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(1000 * float(scene.times_s[-1] - scene.times_s[0]) + _REST_MS)
-    page.get_by_role("button", name="Pause").click()
+    _through(page, scene)
 
 
 def _render(page: Page, desk: Path) -> None:

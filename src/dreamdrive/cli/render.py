@@ -71,21 +71,22 @@ def render(
     from dreamdrive.splat import why_unusable
 
     options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
-    scene = less(open_scene(out), without)
-    drives = drives_of(scene, trajectory, shift_m, fps)
-    trust = trust_of(scene, drives, needed=show == "trust" or stay_within_trust)
-    if stay_within_trust and trust is not None:
-        drives = [bent(drive, trust) for drive in drives]
-    if format == "mp4":
-        for drive in drives:
-            video_rate(drive, options)
-    console = plain()
-    for drive, place in zip(drives, places(out, output, drives, options), strict=True):
-        start, count = time.perf_counter(), len(drive.path)
-        with computing_on(device, why_unusable) as where, Bars(console) as bars:
-            write_drive(place, scene.on(where), drive, options, partial(bars, "render", total=count), trust)
-        seconds = time.perf_counter() - start
-        rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
-        console.print(f"{place}: {rate}")
+    with computing_on(device, why_unusable) as where:
+        scene = less(open_scene(out), without)
+        drives = drives_of(scene, trajectory, shift_m, fps)
+        trust = trust_of(scene, drives, needed=show == "trust" or stay_within_trust)
+        if stay_within_trust and trust is not None:
+            drives = [bent(drive, trust) for drive in drives]
+        if format == "mp4":
+            for drive in drives:
+                video_rate(drive, options)
+        there, console = scene.on(where), plain()
+        for drive, place in zip(drives, places(out, output, drives, options), strict=True):
+            start, count = time.perf_counter(), len(drive.path)
+            with Bars(console) as bars:
+                write_drive(place, there, drive, options, partial(bars, "render", total=count), trust)
+            seconds = time.perf_counter() - start
+            rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
+            console.print(f"{place}: {rate}")
     if trust is not None:
         console.print(believed(trust))
