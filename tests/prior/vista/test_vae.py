@@ -1,5 +1,6 @@
 """The autoencoder against the public code."""
 
+from dreamdrive.prior.vista.decoder import decode_by_frames
 from tests.golden.reading import close, tensors
 from tests.prior.vista.networks import build
 
@@ -16,3 +17,4 @@ def test_golden_frames_there_and_back() -> None:
     close(coded.mode(), given["mode"], LIMIT)
     frames = vae.decode(given["z"], num_frames=len(given["z"])).sample
     close(frames, given["frames"], LIMIT)
+    close(decode_by_frames(vae.decoder, given["z"]), given["frames"], LIMIT)

@@ -33,8 +33,8 @@ SVD = Prior(
         "which limits commercial use"
     ),
     memory=(
-        "at 1024x576 8.3 GB for the UNet in half precision (16.5 GB on a CPU, and hours) and 42.9 GB for "
-        "the decoder, at 576x320 4.9 and 13.7 GB (reckoned, not measured); a run that does not fit is "
+        "at 1024x576 8.3 GB for the UNet in half precision (16.5 GB on a CPU, and hours) and 12.8 GB for "
+        "the decoder, at 576x320 4.9 and 4.3 GB (reckoned, not measured); a run that does not fit is "
         "refused before it starts"
     ),
     weights="svd_xt.safetensors or the folder of stabilityai/stable-video-diffusion-img2vid-xt",

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from dreamdrive.compute.machine import free_bytes
 from dreamdrive.errors import InputError
 from dreamdrive.prior.vista.condition import clip_pixels
+from dreamdrive.prior.vista.decoder import decode_by_frames
 from dreamdrive.prior.vista.keys import Part
 from dreamdrive.prior.vista.kinds import MOTION_BUCKET
 from dreamdrive.prior.vista.memory import Free, Job, check_memory
@@ -74,9 +75,8 @@ class Engine:
         return torch.cat(coded)
 
     def decode(self, latents: Float[Tensor, "t c h w"]) -> Float[Tensor, "t 3 h2 w2"]:
-        """Frames of latents that are not scaled, all at once."""
-        given = latents.float().to(self.device)
-        return self.network("vae").decode(given, num_frames=len(given), return_dict=False)[0]
+        """Frames of latents that are not scaled, mixed as if decoded all at once."""
+        return decode_by_frames(self.network("vae").decoder, latents.float().to(self.device))
 
     def describe(self, images: Images) -> Float[Tensor, " d"]:
         """What CLIP says of one frame in [-1, 1]."""

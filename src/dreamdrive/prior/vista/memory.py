@@ -21,8 +21,9 @@ MAKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet", "decoder")
 LOOKING: tuple[Step, ...] = ("image encoder", "encoder", "UNet")
 """What features of frames that are there already need."""
 _FLOAT = 4
-# Numbers that live at once for each channel of the first level, frame and pixel of the latents.
-_UNET, _DECODER, _ENCODER = 27, 512, 322
+# Numbers that live at once for each channel of the first level and pixel of the latents: for each frame, and
+# in the decoder once beside them, for the frame that goes through.
+_UNET, _ENCODER, _DECODER, _DECODER_ONCE = 27, 322, 128, 320
 _MARGIN = 1.25  # for workspaces of the libraries and what the allocator cannot give back
 _RESULT = 3 * _FLOAT + 2 * 3  # bytes a pixel of a decoded frame: as it comes, and twice as bytes
 
@@ -82,7 +83,7 @@ def plan_memory(stored: StoredModel, job: Job, *, half: bool) -> MemoryUse:
         "image encoder": int(_FLOAT * weights["image_encoder"] * _MARGIN),
         "encoder": int(vae + alive * _ENCODER),
         "UNet": int(bytes_ * (weights["unet"] + _MARGIN * _UNET * width["unet"] * pixels * job.per_round)),
-        "decoder": int(vae + alive * _DECODER * min(CHUNK, job.frames)),
+        "decoder": int(vae + alive * (_DECODER * min(CHUNK, job.frames) + _DECODER_ONCE)),
     }
     frames = _RESULT * job.frames * job.size[0] * job.size[1] if "decoder" in job.steps else 0
     return MemoryUse({step: steps[step] for step in job.steps}, frames)
