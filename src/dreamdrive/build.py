@@ -132,7 +132,9 @@ def build_scene(
     scene = run(
         "fit",
         [o.representation, o.fit, o.cast, o.drift, o.trial, o.motion, o.densify, o.device, given.tracks],
-        lambda work: _completed(seen, _fitted(seen, geometry, parts, static, o, seeded["fit"], work, device)),
+        lambda work: _completed(
+            seen, _fitted(seen, geometry, parts, static, o, seeded["fit"], work, device), device
+        ),
         check=partial(check.scene, seen),
     )
     return Built(clip, geometry, static, scores, scene)
@@ -159,9 +161,9 @@ def _fitted(
     return replace(scene, camera=clip.camera if len(clip.rig) > 1 else None, **recorded)
 
 
-def _completed(clip: Clip, scene: Scene) -> Scene:
+def _completed(clip: Clip, scene: Scene, device: torch.device) -> Scene:
     """The scene with how far it is off its frames, and what the prior knows to stand where none looks."""
-    compared = replace(scene, residual=_residual(clip, scene))
+    compared = replace(scene, residual=_residual(clip, scene.on(device)))
     if clip.known.unseen is None or scene.moves_per_frame or not len(scene.static):
         return compared
     return compared.with_standing(clip.known.unseen)
@@ -217,11 +219,11 @@ def _scores(
     clip: Clip, geometry: Geometry, seeds: Gaussians, static: StaticFit, options: Options, seed: int, run: Run
 ) -> Float[torch.Tensor, " n"]:
     """How dynamic each seed is."""
-    o = options
+    o, device = options, torch.device(options.device)
 
     def compute(work: Work) -> Float[torch.Tensor, " n"]:
-        errors = error_maps(clip, geometry, static.gaussians, static.sky, static.exposure)
-        return score(clip, geometry, seeds, errors, o.score, stage_seed(seed, "score"), work)
+        errors = error_maps(clip, geometry, static, device)
+        return score(clip, geometry, seeds, errors, o.score, stage_seed(seed, "score"), work, device)
 
     return run("score", [o.score, seed], compute, check=partial(check.scores, seeds))
 
@@ -233,12 +235,12 @@ def _known(scores: Float[torch.Tensor, " n"] | None) -> Float[torch.Tensor, " n"
 
 def _as_frames_say(clip: Clip, geometry: Geometry, options: Options, seed: int) -> Geometry:
     """The geometry with the better of two depths; on a calm path where no street stands on the one found."""
-    o = options
-    chosen, found = better_depth(clip, geometry, o.seeds, o.trial, seed, partial(_stands, o))
+    o, device = options, torch.device(options.device)
+    chosen, found = better_depth(clip, geometry, o.seeds, o.trial, seed, partial(_stands, o), device)
     mapped = chosen.fallback is None and clip.known.world_from_camera is None and len(clip.rig) == 1
     calms = mapped and _may_move_per_frame(clip, o)
     if calms and found is None:
-        found = trial(clip, chosen, o.seeds, o.trial, seed)
+        found = trial(clip, chosen, o.seeds, o.trial, seed, device)
     standing = None if found is None else _stands(o, found)
     return calmed(clip, chosen) if calms and standing is False else replace(chosen, stands=standing)
 
@@ -266,7 +268,8 @@ def _per_frame_street(
     """A per-frame street, beside what moves; None where one that stands predicts the frames."""
     standing = geometry.stands
     if standing is None:  # not asked, or about another path
-        found = trial(clip, geometry, options.seeds, options.trial, stage_seed(seed, "static"))
+        device, seed = torch.device(options.device), stage_seed(seed, "static")
+        found = trial(clip, geometry, options.seeds, options.trial, seed, device)
         standing = found is None or _stands(options, found)
     if standing:
         return None

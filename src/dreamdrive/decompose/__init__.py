@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     )
     from dreamdrive.decompose.actors.paths import Path as Path, find_path as find_path
     from dreamdrive.decompose.between import with_between as with_between
-    from dreamdrive.decompose.errors import error_maps as error_maps, static_picture as static_picture
+    from dreamdrive.decompose.errors import error_maps as error_maps
     from dreamdrive.decompose.group import (
         Grouping as Grouping,
         GroupOptions as GroupOptions,

@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from dreamdrive.compute.device import CPU
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.decompose.errors import smoothed
 from dreamdrive.motion import encode
@@ -82,23 +83,30 @@ def score(
     options: ScoreOptions,
     seed: int,
     progress: Callable[[int, int], None],
+    device: torch.device = CPU,
 ) -> Float[Tensor, " n"]:
     """Train F_score by binary cross-entropy between its splatted scores and the targets (eq. 8).
 
     The Gaussians are the seeds G_init, with features, the errors those of the static fit (eq. 6). Scores are
     in (0, 1); eq. 9 compares them with an absolute threshold, ``GroupOptions.threshold``. ``progress`` is
-    called with steps done and steps in all.
+    called with steps done and steps in all. It is computed on ``device``; the scores are on the CPU.
     """
     if gaussians.features is None:
         raise ValueError("score: the Gaussians carry no features")
-    inputs = _inputs(gaussians, options.position_frequencies)
-    targets = _targets(clip, geometry, errors, options)
-    bare = gaussians.without_features()
+    inputs = _inputs(gaussians, options.position_frequencies).to(device)
+    targets = {
+        frame: (target.to(device), weight.to(device))
+        for frame, (target, weight) in _targets(clip, geometry, errors, options).items()
+    }
+    bare = gaussians.without_features().to(device)
     shown = dict.fromkeys(targets, (bare, inputs))
     if options.window is not None:
         windows = {frame: _in_window(gaussians, clip, frame, options.window) for frame in targets}
-        shown = {frame: (bare.select(rows), inputs[rows]) for frame, rows in windows.items()}
-    network = ScoreNetwork(gaussians.features.shape[1], options, seed)
+        shown = {
+            frame: (bare.select(rows), inputs[rows])
+            for frame, rows in ((frame, rows.to(device)) for frame, rows in windows.items())
+        }
+    network = ScoreNetwork(gaussians.features.shape[1], options, seed).to(device)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate)
     generator = torch.Generator().manual_seed(seed)
     order: list[int] = []
@@ -118,7 +126,7 @@ def score(
         optimiser.step()
         progress(step + 1, options.steps)
     with torch.no_grad():
-        return network(inputs)
+        return network(inputs).cpu()
 
 
 def _splat(

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
 
 from dreamdrive.compute.device import CPU
+from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork
 from dreamdrive.fit.parameters import LearningRates, Parameters
@@ -17,6 +19,7 @@ from dreamdrive.scene.exposure import Exposure
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.sky import Sky
+from dreamdrive.splat import render
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,19 @@ class StaticFit:
     gaussians: Gaussians
     sky: Sky
     exposure: Exposure
+
+    def on(self, device: torch.device) -> "StaticFit":
+        """The same with all its tensors on a device, where it is rendered then."""
+        return StaticFit(self.gaussians.to(device), self.sky.on(device), self.exposure.on(device))
+
+    @one_torch_thread()
+    @torch.no_grad()
+    def picture(self, clip: Clip, geometry: Geometry, frame: int) -> Float[torch.Tensor, "h w 3"]:
+        """I_static of a frame (eq. 5), RGB in [0, 1] in the colours of the recording."""
+        camera = geometry.cameras[frame]
+        drawn = render(self.gaussians, camera)
+        image = drawn.colour + (1 - drawn.alpha)[..., None] * self.sky.colour(camera)
+        return self.exposure.apply(image, float(clip.times_s[frame]), int(clip.camera[frame])).clamp(0, 1)
 
 
 def fit_static(

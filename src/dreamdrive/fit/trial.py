@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from dreamdrive.compute.device import CPU
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.initialise import SeedOptions, initialise
 from dreamdrive.fit.static import fit_static
@@ -17,7 +18,6 @@ from dreamdrive.fit.trainer import FitOptions
 from dreamdrive.progress import silent
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
-from dreamdrive.splat import render
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ def better_depth(
     options: TrialOptions,
     seed: int,
     stands: Callable[[Trial], bool],
+    device: torch.device = CPU,
 ) -> tuple[Geometry, Trial | None]:
     """The geometry with that of its two depths which predicts withheld frames better, and its trial.
 
@@ -79,7 +80,7 @@ def better_depth(
     if ratio is None or trust is None:
         return fused, None
     stereo = replace(fused, depth_m=ratio * geometry.depth_m, confidence=trust)
-    first, second = (trial(clip, each, seeds, options, seed) for each in (fused, stereo))
+    first, second = (trial(clip, each, seeds, options, seed, device) for each in (fused, stereo))
     if first is None or second is None:
         return fused, None
     scores = {"fused": round(first.psnr_db, 2), "stereo": round(second.psnr_db, 2)}
@@ -91,7 +92,12 @@ def better_depth(
 
 @one_torch_thread()
 def trial(
-    clip: Clip, geometry: Geometry, seeds: SeedOptions, options: TrialOptions, seed: int
+    clip: Clip,
+    geometry: Geometry,
+    seeds: SeedOptions,
+    options: TrialOptions,
+    seed: int,
+    device: torch.device = CPU,
 ) -> Trial | None:
     """Fit a street that stands to most of the frames that may be seen, small and short; judge the others.
 
@@ -109,16 +115,12 @@ def trial(
     small = replace(small, held_out=held_out)
     gaussians = initialise(small, shown, seeds)
     steps = ceil(options.visits * (~held_out).sum())
-    fitted = fit_static(small, shown, gaussians, FitOptions(steps=steps), seed, silent)
-    errors, judged = [], []
-    with torch.no_grad():
-        for i in frames:
-            drawn = render(fitted.gaussians, shown.cameras[i])
-            image = drawn.colour + (1 - drawn.alpha)[..., None] * fitted.sky.colour(shown.cameras[i])
-            image = fitted.exposure.apply(image, float(small.times_s[i]), int(small.camera[i])).clamp(0, 1)
-            errors.append(np.abs(image.numpy() - small.frames[i] / np.float32(255)).mean(axis=2))
-            judged.append(small.valid[i] & (shown.fixed_regions[small.camera[i]] == 0))
-    return Trial(small, frames, np.stack(errors), np.stack(judged)) if np.any(judged) else None
+    fitted = fit_static(small, shown, gaussians, FitOptions(steps=steps), seed, silent, device).on(device)
+    found = torch.stack([fitted.picture(small, shown, i) for i in frames]).cpu().numpy()
+    each = list(frames)
+    errors = np.abs(found - small.frames[each] / np.float32(255)).mean(axis=3)
+    judged = small.valid[each] & (shown.fixed_regions[small.camera[each]] == 0)
+    return Trial(small, frames, errors, judged) if judged.any() else None
 
 
 def _reduced(clip: Clip, geometry: Geometry, width_px: int) -> tuple[Clip, Geometry]:

@@ -1,6 +1,6 @@
 """Colour of the recording camera: one affine transform a frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -24,6 +24,10 @@ class Exposure:
         times = [self.of(camera)[1] for camera in cameras]
         if len(self.times_s) == 0 or any((np.diff(each) <= 0).any() for each in times):
             raise ValueError("exposure: expected at least one frame and strictly increasing times")
+
+    def on(self, device: torch.device) -> "Exposure":
+        """The same with its transforms on a device."""
+        return replace(self, transforms=self.transforms.to(device))
 
     def at(self, t_s: float, camera: int = 0) -> Float[Tensor, "3 4"]:
         """The transform at a time: linear between the neighbouring trained frames, constant outside."""

@@ -142,10 +142,8 @@ class Scene:
             static=self.static.to(there),
             dynamic=self.dynamic.to(there),
             deformation=None if self.deformation is None else self.deformation.on(there),
-            sky=None if self.sky is None else replace(self.sky, texture=self.sky.texture.to(there)),
-            exposure=None
-            if self.exposure is None
-            else replace(self.exposure, transforms=self.exposure.transforms.to(there)),
+            sky=None if self.sky is None else self.sky.on(there),
+            exposure=None if self.exposure is None else self.exposure.on(there),
         )
 
     @property

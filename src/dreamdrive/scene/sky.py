@@ -1,7 +1,7 @@
 """The sky: a far panorama that only the direction of a ray selects from."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Float
@@ -28,6 +28,10 @@ class Sky:
             low, high = getattr(self, name)
             if not high > low:
                 raise ValueError(f"sky: {name} must grow, got {low}..{high}")
+
+    def on(self, device: torch.device) -> "Sky":
+        """The same with its texture on a device."""
+        return replace(self, texture=self.texture.to(device))
 
     def grid(self, camera: Camera) -> Float[Tensor, "h w 2"]:
         """Where each pixel of a camera looks in the texture, in [-1, 1]; serves many textures."""

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from dreamdrive.decompose import error_maps, score, static_picture
+from dreamdrive.decompose import error_maps, score
 from dreamdrive.files.digest import stage_seed
 from dreamdrive.options import Options
 from dreamdrive.scene.clip import OF_GEOMETRY, pixel_features
@@ -37,8 +37,7 @@ def scored_on(errors: Errors) -> Around:
 
 def own_errors(before: Before, options: Options) -> Float[np.ndarray, "f h w"]:
     """Hybrid's errors: of colour, absolute."""
-    clip, geometry, fitted = before["prior"], before["geometry"], before["static"]
-    return error_maps(clip, geometry, fitted.gaussians, fitted.sky, fitted.exposure)
+    return error_maps(before["prior"], before["geometry"], before["static"])
 
 
 def dssim_errors(before: Before, options: Options) -> Float[np.ndarray, "f h w"]:
@@ -46,7 +45,7 @@ def dssim_errors(before: Before, options: Options) -> Float[np.ndarray, "f h w"]
     clip, geometry, fitted = before["prior"], before["geometry"], before["static"]
 
     def error(frame: int) -> np.ndarray:
-        image = static_picture(clip, geometry, fitted.gaussians, fitted.sky, fitted.exposure, frame)
+        image = fitted.picture(clip, geometry, frame)
         reference = torch.from_numpy(clip.frames[frame] / np.float32(255))
         return ((1 - ssim_map(image, reference)) / 2).mean(dim=2).numpy()
 

@@ -84,8 +84,7 @@ def scene_of(case: Case, options: Options, arm: tuple[str, ...]) -> Scene:
 
 
 def _voted(parts: Begun, options: Options) -> Grouping:
-    fitted = parts.static
-    maps = error_maps(parts.clip, parts.geometry, fitted.gaussians, fitted.sky, fitted.exposure)
+    maps = error_maps(parts.clip, parts.geometry, parts.static)
     seed = stage_seed(0, "score")
     scores = score(parts.clip, parts.geometry, parts.seeds, maps, options.score, seed, silent)
     return group(parts.clip, parts.geometry, parts.seeds, scores, options.group, options.seeds.reach_px)
