@@ -222,7 +222,7 @@ def _scores(
     o, device = options, torch.device(options.device)
 
     def compute(work: Work) -> Float[torch.Tensor, " n"]:
-        errors = error_maps(clip, geometry, static, device)
+        errors = error_maps(clip, geometry, static.on(device).pictures(clip, geometry))
         return score(clip, geometry, seeds, errors, o.score, stage_seed(seed, "score"), work, device)
 
     return run("score", [o.score, seed], compute, check=partial(check.scores, seeds))

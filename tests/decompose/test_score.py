@@ -17,7 +17,7 @@ def fitted():
     clip, geometry = street_clip(street, hold_out=8), true_geometry(street)
     seeds = initialise(clip, geometry, SeedOptions())
     start = fit_static(clip, geometry, seeds, FitOptions(steps=80), 0, quiet)
-    errors = error_maps(clip, geometry, start)
+    errors = error_maps(clip, geometry, start.pictures(clip, geometry))
     return street, clip, geometry, seeds, errors
 
 

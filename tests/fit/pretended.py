@@ -58,7 +58,8 @@ def computed(func: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         for value in given:
             if not isinstance(value, Elsewhere) and value.dim():
                 raise RuntimeError(f"{func}: a tensor of the CPU, {tuple(value.shape)}, among others")
-    wanted = kwargs.get("device")
+    named = [value for value in args if isinstance(value, torch.device)]
+    wanted = named[0] if named else kwargs.get("device")
     there = elsewhere if wanted is None else torch.device(wanted).type == DEVICE.type
 
     def inner(value: Any) -> Any:
@@ -70,7 +71,8 @@ def computed(func: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         return Elsewhere(value) if there and isinstance(value, torch.Tensor) else value
 
     result = tree_map(outer, func(*tree_map(inner, args), **tree_map(inner, kwargs)))
-    return return_and_correct_aliasing(func, args, kwargs, result) if elsewhere else result
+    # In inference mode a copy to the CPU comes as one that might be a view.
+    return return_and_correct_aliasing(func, args, kwargs, result) if elsewhere and there else result
 
 
 @contextmanager

@@ -53,7 +53,7 @@ def pictures(built: Built, tau: float) -> dict[str, tuple[dict[str, Image], int]
     clip, scene, geometry = built.clip, built.scene, built.geometry
     camera, t_s, frame = scene.cameras[_AT], float(scene.times_s[_AT]), clip.frames[_AT]
     seen = render_scene(scene, camera, t_s)
-    errors = error_maps(clip, geometry, built.static)[_AT]
+    errors = error_maps(clip, geometry, built.static.pictures(clip, geometry))[_AT]
     parts = {part: render_scene(scene, camera, t_s, part=part).picture for part in ("static", "dynamic")}
     shift = camera.at(manoeuvre("shift", scene.trajectory, scene.up, -2.0).world_from_camera[_AT])
     aside = render_scene(scene, shift, t_s)

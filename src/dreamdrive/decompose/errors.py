@@ -1,30 +1,30 @@
 """Error maps: renders of the static fit and their distance from the frames (eq. 5-6)."""
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import torch
 from jaxtyping import Float
 
-from dreamdrive.compute.device import CPU
-from dreamdrive.fit import StaticFit
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.vision.windows import grown
 
 
 def error_maps(
-    clip: Clip, geometry: Geometry, fitted: StaticFit, device: torch.device = CPU
+    clip: Clip, geometry: Geometry, picture: Callable[[int], Float[torch.Tensor, "h w 3"]]
 ) -> Float[np.ndarray, "f h w"]:
-    """|I_static - I_ref| (eq. 6), mean over colour, in [0, 1], of the static fit (eq. 5).
+    """|I_static - I_ref| (eq. 6), mean over colour, in [0, 1].
 
-    Held-out frames get 0 and are not read; so do pixels that are invalid or fixed to the camera. It is
-    computed on ``device``.
+    ``picture`` is I_static of a frame (eq. 5), on any device. Held-out frames get 0 and are not read; so do
+    pixels that are invalid or fixed to the camera.
     """
-    there = fitted.on(device)
 
     def error(frame: int) -> Float[torch.Tensor, "h w"]:
-        reference = torch.from_numpy(clip.frames[frame] / np.float32(255)).to(device)
-        return (there.picture(clip, geometry, frame) - reference).abs().mean(dim=2)
+        shown = picture(frame)
+        reference = torch.from_numpy(clip.frames[frame] / np.float32(255)).to(shown.device)
+        return (shown - reference).abs().mean(dim=2)
 
     seen = np.flatnonzero(~clip.held_out)
     errors = np.zeros(clip.frames.shape[:3], dtype=np.float32)

@@ -1,5 +1,6 @@
 """The static fit: everything optimised as if nothing moved (the scene behind eq. 5)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -40,14 +41,18 @@ class StaticFit:
         """The same with all its tensors on a device, where it is rendered then."""
         return StaticFit(self.gaussians.to(device), self.sky.on(device), self.exposure.on(device))
 
-    @one_torch_thread()
-    @torch.no_grad()
-    def picture(self, clip: Clip, geometry: Geometry, frame: int) -> Float[torch.Tensor, "h w 3"]:
-        """I_static of a frame (eq. 5), RGB in [0, 1] in the colours of the recording."""
-        camera = geometry.cameras[frame]
-        drawn = render(self.gaussians, camera)
-        image = drawn.colour + (1 - drawn.alpha)[..., None] * self.sky.colour(camera)
-        return self.exposure.apply(image, float(clip.times_s[frame]), int(clip.camera[frame])).clamp(0, 1)
+    def pictures(self, clip: Clip, geometry: Geometry) -> Callable[[int], Float[torch.Tensor, "h w 3"]]:
+        """I_static of a frame (eq. 5) by its index, RGB in [0, 1] in the colours of the recording."""
+
+        @one_torch_thread()
+        @torch.no_grad()
+        def picture(frame: int) -> Float[torch.Tensor, "h w 3"]:
+            camera, t_s = geometry.cameras[frame], float(clip.times_s[frame])
+            drawn = render(self.gaussians, camera)
+            image = drawn.colour + (1 - drawn.alpha)[..., None] * self.sky.colour(camera)
+            return self.exposure.apply(image, t_s, int(clip.camera[frame])).clamp(0, 1)
+
+        return picture
 
 
 def fit_static(

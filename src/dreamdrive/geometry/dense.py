@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt16
 
+from dreamdrive.compute.device import CPU, chosen_device
 from dreamdrive.geometry.cameras import Posed
 from dreamdrive.geometry.depth import (
     PAVED,
@@ -23,6 +24,7 @@ from dreamdrive.geometry.depth import (
     shifted_road_users,
     sky_mask,
     sweep_frames,
+    sweep_frames_on,
     temporal_neighbours,
     unheard,
     with_outlines,
@@ -181,7 +183,8 @@ def _inverse(depth_m: np.ndarray) -> Float[np.ndarray, "f h w"]:
 
 
 def _swept(view: PosedFrames, sky: Bool[np.ndarray, "f h w"]) -> DepthMaps:
-    found = sweep_frames(view, sky)
+    device = chosen_device()
+    found = sweep_frames(view, sky) if device == CPU else sweep_frames_on(view, sky, device)
     inverse = np.zeros(view.grey.shape, np.float32)
     confidence = np.zeros(view.grey.shape, np.float32)
     for frame, swept in found.items():

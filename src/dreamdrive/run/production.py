@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from dreamdrive.build import Built
+from dreamdrive.compute.device import chosen_device
 from dreamdrive.compute.machine import available_cores, free_bytes
 from dreamdrive.data import read_clip
 from dreamdrive.files.paths import inside
@@ -62,8 +63,9 @@ class Production(Stages):
         clip, geometry = built.clip, built.geometry
         path = request.control.path
         scene = replace(built.scene, provenance=_about(path, clip, geometry, request.prior))
-        held_out, baselines = score_scene(clip, geometry, scene), score_baselines(clip, geometry)
-        again, options = found_again(clip, scene), request.document["options"]
+        there = scene.on(chosen_device())
+        held_out, baselines = score_scene(clip, geometry, there), score_baselines(clip, geometry)
+        again, options = found_again(clip, there), request.document["options"]
         facts = facts_about(clip, geometry, scene, options, held_out, baselines, again)
         shift = shift_of(scene, facts)
 
@@ -71,10 +73,10 @@ class Production(Stages):
             save_scene(scene, staging / "scene")
             recorded = self._recorded(clip, scene)
             videos = staging / "video"
-            write_videos(videos, scene, recorded, self._scored(built), progress, shift_m=shift.right_m)
-            write_held_out(staging / "held_out", scene, clip.source_index.tolist())
+            write_videos(videos, there, recorded, self._scored(built), progress, shift_m=shift.right_m)
+            write_held_out(staging / "held_out", there, clip.source_index.tolist())
             write_png(staging / PICTURE, draw_geometry(clip, geometry, scene))
-            if (drives := draw_drives(scene)) is not None:
+            if (drives := draw_drives(there)) is not None:
                 write_png(videos / "drives.png", drives)
 
         self.measure("videos", show)
@@ -103,7 +105,8 @@ class Production(Stages):
         """What the panel of the dynamic scores shows, where the representation has them."""
         if built.scores is None:
             return None
-        return Scored(built.static.gaussians, built.scores, self.request.options.group.threshold)
+        gaussians, scores = (each.to(chosen_device()) for each in (built.static.gaussians, built.scores))
+        return Scored(gaussians, scores, self.request.options.group.threshold)
 
     def _recorded(self, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:
         """The frames in the source's distortion, at the clip's size."""

@@ -184,7 +184,8 @@ def score_image(scored: Scored, camera: Camera, frames: list[int]) -> Float[Tens
 
     The seeds hold a moving thing once a frame; of those only the ones from ``frames`` are shown.
     """
-    near = torch.isin(scored.gaussians.source_frame, torch.tensor(frames))
+    source = scored.gaussians.source_frame
+    near = torch.isin(source, torch.tensor(frames, device=source.device))
     rows = torch.nonzero(near | (scored.scores <= scored.threshold)).squeeze(1)
     shown = scored.gaussians.select(rows)
-    return render(shown, camera, channels=scored.scores[rows][:, None], sh_degree=0).channels[..., 0]
+    return render(shown, camera, channels=scored.scores[rows][:, None], sh_degree=0).channels[..., 0].cpu()

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Float, Int, Shaped, UInt8, UInt16
 from torch import Tensor
 
+from dreamdrive.compute.device import CPU, chosen_device
 from dreamdrive.compute.machine import available_cores
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.errors import InputError
@@ -27,7 +28,9 @@ from dreamdrive.street_network.resize import ResizePad, within_regions
 from dreamdrive.street_network.shipped import SHIPPED, load_knowledge
 
 Network = Callable[[Float[Tensor, "n 3 h w"]], Prediction]
-"""From RGB pictures in [0, 1], whose sides are multiples of 32 pixels."""
+"""From RGB pictures in [0, 1], whose sides are multiples of 32 pixels; it is where ``chosen_device`` says."""
+_AT_ONCE = 8
+"""Frames that another device than the CPU sees at once."""
 _WITHIN_68 = -log(1 - 0.6827)
 """Half width of the interval that holds 68 % of a Laplace distribution of scale 1."""
 
@@ -83,7 +86,7 @@ def look(
     resize = ResizePad.choose(width, height, options.width_px)
     maps = {name: np.zeros((count, height, width), kind) for name, kind in _KINDS.items()}
     seen: list[_Seen] = []
-    for each in _see_all(frames, partial(_see, resize=resize, network=network, options=options)):
+    for each in _see_all(frames, network, resize, options):
         for name, values in each.maps.items():
             maps[name][len(seen)] = values
         seen.append(replace(each, maps={}))
@@ -116,26 +119,47 @@ _KINDS = {
 
 
 def _see_all(
-    frames: UInt8[np.ndarray, "f h w 3"], see: Callable[[UInt8[np.ndarray, "h w 3"]], _Seen]
+    frames: UInt8[np.ndarray, "f h w 3"], network: Network, resize: ResizePad, options: LookOptions
 ) -> Iterator[_Seen]:
     """What is seen in each frame, on every core at once.
 
     Each thread has a frame to itself. Threads of torch wait for each other after every operation, and beside
-    other work on the machine a frame then took two seconds.
+    other work on the machine a frame then took two seconds. Another device answers of many frames at once.
     """
+    device = chosen_device()
     with one_torch_thread(), ThreadPoolExecutor(available_cores()) as pool:
+        if device == CPU:
+            answers = (partial(_answer, frame[None], network, resize, CPU) for frame in frames)
+        else:
+            answers = _answers_of(frames, network, resize, device)
         try:
-            yield from pool.map(see, frames)
+            yield from pool.map(partial(_see, resize=resize, options=options), answers)
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 @torch.inference_mode()
-def _see(
-    frame: UInt8[np.ndarray, "h w 3"], resize: ResizePad, network: Network, options: LookOptions
-) -> _Seen:
+def _answer(
+    frames: UInt8[np.ndarray, "f h w 3"], network: Network, resize: ResizePad, device: torch.device
+) -> Prediction:
+    """What the network says, on the CPU."""
+    return network(resize.taken(frames).to(device)).to(CPU)
+
+
+def _answers_of(
+    frames: UInt8[np.ndarray, "f h w 3"], network: Network, resize: ResizePad, device: torch.device
+) -> Iterator[Callable[[], Prediction]]:
+    """What it says of each frame, found for many at once."""
+    for first in range(0, len(frames), _AT_ONCE):
+        some = frames[first : first + _AT_ONCE]
+        said = _answer(some, network, resize, device)
+        yield from (partial(said.of, k) for k in range(len(some)))
+
+
+@torch.inference_mode()
+def _see(answer: Callable[[], Prediction], resize: ResizePad, options: LookOptions) -> _Seen:
     """What the network says of one frame, on the frame's pixels."""
-    said = network(resize.taken(frame[None]))
+    said = answer()
     chance, classes = _classes(torch.softmax(resize.on_pixels(said.classes[0]), dim=0))
     peaks = torch.sigmoid(resize.shown(said.centre[0]))
     # Between two road users a mean of their offsets would point to neither.

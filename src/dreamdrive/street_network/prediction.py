@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -28,6 +29,10 @@ class Prediction:
     offset: Float[Tensor, "n 2 h4 w4"]
     camera: Float[Tensor, "n 7"]
     features: Float[Tensor, "n c h8 w8"] | None = None
+
+    def to(self, device: torch.device) -> "Prediction":
+        """The same on a device."""
+        return replace(self, **{k: value.to(device) for k, value in vars(self).items() if value is not None})
 
     def of(self, index: int) -> "Prediction":
         """The answer for one of the pictures, as a batch of one."""

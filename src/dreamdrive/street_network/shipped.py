@@ -1,8 +1,10 @@
 """The network by the name of the weights that ship, or by a file of others."""
 
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 
+from dreamdrive.compute.device import CPU, chosen_device
 from dreamdrive.errors import InputError
 from dreamdrive.street_network.network import StreetNetwork
 from dreamdrive.street_network.weights import EXPECTED, read_network
@@ -15,13 +17,14 @@ _FILE = Path(__file__).with_name("street.safetensors")
 
 
 def load_knowledge(given: str | Path = SHIPPED) -> StreetNetwork:
-    """The network with the weights that ship, or those in a file, ready to look.
+    """The network with the weights that ship, or those in a file, ready to look on ``chosen_device``.
 
     Raises:
         InputError: There are none, or the file is of something else.
     """
-    path = weights_of(given)
-    return _shipped(path) if given == SHIPPED else read_network(path)[0].folded()
+    path, device = weights_of(given), chosen_device()
+    network = _shipped(path) if given == SHIPPED else read_network(path)[0].folded()
+    return network if device == CPU else deepcopy(network).to(device)
 
 
 @cache

@@ -37,15 +37,17 @@ def scored_on(errors: Errors) -> Around:
 
 def own_errors(before: Before, options: Options) -> Float[np.ndarray, "f h w"]:
     """Hybrid's errors: of colour, absolute."""
-    return error_maps(before["prior"], before["geometry"], before["static"])
+    clip, geometry = before["prior"], before["geometry"]
+    return error_maps(clip, geometry, before["static"].pictures(clip, geometry))
 
 
 def dssim_errors(before: Before, options: Options) -> Float[np.ndarray, "f h w"]:
     """(1 - SSIM) / 2 of static fit and references."""
-    clip, geometry, fitted = before["prior"], before["geometry"], before["static"]
+    clip, geometry = before["prior"], before["geometry"]
+    picture = before["static"].pictures(clip, geometry)
 
     def error(frame: int) -> np.ndarray:
-        image = fitted.picture(clip, geometry, frame)
+        image = picture(frame)
         reference = torch.from_numpy(clip.frames[frame] / np.float32(255))
         return ((1 - ssim_map(image, reference)) / 2).mean(dim=2).numpy()
 

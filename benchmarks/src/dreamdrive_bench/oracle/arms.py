@@ -84,7 +84,8 @@ def scene_of(case: Case, options: Options, arm: tuple[str, ...]) -> Scene:
 
 
 def _voted(parts: Begun, options: Options) -> Grouping:
-    maps = error_maps(parts.clip, parts.geometry, parts.static)
+    shown = parts.static.pictures(parts.clip, parts.geometry)
+    maps = error_maps(parts.clip, parts.geometry, shown)
     seed = stage_seed(0, "score")
     scores = score(parts.clip, parts.geometry, parts.seeds, maps, options.score, seed, silent)
     return group(parts.clip, parts.geometry, parts.seeds, scores, options.group, options.seeds.reach_px)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         misfits as misfits,
         sample as sample,
     )
+    from dreamdrive.geometry.depth.sweep_elsewhere import sweep_frames_on as sweep_frames_on
     from dreamdrive.geometry.depth.view import (
         PosedFrames as PosedFrames,
         Tell as Tell,

@@ -10,10 +10,10 @@ from dreamdrive.compute.threads import THREADS
 from dreamdrive.geometry.depth import smoothing, sweep
 from dreamdrive.geometry.depth.view import PosedFrames, by_frame
 
-_PLANE_BONUS = 0.20
-_PLANE_MATCH_BONUS = 0.35
-_PLANE_MATCH = 0.6  # correlation under the plane's own warp from which the larger bonus counts
-_MIN_PLANE_INVERSE = 0.008  # 1/m; the road farther than 125 m away is a line
+PLANE_BONUS = 0.20
+PLANE_MATCH_BONUS = 0.35
+PLANE_MATCH = 0.6  # correlation under the plane's own warp from which the larger bonus counts
+MIN_PLANE_INVERSE = 0.008  # 1/m; the road farther than 125 m away is a line
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _sweep_frame(
 
 def _plane_labels(plane: Float[np.ndarray, "h w"]) -> tuple[Bool[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
     """Where the road plane is within the sweep, and its nearest label."""
-    reachable = (plane > _MIN_PLANE_INVERSE) & (plane <= sweep.MAX_INVERSE_DEPTH)
+    reachable = (plane > MIN_PLANE_INVERSE) & (plane <= sweep.MAX_INVERSE_DEPTH)
     return reachable, sweep.nearest_label(plane)
 
 
@@ -81,7 +81,7 @@ def _plane_bonus(
     plane: Float[np.ndarray, "h w"], score: Float[np.ndarray, "h w"]
 ) -> Float[np.ndarray, "h w"]:
     """What the road's own label is favoured by; more where the picture warped by the plane matches."""
-    bonus = _PLANE_BONUS + np.where(score > _PLANE_MATCH, _PLANE_MATCH_BONUS * score, 0)
+    bonus = PLANE_BONUS + np.where(score > PLANE_MATCH, PLANE_MATCH_BONUS * score, 0)
     return np.where(_plane_labels(plane)[0], bonus, 0).astype(np.float32)
 
 

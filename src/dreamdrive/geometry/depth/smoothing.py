@@ -5,9 +5,9 @@ from jaxtyping import Float
 
 from dreamdrive import _native
 
-_P1 = 0.10  # a change by one label
-_P2 = 0.9  # a jump, on a featureless neighbourhood
-_P2_GRADIENT = 8.0  # grey levels at which the jump costs half
+STEP_COST = 0.10  # a change by one label
+JUMP_COST = 0.9  # a jump, on a featureless neighbourhood
+JUMP_LEVELS = 8.0  # grey levels at which the jump costs half
 
 
 class CostBuffers:
@@ -24,11 +24,11 @@ def best_label(work: CostBuffers, grey: Float[np.ndarray, "h w"]) -> Float[np.nd
     It is refined by a parabola through its neighbours. Jumps are cheaper across the edges of the picture.
     """
     label = np.empty(grey.shape, np.float32)
-    _native.smooth(work.cost, _jump(grey, 0), _jump(grey, 1), _P1, work.total, label)
+    _native.smooth(work.cost, _jump(grey, 0), _jump(grey, 1), STEP_COST, work.total, label)
     return label
 
 
 def _jump(grey: Float[np.ndarray, "h w"], axis: int) -> Float[np.ndarray, "n m"]:
     """What a jump between neighbours along an axis costs."""
-    jump = np.float32(_P2) / (1 + np.abs(np.diff(grey, axis=axis)) / np.float32(_P2_GRADIENT))
-    return np.maximum(jump, np.float32(_P1)).astype(np.float32)
+    jump = np.float32(JUMP_COST) / (1 + np.abs(np.diff(grey, axis=axis)) / np.float32(JUMP_LEVELS))
+    return np.maximum(jump, np.float32(STEP_COST)).astype(np.float32)

@@ -14,12 +14,12 @@ LABELS = 64
 MAX_INVERSE_DEPTH = 0.30  # 1/m; nearest plane 3.3 m
 BASELINES_M = (0.8, 2.0)
 UNSEEN_SCORE = 0.0
-_WINDOW_PX = 5
-_NOISE = 6.0**2  # grey levels squared, added to both variances: noise on bare asphalt must not correlate
-_CENTRE = 128.0
+WINDOW_PX = 5
+NOISE = 6.0**2  # grey levels squared, added to both variances: noise on bare asphalt must not correlate
+CENTRE = 128.0
 _OUTSIDE_PX = -10.0
 _UNSEEN = np.float32(-2)
-_MIN_Z = 0.05  # of the reference's depth; nearer to the source's image plane a point is not projected
+MIN_Z = 0.05  # of the reference's depth; nearer to the source's image plane a point is not projected
 
 
 def choose_sources(
@@ -74,7 +74,7 @@ class Warp:
         """Source pixel indices (x, y) for ``cv2.remap``; far outside where the point is behind the source."""
         inverse, camera = np.asarray(inverse_depth, np.float32), self.source
         x, y, z = (self.rotated[k] + np.float32(self.translation[k]) * inverse for k in range(3))
-        behind = None if z.min() > _MIN_Z else ~(z > _MIN_Z)
+        behind = None if z.min() > MIN_Z else ~(z > MIN_Z)
         if behind is not None:
             z[behind] = 1
         for at, focal, middle in ((x, camera.fx_px, camera.cx_px), (y, camera.fy_px, camera.cy_px)):
@@ -92,11 +92,11 @@ class Correlation:
     Keeps working buffers, so one object serves one thread.
     """
 
-    def __init__(self, grey: Float[np.ndarray, "h w"], window: int = _WINDOW_PX) -> None:
+    def __init__(self, grey: Float[np.ndarray, "h w"], window: int = WINDOW_PX) -> None:
         self.side = window_px(window, grey.shape[1])
         self._row = np.full(self.side, 1 / self.side, np.float32)
         # Centred values keep the differences of squares exact enough in float32.
-        self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(_CENTRE)
+        self.grey = np.ascontiguousarray(grey, np.float32) - np.float32(CENTRE)
         self._buffers = [np.empty_like(self.grey) for _ in range(4)]
         self.mean = self._box(self.grey, np.empty_like(self.grey))
         square = self._box(self.grey * self.grey, np.empty_like(self.grey))
@@ -109,13 +109,13 @@ class Correlation:
     def __call__(self, warped: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
         """Correlation in [-1, 1] with a picture (H, W) on the reference's grid, values in grey levels."""
         other, mean, product, square = self._buffers
-        np.subtract(warped, np.float32(_CENTRE), out=other)
+        np.subtract(warped, np.float32(CENTRE), out=other)
         self._box(other, mean)
         self._box(np.multiply(other, other, out=product), square)
         np.subtract(square, np.multiply(mean, mean, out=product), out=square)
         np.maximum(square, 0, out=square)
-        square += np.float32(_NOISE)
-        square *= self.variance + np.float32(_NOISE)
+        square += np.float32(NOISE)
+        square *= self.variance + np.float32(NOISE)
         np.sqrt(square, out=square)
         covariance = self._box(np.multiply(self.grey, other, out=product), np.empty_like(other))
         covariance -= np.multiply(self.mean, mean, out=mean)
@@ -184,7 +184,7 @@ def matching_cost(
     """One minus ``similarity`` for every plane, uniform in 1/m from 0, into ``cost`` (H, labels, W)."""
     laid = _laid_on_planes(sources, np.linspace(0.0, MAX_INVERSE_DEPTH, LABELS))
     reference = correlation.grey, correlation.mean, correlation.variance
-    _native.sweep_cost(*reference, *laid, correlation.side, _CENTRE, _NOISE, _MIN_Z, cost)
+    _native.sweep_cost(*reference, *laid, correlation.side, CENTRE, NOISE, MIN_Z, cost)
 
 
 def misfits(
@@ -199,7 +199,7 @@ def misfits(
     also stands where no source sees the point.
     """
     found = np.empty((len(inverse_depth), *grey.shape), np.float32)
-    _native.sweep_misfit(grey, *_laid_on_planes(sources, inverse_depth), _MIN_Z, most_levels, found)
+    _native.sweep_misfit(grey, *_laid_on_planes(sources, inverse_depth), MIN_Z, most_levels, found)
     return found
 
 
