@@ -70,8 +70,8 @@ def render(
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
     from dreamdrive.splat import why_unusable
 
-    options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
     with computing_on(device, why_unusable) as where:
+        options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
         scene = less(open_scene(out), without)
         drives = drives_of(scene, trajectory, shift_m, fps)
         trust = trust_of(scene, drives, needed=show == "trust" or stay_within_trust)
