@@ -28,6 +28,8 @@ if TYPE_CHECKING:
         C2 as C2,
         SIGMA_PX as SIGMA_PX,
         WINDOW as WINDOW,
+        blurred as blurred,
+        mean_ssim as mean_ssim,
         ssim as ssim,
         ssim_map as ssim_map,
         ssim_map_reference as ssim_map_reference,
