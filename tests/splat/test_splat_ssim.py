@@ -90,7 +90,7 @@ def test_the_closed_gradient_of_the_mean_is_that_of_plain_torch(size):
 
 @pytest.fixture
 def fused(monkeypatch: pytest.MonkeyPatch) -> Generator[SimpleNamespace, None, None]:
-    """A package fused_ssim in plain torch, with what the real one computes; it tells how often it was used."""
+    """A package fused_ssim in plain torch, of what the real one computes; it counts how often it is used."""
     told = SimpleNamespace(calls=0, edge=0)
 
     def fused_ssim(image, target, padding="same", train=True):
