@@ -7,7 +7,7 @@ import importlib
 import importlib.util
 import shutil
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +15,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
 from dreamdrive.compute.device import why_no_cuda
 from dreamdrive.errors import InputError, installing
 from dreamdrive.scene.camera import NEAR_M
@@ -28,15 +29,16 @@ CHANNELS_AT_ONCE = 32
 PACKED_ABOVE = 2_000_000
 """Gaussians up to which rows are kept for those out of view, too: the sizes that were timed so.
 
-More belong to the drives of a rig, of which a camera sees a small share: the others then take 13 bytes each
-of a render's own instead of 100, and no work; one more count is waited for.
+More belong to the drives of a rig, of which a camera sees a small share: the others then take neither work
+nor the hundred bytes of a row; one more count is waited for.
 """
 
 
 def why_unusable() -> str | None:
     """What keeps the backend from running here, and what to do about it; None where nothing does.
 
-    Nothing is compiled: that the kernels cannot be built shows at first use.
+    Nothing is compiled: that the kernels cannot be built shows at first use. A wheel with kernels in it, as
+    the project of gsplat builds for some versions of torch and CUDA, needs no compiler.
     """
     if (trouble := why_no_cuda()) is not None:
         return trouble
@@ -45,7 +47,8 @@ def why_unusable() -> str | None:
     if importlib.util.find_spec("gsplat.csrc") is None and not _has_compiler():
         return (
             "gsplat is installed without compiled kernels and there is no nvcc to compile them: "
-            f"install the CUDA toolkit {torch.version.cuda}, or set CUDA_HOME to it"
+            f"install the CUDA toolkit {torch.version.cuda}, or set CUDA_HOME to it, or install a wheel of "
+            f"gsplat with kernels for torch {torch.__version__}, if its project has one"
         )
     return None
 
@@ -100,7 +103,7 @@ def _colours(
 
 
 def _project(gsplat: ModuleType, arguments: SplatArguments, packed: bool) -> tuple[Any, ...]:
-    """Radii, centres, depths, conics, dilutions or None; packed, with batch, camera and row of each before."""
+    """Radii, centres, depths, conics, dilutions or None; packed, batch, camera and row of each before."""
     (width, height), means = arguments.size_px, arguments.means
     intrinsics = _intrinsics(arguments.focal_px, arguments.centre_px, means.device)
     return gsplat.fully_fused_projection(
@@ -111,9 +114,18 @@ def _project(gsplat: ModuleType, arguments: SplatArguments, packed: bool) -> tup
 
 
 def _in_view(arguments: SplatArguments, rows: Int[Tensor, " m"]) -> SplatArguments:
-    """Those of the Gaussians at these rows."""
+    """Those of the Gaussians at these rows, each of which is there once."""
     each = {name: value for name, value in arguments.tensors().items() if name != "camera_from_world"}
-    return replace(arguments, **{name: value.index_select(0, rows) for name, value in each.items()})
+    picked = {name: differentiable(partial(_picked, rows), value) for name, value in each.items()}
+    return replace(arguments, **picked)
+
+
+def _picked(rows: Tensor, value: Tensor, *, wanted: Wanted) -> tuple[Tensor, Gradients]:
+    def gradients(upstream: Tensor) -> tuple[Tensor]:
+        # That of index_select adds, and takes the memory of all rows twice.
+        return (torch.zeros_like(value).index_copy_(0, rows, upstream),)
+
+    return value.index_select(0, rows), gradients
 
 
 def _splat(gsplat: ModuleType, arguments: SplatArguments) -> Render:
