@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from dreamdrive.registry import offer
 
 if TYPE_CHECKING:
-    from dreamdrive.fit import memory as memory, trainer as trainer
+    from dreamdrive.fit import trainer as trainer
     from dreamdrive.fit.densify import (
         DENSIFIERS as DENSIFIERS,
         Densifier as Densifier,

@@ -16,7 +16,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import l1_loss
 
-from dreamdrive.splat import C1, C2, NEAR_M, blurred, rasterize
+from dreamdrive.splat import C1, C2, NEAR_M, rasterize
+from dreamdrive.splat.ssim import blurred
 
 Step = Callable[[int], Tensor]
 
