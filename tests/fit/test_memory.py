@@ -168,6 +168,19 @@ def test_the_papers_size_fits_in_16_gb_and_what_does_not_is_refused_with_a_size_
         check_fit(PAPER, 10**6, least=True)
 
 
+def test_each_part_that_grows_counts_with_what_it_may_grow_to(street) -> None:
+    clip, geometry = street
+    seeds = initialise(clip, geometry)
+    none, few = seeds.select(torch.arange(0)), seeds.select(torch.arange(7))
+    size = memory.size_of(clip, seeds, few, PAPER.motion, most=100)
+    assert (size.gaussians, size.moving) == (len(seeds) + 100, 100)
+    assert (size.views, size.size_px, size.coefficients, size.features) == (4, (96, 64), 4, 5)
+    alone = memory.size_of(clip, seeds, none, PAPER.motion, most=10**6)
+    assert (alone.gaussians, alone.moving) == (10**6, 0)
+    every = memory.size_of(clip, none, few, PAPER.motion, most=0)
+    assert (every.gaussians, every.moving) == (7, 7)
+
+
 def test_a_gpu_is_told_what_it_holds() -> None:
     most = most_gaussians(PAPER, 16 * GB)
     assert plan_fit(replace(PAPER, gaussians=most)).peak <= 16 * GB
