@@ -122,9 +122,12 @@ def test_the_doctor_says_whether_a_gpu_can_be_used(run: Run, monkeypatch: pytest
     monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: "there is no nvcc: install it")
     assert re.search(r"GPU\s+not needed; there is no nvcc: install it", run("doctor").out)
     monkeypatch.setattr("dreamdrive.splat.why_unusable", lambda: None)
+    monkeypatch.setattr("dreamdrive.cli.doctor.free_bytes", lambda *device: 16 * 10**9)
     result = run("doctor")
     assert result.code == 0
-    assert re.search(r"GPU\s+backend gsplat can be used; not needed", result.out)
+    assert re.search(
+        r"GPU\s+backend gsplat can be used; not needed; 16\.0 GB are free, for about 1\d\.\d", result.out
+    )
 
 
 @pytest.mark.parametrize("command", [(), ("generate",), ("render",), ("export",), ("doctor",)])

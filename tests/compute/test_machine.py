@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 
 from dreamdrive.compute import machine
 
@@ -87,3 +88,10 @@ def test_the_limit_of_address_space_counts() -> None:
         check=True,
     )
     assert 0 < int(done.stdout) < GB
+
+
+def test_what_torch_holds_of_a_gpu_without_using_it_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = {"mem_get_info": (3 * GB, 9 * GB), "memory_reserved": 5 * GB, "memory_allocated": 4 * GB}
+    for name, value in told.items():
+        monkeypatch.setattr(f"torch.cuda.{name}", lambda device, value=value: value)
+    assert machine.free_bytes(torch.device("cuda")) == 4 * GB

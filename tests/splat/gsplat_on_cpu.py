@@ -68,7 +68,9 @@ def written(inside: Tensor, values: Tensor) -> Tensor:
     return torch.where(inside, values, torch.nan)
 
 
-def project(means, quats, scales, viewmats, Ks, opacities, **others) -> tuple[Tensor | None, ...]:
+def project(
+    means, quats, scales, viewmats, Ks, opacities, packed=False, **others
+) -> tuple[Tensor | None, ...]:
     covariances, _ = _torch_impl._quat_scale_to_covar_preci(quats, scales, True, False)
     radii, *numbers, dilutions = _torch_impl._fully_fused_projection(
         means, covariances, viewmats, Ks, **others
@@ -76,6 +78,11 @@ def project(means, quats, scales, viewmats, Ks, opacities, **others) -> tuple[Te
     radii = torch.where(opacities[:, None] >= 1 / 255, radii, 0)
     inside = (radii > 0).all(-1)
     means2d, depths, conics = numbers
+    if packed:
+        rows = torch.nonzero(inside[0]).squeeze(1)
+        found = (radii, means2d, depths, conics, dilutions)
+        nothing = torch.zeros_like(rows)
+        return (nothing, nothing, rows, *(None if each is None else each[0, rows] for each in found))
     return (
         radii,
         written(inside[..., None], means2d),
@@ -89,6 +96,24 @@ def spherical_harmonics(degrees_to_use, dirs, coeffs, masks) -> Tensor:
     return written(masks[..., None], _torch_impl._spherical_harmonics(degrees_to_use, dirs, coeffs))
 
 
+def list_by_tile(
+    means2d, radii, depths, tile_size, tile_width, tile_height,
+    packed=False, n_images=None, image_ids=None, gaussian_ids=None,
+) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    if not packed:
+        return _torch_impl._isect_tiles(means2d, radii, depths, tile_size, tile_width, tile_height)
+    assert (n_images, len(image_ids), len(gaussian_ids)) == (1, len(depths), len(depths))
+    each = (value[None] for value in (means2d, radii, depths))
+    tiles, *others = _torch_impl._isect_tiles(*each, tile_size, tile_width, tile_height)
+    return tiles[0], *others
+
+
+def composite(means2d, conics, colors, opacities, packed=False, **others) -> tuple[Tensor, Tensor]:
+    given = (means2d, conics, colors, opacities)
+    assert means2d.ndim == (2 if packed else 3)
+    return _torch_impl._rasterize_to_pixels(*(each[None] if packed else each for each in given), **others)
+
+
 def offsets(isect_ids, n_images, tile_width, tile_height) -> Tensor:
     return _torch_impl._isect_offset_encode(isect_ids, n_images, tile_width, tile_height)
 
@@ -96,9 +121,9 @@ def offsets(isect_ids, n_images, tile_width, tile_height) -> Tensor:
 STAND_INS = {
     "fully_fused_projection": project,
     "spherical_harmonics": spherical_harmonics,
-    "isect_tiles": _torch_impl._isect_tiles,
+    "isect_tiles": list_by_tile,
     "isect_offset_encode": offsets,
-    "rasterize_to_pixels": _torch_impl._rasterize_to_pixels,
+    "rasterize_to_pixels": composite,
 }
 
 

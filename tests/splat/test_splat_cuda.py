@@ -18,9 +18,18 @@ from tests.splat.scenes import IMAGES, pinhole, random_scene, relative, render_w
 TOLERANCES = {"cpu": (1e-4, 1e-4), "cuda": (1e-3, 5e-3)}
 
 
-@pytest.fixture(params=["gsplat's torch functions", pytest.param("kernels", marks=pytest.mark.gpu)])
+WAYS = [(of, packed) for of in ("gsplat's torch functions", "kernels") for packed in ("", ", packed")]
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(f"{of}{packed}", marks=pytest.mark.gpu if of == "kernels" else ()) for of, packed in WAYS
+    ]
+)
 def device(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    if request.param == "kernels":
+    if "packed" in request.param:
+        monkeypatch.setattr(cuda, "PACKED_ABOVE", 0)
+    if "kernels" in request.param:
         return gpu()
     stand_in = gsplat_on_cpu(monkeypatch)
     monkeypatch.setattr(cuda, "load_gsplat", lambda: stand_in)

@@ -1,10 +1,15 @@
 """Fused SSIM against plain torch."""
 
+import sys
+from collections.abc import Generator
+from types import SimpleNamespace
+
 import pytest
 import torch
 
-from dreamdrive.splat import set_threads, ssim, ssim_map, threads
-from dreamdrive.splat.ssim import ssim_map_reference
+from dreamdrive.splat import mean_ssim, set_threads, ssim, ssim_map, threads
+from dreamdrive.splat.ssim import _fused_ssim, ssim_map_reference
+from tests.fit.pretended import pretending
 from tests.splat.scenes import relative
 
 
@@ -61,3 +66,57 @@ def test_other_types_are_refused():
     image = torch.rand(8, 9, 3)
     with pytest.raises(ValueError, match="target"):
         ssim_map(image, torch.rand(8, 9, 3, dtype=torch.float64))
+
+
+def of_mean(function, image, target):
+    leaf = image.clone().requires_grad_()
+    value = function(leaf, target)
+    (3 * value).backward()
+    return value.detach(), leaf.grad
+
+
+def mean_of_the_map(image, target):
+    return ssim_map_reference(image, target).mean()
+
+
+@pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 2), (12, 70)])
+def test_the_closed_gradient_of_the_mean_is_that_of_plain_torch(size):
+    image, target = pair(*size)
+    found, expected = (of_mean(each, image, target) for each in (mean_ssim, mean_of_the_map))
+    for value, wanted in zip(found, expected, strict=True):
+        torch.testing.assert_close(value, wanted, rtol=1e-8, atol=1e-12)
+    assert mean_ssim(image, target) == found[0]
+
+
+@pytest.fixture
+def fused(monkeypatch: pytest.MonkeyPatch) -> Generator[SimpleNamespace, None, None]:
+    """A package fused_ssim in plain torch, of what the real one computes; it counts how often it is used."""
+    told = SimpleNamespace(calls=0, edge=0)
+
+    def fused_ssim(image, target, padding="same", train=True):
+        assert padding == "same"
+        assert image.is_contiguous()
+        assert target.is_contiguous()
+        told.calls += 1
+        whole = ssim_map_reference(*(each[0].permute(1, 2, 0) for each in (image, target)))
+        return whole[told.edge : len(whole) - told.edge].mean()
+
+    monkeypatch.setitem(sys.modules, "fused_ssim", SimpleNamespace(fused_ssim=fused_ssim))
+    _fused_ssim.cache_clear()
+    yield told
+    _fused_ssim.cache_clear()
+
+
+@pytest.mark.parametrize("edge", [0, 1])
+def test_the_fused_kernel_is_taken_off_the_cpu_where_it_is_the_same(fused, edge):
+    fused.edge = edge
+    image, target = (each.float() for each in pair(20, 24))
+    expected = of_mean(mean_of_the_map, image, target)
+    assert of_mean(mean_ssim, image, target)[0] == pytest.approx(float(expected[0]))
+    assert fused.calls == 0
+    with pretending() as there:
+        value, gradient = of_mean(mean_ssim, image.to(there), target.to(there))
+        of_mean(mean_ssim, image.to(there), target.to(there))
+    assert fused.calls == (3 if edge == 0 else 1)
+    assert value.here.item() == pytest.approx(float(expected[0]), rel=1e-5)
+    assert relative(gradient.here, expected[1]) < 1e-4

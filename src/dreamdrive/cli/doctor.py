@@ -120,4 +120,20 @@ def _gpu() -> str:
     except ImportError:
         return "unknown without torch and the native core; not needed"
     trouble = why_unusable()
-    return "backend gsplat can be used; not needed" if trouble is None else f"not needed; {trouble}"
+    return f"backend gsplat can be used; {_held_by_gpu()}" if trouble is None else f"not needed; {trouble}"
+
+
+def _held_by_gpu() -> str:
+    """What a fit of the paper's size may have on the GPU that is there."""
+    import torch
+
+    from dreamdrive.fit import FitSize, most_gaussians
+
+    size, free = FitSize(0, 0, 6 * 24, (1600, 900), cameras=6), free_bytes(torch.device("cuda"))
+    if free is None:
+        return "not needed"
+    most = most_gaussians(size, free)
+    return (
+        f"not needed; {free / 1e9:.1f} GB are free, for about {most / 1e6:.1f} million Gaussians with 24 "
+        "frames of each of six cameras at 1600x900"
+    )

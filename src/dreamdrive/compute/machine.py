@@ -35,7 +35,9 @@ def free_bytes(device: "torch.device | None" = None) -> int | None:
     if device is not None and device.type == "cuda":
         import torch
 
-        return torch.cuda.mem_get_info(device)[0]
+        # What torch holds without using it can be taken, too.
+        held = torch.cuda.memory_reserved(device) - torch.cuda.memory_allocated(device)
+        return torch.cuda.mem_get_info(device)[0] + held
     known = [_free_of_machine(), _free_address_space(), *map(_free_of_group, _groups("memory"))]
     return min((each for each in known if each is not None), default=None)
 

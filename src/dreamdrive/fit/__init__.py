@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from dreamdrive.fit.hybrid import Parts as Parts, fit as fit
     from dreamdrive.fit.initialise import SeedOptions as SeedOptions, initialise as initialise
     from dreamdrive.fit.losses import WEIGHTS as WEIGHTS, LossName as LossName, render_loss as render_loss
+    from dreamdrive.fit.memory import (
+        FitMemory as FitMemory,
+        FitSize as FitSize,
+        check_fit as check_fit,
+        most_gaussians as most_gaussians,
+        plan_fit as plan_fit,
+    )
     from dreamdrive.fit.parameters import LearningRates as LearningRates, Parameters as Parameters
     from dreamdrive.fit.static import (
         StaticFit as StaticFit,

@@ -71,11 +71,12 @@ def _torch_step(leaf: Tensor, moments: Moments, rates: tuple[float, ...]) -> Non
     assert leaf.grad is not None
     moments.mean.lerp_(leaf.grad, 1 - BETA1)
     moments.square.mul_(BETA2).addcmul_(leaf.grad, leaf.grad, value=1 - BETA2)
-    root = (moments.square / (1 - BETA2**moments.steps)).sqrt_().add_(EPSILON)
-    step = moments.mean / root / (1 - BETA1**moments.steps)
-    each = rates[0] if len(rates) == 1 else _rates(rates, leaf.device).view(leaf.shape[1:])
-    leaf.sub_(step * each)
     leaf.grad = None
+    # In the memory of one such tensor: three more are the most that a whole step would take.
+    step = (moments.square / (1 - BETA2**moments.steps)).sqrt_().add_(EPSILON)
+    torch.div(moments.mean, step, out=step).div_(1 - BETA1**moments.steps)
+    each = rates[0] if len(rates) == 1 else _rates(rates, leaf.device).view(leaf.shape[1:])
+    leaf.sub_(step.mul_(each))
 
 
 @lru_cache(maxsize=64)

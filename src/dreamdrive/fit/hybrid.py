@@ -7,6 +7,7 @@ import torch
 from dreamdrive.compute.device import CPU
 from dreamdrive.fit.densify import DENSIFIERS, DensifySettings
 from dreamdrive.fit.exposure import ExposureNetwork
+from dreamdrive.fit.memory import check_holds, size_of
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.static import StaticFit, footprints
 from dreamdrive.fit.trainer import FitOptions, Model, optimise
@@ -54,7 +55,12 @@ def fit(
     All motions take ``options.steps`` steps from the same static fit, whose sky is kept; the paper's is
     F_deform. Held-out frames are not read, their exposure is interpolated. Without dynamic Gaussians the
     result is a static scene. It is computed on ``device``; the scene is on the CPU.
+
+    Raises:
+        InputError: The memory of a CUDA device cannot hold it.
     """
+    most = 0 if densify.strategy == "none" else densify.most
+    check_holds(device, size_of(clip, parts.static, parts.dynamic, motion, most))
     views = training_views(clip, geometry, device)
     moving, dynamic = None, parts.dynamic
     if len(dynamic):

@@ -10,7 +10,7 @@ from torch import Tensor
 from dreamdrive import _native
 from dreamdrive.compute.compiled import Gradients, Wanted, at_once, differentiable
 from dreamdrive.compute.device import in_core
-from dreamdrive.splat import check_dtype, ssim_map_reference
+from dreamdrive.splat import check_dtype, mean_ssim
 
 LossName = Literal["field", "paper"]
 # Weights of L1 and of 1 - SSIM. "paper" is eq. 14 as printed, unweighted; "field" is what 3DGS and its
@@ -45,8 +45,7 @@ def render_loss(
     if not in_core(image):
         image = torch.where(mask[..., None], image, reference)
         of_l1, of_ssim = WEIGHTS[name]
-        similarity = ssim_map_reference(image, reference).mean()
-        return of_l1 * (image - reference).abs().mean() + of_ssim * (1 - similarity)
+        return of_l1 * (image - reference).abs().mean() + of_ssim * (1 - mean_ssim(image, reference))
     return differentiable(partial(_l1_and_ssim, *WEIGHTS[name]), image, reference, mask)
 
 

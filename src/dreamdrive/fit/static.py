@@ -10,6 +10,7 @@ from dreamdrive.compute.device import CPU
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork
+from dreamdrive.fit.memory import check_holds, size_of
 from dreamdrive.fit.parameters import LearningRates, Parameters
 from dreamdrive.fit.sky import estimate_sky
 from dreamdrive.fit.trainer import FitOptions, Model, optimise
@@ -67,7 +68,11 @@ def fit_static(
     """Optimise all seeds as static (eq. 5), without densification, so that rows keep their meaning.
 
     Held-out frames are not read. It is computed on ``device``; the result is on the CPU.
+
+    Raises:
+        InputError: The memory of a CUDA device cannot hold it.
     """
+    check_holds(device, size_of(clip, gaussians, None, None, most=0))
     views = training_views(clip, geometry, device)
     static = Parameters(gaussians.to(device), footprints(gaussians).to(device), LearningRates())
     exposure = ExposureNetwork(len(clip), seed).to(device)

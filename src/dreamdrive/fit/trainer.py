@@ -1,7 +1,7 @@
 """The optimisation loop both fits share: render a frame, compare, step, densify."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import torch
 from jaxtyping import Float, Int
@@ -14,7 +14,7 @@ from dreamdrive.fit.densify import Densifier
 from dreamdrive.fit.exposure import ExposureNetwork, recorded_picture
 from dreamdrive.fit.losses import LossName, geometry_loss, render_loss
 from dreamdrive.fit.parameters import Parameters
-from dreamdrive.fit.views import View
+from dreamdrive.fit.views import View, Views
 from dreamdrive.motion import Motion
 from dreamdrive.progress import Progress
 from dreamdrive.scene.camera import Camera
@@ -202,7 +202,7 @@ class Trainer:
 @one_torch_thread()
 def optimise(
     model: Model,
-    views: Sequence[View],
+    views: Views,
     densifiers: Sequence[Densifier],
     options: FitOptions,
     seed: int,
@@ -217,14 +217,25 @@ def optimise(
     # both, a change of one thing in the input changed everything else in the scene.
     frame_order = torch.Generator("cpu").manual_seed(seed)
     trainer = Trainer(model, densifiers, options, torch.Generator("cpu").manual_seed(seed))
-    skies = [model.sky.colour(view.camera).contiguous().to(model.device) for view in views]
+    behind = _sky_behind(model.sky, [view.camera for view in views], model.device)
     order: list[int] = []
     for step in range(options.steps):
         if not order:
             order = torch.randperm(len(views), generator=frame_order, device="cpu").tolist()
         which = order.pop()
-        trainer.step(step, views[which], skies[which])
+        trainer.step(step, views[which].whole(), behind(which))
         progress(step + 1, options.steps)
+
+
+def _sky_behind(
+    sky: Sky, cameras: Sequence[Camera], device: torch.device
+) -> Callable[[int], Float[Tensor, "h w 3"]]:
+    """What each camera sees of the sky, by its number."""
+    if device.type == "cpu":
+        return [sky.colour(camera).contiguous() for camera in cameras].__getitem__
+    # Drawn anew at each step: there it takes little time, but as much memory as all else of a view.
+    there = replace(sky, texture=sky.texture.to(device))
+    return lambda which: there.colour(cameras[which]).contiguous()
 
 
 def _splat(

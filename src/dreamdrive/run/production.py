@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import torch
 from jaxtyping import UInt8
 
 from dreamdrive.build import Built
@@ -12,9 +13,10 @@ from dreamdrive.compute.device import chosen_device
 from dreamdrive.compute.machine import available_cores, free_bytes
 from dreamdrive.data import read_clip
 from dreamdrive.files.paths import inside
+from dreamdrive.fit import check_fit
 from dreamdrive.prior import NAMED, Choice, choose_prior
 from dreamdrive.progress import Progress, StageProgress
-from dreamdrive.run.report.cost import announcement, check_memory
+from dreamdrive.run.report.cost import announcement, announcement_of_gpu, check_memory, fit_of
 from dreamdrive.run.report.document import describe, facts_about
 from dreamdrive.run.report.held_out import score_baselines, score_scene
 from dreamdrive.run.report.in_motion import found_again
@@ -123,12 +125,15 @@ def start(
 ) -> Production:
     """Say which prior it is, and what the run will cost where that is known before, and begin."""
     say(_whose_frames(request.choice))
-    planned = request.input.plan
+    planned, options = request.input.plan, request.options
     if planned is not None:
         check_memory(planned, free_bytes())
-        if request.options.device == "cpu":  # where the times were measured
-            for sentence in announcement(planned, request.options, available_cores()):
+        if options.device == "cpu":  # where the times were measured
+            for sentence in announcement(planned, options, available_cores()):
                 say(sentence)
+        else:
+            check_fit(fit_of(planned, options), free_bytes(torch.device(options.device)), least=True)
+            say(announcement_of_gpu(planned, options))
     return Production(
         workspace.stages,
         recompute_from,

@@ -7,7 +7,11 @@ from dreamdrive.registry import offer
 if TYPE_CHECKING:
     from dreamdrive.scene.camera import NEAR_M as NEAR_M
     from dreamdrive.splat.arguments import check_dtype as check_dtype
-    from dreamdrive.splat.cuda import load_gsplat as load_gsplat, why_unusable as why_unusable
+    from dreamdrive.splat.cuda import (
+        PACKED_ABOVE as PACKED_ABOVE,
+        load_gsplat as load_gsplat,
+        why_unusable as why_unusable,
+    )
     from dreamdrive.splat.rasterize import BACKENDS as BACKENDS, rasterize as rasterize
     from dreamdrive.splat.scene_view import (
         Moment as Moment,
@@ -28,6 +32,7 @@ if TYPE_CHECKING:
         C2 as C2,
         SIGMA_PX as SIGMA_PX,
         WINDOW as WINDOW,
+        mean_ssim as mean_ssim,
         ssim as ssim,
         ssim_map as ssim_map,
         ssim_map_reference as ssim_map_reference,

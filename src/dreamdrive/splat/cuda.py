@@ -6,13 +6,16 @@ Neither gsplat nor CUDA is imported before the backend is asked for.
 import importlib
 import importlib.util
 import shutil
-from functools import cache, lru_cache
+from dataclasses import replace
+from functools import cache, lru_cache, partial
 from types import ModuleType
+from typing import Any
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from dreamdrive.compute.compiled import Gradients, Wanted, differentiable
 from dreamdrive.compute.device import why_no_cuda
 from dreamdrive.errors import InputError, installing
 from dreamdrive.scene.camera import NEAR_M
@@ -23,12 +26,19 @@ from dreamdrive.splat.reference import BLUR_PX2, FAR_M
 TILE_PX = 16
 # A kernel holds all channels of a pixel in registers; gsplat's own rendering takes as many at a time.
 CHANNELS_AT_ONCE = 32
+PACKED_ABOVE = 2_000_000
+"""Gaussians up to which rows are kept for those out of view, too: the sizes that were timed so.
+
+More belong to the drives of a rig, of which a camera sees a small share: the others then take neither work
+nor the hundred bytes of a row; one more count is waited for.
+"""
 
 
 def why_unusable() -> str | None:
     """What keeps the backend from running here, and what to do about it; None where nothing does.
 
-    Nothing is compiled: that the kernels cannot be built shows at first use.
+    Nothing is compiled: that the kernels cannot be built shows at first use. A wheel with kernels in it, as
+    the project of gsplat builds for some versions of torch and CUDA, needs no compiler.
     """
     if (trouble := why_no_cuda()) is not None:
         return trouble
@@ -37,7 +47,8 @@ def why_unusable() -> str | None:
     if importlib.util.find_spec("gsplat.csrc") is None and not _has_compiler():
         return (
             "gsplat is installed without compiled kernels and there is no nvcc to compile them: "
-            f"install the CUDA toolkit {torch.version.cuda}, or set CUDA_HOME to it"
+            f"install the CUDA toolkit {torch.version.cuda}, or set CUDA_HOME to it, or install a wheel of "
+            f"gsplat with kernels for torch {torch.__version__}, if its project has one"
         )
     return None
 
@@ -91,43 +102,76 @@ def _colours(
     return (harmonics + 0.5).clamp(min=0)
 
 
-def _splat(gsplat: ModuleType, arguments: SplatArguments) -> Render:
-    """Project, list by tile, composite. Rows of culled Gaussians have radius 0 and are not written."""
-    width, height = arguments.size_px
-    intrinsics = _intrinsics(arguments.focal_px, arguments.centre_px, arguments.means.device)
-    radii, centres, depths, conics, dilutions = gsplat.fully_fused_projection(
-        arguments.means, None, arguments.quaternions, arguments.scales, arguments.camera_from_world[None],
-        intrinsics, width, height, eps2d=BLUR_PX2, near_plane=NEAR_M, far_plane=FAR_M,
+def _project(gsplat: ModuleType, arguments: SplatArguments, packed: bool) -> tuple[Any, ...]:
+    """Radii, centres, depths, conics, dilutions or None; packed, batch, camera and row of each before."""
+    (width, height), means = arguments.size_px, arguments.means
+    intrinsics = _intrinsics(arguments.focal_px, arguments.centre_px, means.device)
+    return gsplat.fully_fused_projection(
+        means, None, arguments.quaternions, arguments.scales, arguments.camera_from_world[None], intrinsics,
+        width, height, eps2d=BLUR_PX2, near_plane=NEAR_M, far_plane=FAR_M, packed=packed,
         opacities=arguments.opacities, calc_compensations=arguments.antialiased,
     )  # fmt: skip
-    opacities = arguments.opacities[None]
+
+
+def _in_view(arguments: SplatArguments, rows: Int[Tensor, " m"]) -> SplatArguments:
+    """Those of the Gaussians at these rows, each of which is there once."""
+    each = {name: value for name, value in arguments.tensors().items() if name != "camera_from_world"}
+    picked = {name: differentiable(partial(_picked, rows), value) for name, value in each.items()}
+    return replace(arguments, **picked)
+
+
+def _picked(rows: Tensor, value: Tensor, *, wanted: Wanted) -> tuple[Tensor, Gradients]:
+    def gradients(upstream: Tensor) -> tuple[Tensor]:
+        # That of index_select adds, and takes the memory of all rows twice.
+        return (torch.zeros_like(value).index_copy_(0, rows, upstream),)
+
+    return value.index_select(0, rows), gradients
+
+
+def _splat(gsplat: ModuleType, arguments: SplatArguments) -> Render:
+    """Project, list by tile, composite. Rows of culled Gaussians have radius 0 and are not written.
+
+    Of more than ``PACKED_ABOVE`` Gaussians there are only the rows in view, and what follows is of those.
+    """
+    width, height = arguments.size_px
+    count, packed = len(arguments.means), len(arguments.means) > PACKED_ABOVE
+    projected = _project(gsplat, arguments, packed)
+    rows, ids = None, dict[str, Any]()
+    if packed:
+        _, cameras, rows = projected[:3]  # all of one camera
+        arguments = _in_view(arguments, rows)
+        ids = {"packed": True, "n_images": 1, "image_ids": cameras, "gaussian_ids": rows}
+    radii, centres, depths, conics, dilutions = projected[-5:]
+    opacities = arguments.opacities.view(depths.shape)
     inside = (radii > 0).all(-1)
     if arguments.antialiased:
         opacities = opacities * torch.where(inside, dilutions, 0.0)
     if arguments.screen_offsets_px is not None:
         centres = centres + arguments.screen_offsets_px
-    columns, rows = -(-width // TILE_PX), -(-height // TILE_PX)
-    tiles, keys, order = gsplat.isect_tiles(centres, radii, depths, TILE_PX, columns, rows)
-    starts = gsplat.isect_offset_encode(keys, 1, columns, rows)
+    columns, lines = -(-width // TILE_PX), -(-height // TILE_PX)
+    tiles, keys, order = gsplat.isect_tiles(centres, radii, depths, TILE_PX, columns, lines, **ids)
+    starts = gsplat.isect_offset_encode(keys, 1, columns, lines)
 
-    values = [_colours(gsplat, arguments, inside[0]), depths[0, :, None]]
+    values = [_colours(gsplat, arguments, inside.view(-1)), depths.view(-1, 1)]
     if arguments.channels is not None:
         values.append(arguments.channels)
+    of_each = torch.cat(values, dim=-1) if packed else torch.cat(values, dim=-1)[None]
     composited = [
         gsplat.rasterize_to_pixels(
-            centres, conics, some[None], opacities, width, height, TILE_PX, starts, order
+            centres, conics, some, opacities, width, height, TILE_PX, starts, order, packed=packed
         )
-        for some in torch.cat(values, dim=-1).split(CHANNELS_AT_ONCE, dim=-1)
+        for some in of_each.split(CHANNELS_AT_ONCE, dim=-1)
     ]
     image = torch.cat([image[0] for image, _ in composited], dim=-1)
     colour, depth, channels = image.split([3, 1, image.shape[-1] - 4], dim=-1)
     _, alpha = composited[0]
+    visible = tiles.view(-1) > 0
     return Render(
         colour=colour,
         alpha=alpha[0, ..., 0],
         depth_m=depth[..., 0],
         channels=channels,
-        visible=tiles[0] > 0,
+        visible=visible if rows is None else visible.new_zeros(count).index_copy(0, rows, visible),
     )
 
 

@@ -14,7 +14,14 @@ from dreamdrive.errors import InputError
 from dreamdrive.options import QUALITIES
 from dreamdrive.prior import Input, choose_prior
 from dreamdrive.prior.replay import REPLAY
-from dreamdrive.run.report.cost import announcement, bytes_of, check_memory, seconds_of
+from dreamdrive.run.report.cost import (
+    announcement,
+    announcement_of_gpu,
+    bytes_of,
+    check_memory,
+    fit_of,
+    seconds_of,
+)
 from dreamdrive.scene.control import Control
 
 CLIP = Planned(24, 1, (480, 270), 10.0, 0, 1, chosen=True)
@@ -66,6 +73,24 @@ def test_what_is_left_out_of_too_many_frames_is_said_first() -> None:
     assert first == "There are more than 1000 frames: every 4th one is taken. Choose others with --frames."
     assert third.startswith("That is a long clip: --frames 0:142:3 takes 48 of its frames")
     assert len(announcement(replace(thinned, chosen=True), QUALITIES["standard"], 1)) == 1
+
+
+def test_the_fits_of_a_run_are_estimated_for_a_gpu() -> None:
+    """README's street, of 24 frames at 320x192, has 80,702 Gaussians: at least 0.05 of its pixels."""
+    standard = QUALITIES["standard"]
+    small = fit_of(replace(CLIP, size=(320, 192)), standard)
+    assert 0.8 * 80_702 < small.gaussians < 80_702
+    assert 0 < small.moving < 0.1 * small.gaussians
+    rig = Planned(24, 6, (1600, 900), 12.0, 0, 1, chosen=True)
+    assert announcement_of_gpu(rig, standard) == (
+        "24 frames of each of 6 cameras at 1600x900 take at least 10.6 GB of the GPU, with about 10,000,000 "
+        "Gaussians"
+    )
+    every = fit_of(rig, replace(standard, representation="deformable"))
+    assert every.moving == every.gaussians == fit_of(rig, standard).gaussians
+    sparse = replace(standard, seeds=replace(standard.seeds, stride_px=4))
+    assert 4 * fit_of(rig, sparse).gaussians == pytest.approx(every.gaussians, rel=1e-5)
+    assert fit_of(replace(rig, frames=96), standard).gaussians == pytest.approx(2 * every.gaussians, rel=1e-5)
 
 
 def test_what_memory_cannot_hold_is_refused_with_what_fits() -> None:

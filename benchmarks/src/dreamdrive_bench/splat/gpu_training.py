@@ -14,9 +14,10 @@ from types import ModuleType
 
 import torch
 from torch import Tensor
-from torch.nn.functional import conv2d, l1_loss
+from torch.nn.functional import l1_loss
 
-from dreamdrive.splat import C1, C2, NEAR_M, SIGMA_PX, WINDOW, rasterize
+from dreamdrive.splat import C1, C2, NEAR_M, rasterize
+from dreamdrive.splat.ssim import blurred
 
 Step = Callable[[int], Tensor]
 
@@ -41,18 +42,6 @@ def leaves(gaussians: dict[str, Tensor]) -> dict[str, Tensor]:
         "shN": gaussians["sh"][:, 1:],
     }
     return {name: value.detach().clone().requires_grad_() for name, value in values.items()}
-
-
-def blurred(planes: Tensor) -> Tensor:
-    """Planes (C, H, W) under the window of SSIM, zeros beyond the edge.
-
-    Planes are channels, each a group of its own: cuDNN takes 2.5 times as long for them as images.
-    """
-    offsets = torch.arange(WINDOW, dtype=planes.dtype, device=planes.device) - WINDOW // 2
-    window = torch.exp(-(offsets**2) / (2 * SIGMA_PX**2))
-    weight = (window / window.sum()).repeat(len(planes), 1, 1)
-    down = conv2d(planes[None], weight[..., None], padding=(WINDOW // 2, 0), groups=len(planes))
-    return conv2d(down, weight[:, :, None], padding=(0, WINDOW // 2), groups=len(planes))[0]
 
 
 def loss_and_gradient(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
