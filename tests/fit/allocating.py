@@ -5,7 +5,6 @@ What is taken is what gsplat 1.5.3's sources allocate (``Projection.cpp``, ``Int
 """
 
 import types
-import weakref
 from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
@@ -13,42 +12,13 @@ from typing import Any
 import pytest
 import torch
 from torch import Tensor
-from torch.utils._python_dispatch import TorchDispatchMode
-from torch.utils._pytree import tree_leaves
 
 from dreamdrive.compute import device
 from dreamdrive.fit import activation, adam, exposure, losses
 from dreamdrive.motion import deformation
 from dreamdrive.splat import BACKENDS, cuda
 from dreamdrive.splat.cuda import rasterize_gsplat
-
-
-class Living(TorchDispatchMode):
-    """Adds up the bytes of all tensors that operations inside make, as long as they live."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._alive: dict[int, int] = {}
-        self.bytes = self.peak = 0
-
-    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        result = func(*args, **(kwargs or {}))
-        for value in tree_leaves(result):
-            if isinstance(value, Tensor):
-                self._count(value.untyped_storage())
-        return result
-
-    def _count(self, storage: Any) -> None:
-        place, size = storage._cdata, storage.nbytes()
-        if place in self._alive:
-            return
-        self._alive[place] = size
-        self.bytes += size
-        self.peak = max(self.peak, self.bytes)
-        weakref.finalize(storage, self._forget, place)
-
-    def _forget(self, place: int) -> None:
-        self.bytes -= self._alive.pop(place)
+from tests.living import Living
 
 
 class _Projected(torch.autograd.Function):

@@ -77,7 +77,7 @@ def steps(size: FitSize, living: Living, settings: DensifySettings, count: int =
     trainer = Trainer(model, densifiers, FitOptions(steps=10), torch.Generator())
     sky = torch.zeros(*size.size_px[::-1], 3)
     del standing
-    living.peak = living.bytes
+    living.peak = living.now
     for step in range(4, 4 + count):
         trainer.step(step, views[0].whole(), sky)
     return model
