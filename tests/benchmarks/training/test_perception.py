@@ -75,10 +75,13 @@ def test_networks_are_trained_from_a_pack(runs, tmp_path):
     carried, made = (BevSet.open(Places(out).set(name)) for name in ("generated-of-real", "real"))
     assert (carried[0].pictures == made[0].pictures).all()  # both went the same way
     assert (made[0].pictures != BevSet.open(Places(runs).set("real"))[0].pictures).any()
-    again = replace(plan, found=told["trials"])
+    again = replace(plan, found=told)
     shutil.rmtree(out / "trials")
     assert perception.train(tmp_path / "pack", out, CPU, Limit(0.0), Figures(path, CPU), again)
     assert json.loads(path.read_text())["tables"] == told["tables"]
+    other = replace(plan, found=told | {"pack": {"sha256": "0", "webp": 90}})
+    with pytest.raises(InputError, match="another pack"):
+        perception.train(tmp_path / "pack", out, CPU, Limit(0.0), Figures(path, CPU), other)
 
 
 @pytest.mark.slow

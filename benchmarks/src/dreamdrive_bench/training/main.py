@@ -128,7 +128,7 @@ def _train_perception(
     from dreamdrive_bench.training.perception import PerceptionPlan, train
 
     found = json.loads(options.found.read_text()) if options.found else {}
-    plan = PerceptionPlan(_protocol(options), found=found.get("trials", []))
+    plan = PerceptionPlan(_protocol(options), found=found)
     return train(options.pack, options.runs / "perception", device, limit, figures, plan)
 
 

@@ -6,8 +6,8 @@ goes through the same WebP, so that no arm sees better pictures than another. Re
 are left out, and with them the test of recorded networks on renders.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -41,12 +41,17 @@ class PerceptionPlan:
     Attributes:
         protocol: The experiment.
         side_by_side: Networks on a GPU: three seeds of three arms.
-        found: Trials of an earlier call with the same pack, as in its figures.
+        found: Figures of an earlier call with the same pack, whose trials count.
     """
 
     protocol: Protocol
     side_by_side: int = 9
-    found: Sequence[dict[str, Any]] = ()
+    found: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Counts that were found before."""
+        return list(self.found.get("trials", ()))
 
 
 class _TimeIsOverError(Exception):
@@ -75,9 +80,14 @@ def train(
     about = unpack(pack, out / "sets")
     if about.get("samples") != _drawn_as(protocol):
         raise InputError(f"{pack} was made for other streets or samples; expected those of the protocol")
-    figures.put("pack", {"sha256": sha256(pack.read_bytes()).hexdigest(), "webp": about["quality"]})
+    said = {"sha256": sha256(pack.read_bytes()).hexdigest(), "webp": about["quality"]}
+    if plan.found.get("pack", said) != said:
+        raise InputError(
+            "--found is of another pack; expected figures of networks that saw the same pictures"
+        )
+    figures.put("pack", said)
     _make(places, plan, about["quality"], figures, limit)
-    there = {(row["arm"], row["seed"]) for row in plan.found}
+    there = {(row["arm"], row["seed"]) for row in plan.rows}
     every = [Trial(arm, seed, out, protocol) for seed in protocol.seeds for arm in protocol.arms]
     trials = [each for each in every if (each.arm, each.seed) not in there]
     _tell(figures, trials, plan)
@@ -138,7 +148,7 @@ def _train(
 
 def _tell(figures: Figures, trials: Iterable[Trial], plan: PerceptionPlan) -> int:
     """Put the counts that are there into the figures, with those of before; how many networks they are of."""
-    rows = [*plan.found, *(published(row) for each in trials if (row := load(each.result)) is not None)]
+    rows = [*plan.rows, *(published(row) for each in trials if (row := load(each.result)) is not None)]
     figures.put("trials", rows)
     figures.put("tables", tables(rows, plan.protocol).splitlines())
     return len(rows)
