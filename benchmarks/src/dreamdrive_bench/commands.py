@@ -48,6 +48,7 @@ COMMANDS = {
     "surfaces": "surfaces",
     "table1": "table1.main",
     "train_step": "splat.train_step",
+    "training": "training.main",
     "trust": "trust.main",
     "wild": "wild.main",
 }

@@ -3,7 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
@@ -113,8 +113,10 @@ def _words(file: Path) -> list[str]:
 
 
 @contextmanager
-def workers(count: int) -> Generator["ProcessPoolExecutor", None, None]:
-    """So many processes with a thread each.
+def workers(
+    count: int, prepare: Callable[[], None] | None = None
+) -> Generator["ProcessPoolExecutor", None, None]:
+    """So many processes with a thread each, which call ``prepare`` before their first job.
 
     They end at once where the work fails or is interrupted, or where this process is killed; what they write
     has to appear whole or not at all. Jobs that wait at the end are dropped.
@@ -124,7 +126,7 @@ def workers(count: int) -> Generator["ProcessPoolExecutor", None, None]:
 
     context = get_context("spawn")
     stopped = context.Event()
-    pool = ProcessPoolExecutor(count, context, _begin, (os.getpid(), stopped))
+    pool = ProcessPoolExecutor(count, context, _begin, (os.getpid(), stopped, prepare))
     try:
         yield pool
     except BaseException:
@@ -134,7 +136,7 @@ def workers(count: int) -> Generator["ProcessPoolExecutor", None, None]:
         pool.shutdown(cancel_futures=True)
 
 
-def _begin(parent: int, stopped: "Event") -> None:
+def _begin(parent: int, stopped: "Event", prepare: Callable[[], None] | None) -> None:
     """What a worker does first."""
     import cv2
 
@@ -142,6 +144,8 @@ def _begin(parent: int, stopped: "Event") -> None:
     # Ctrl-C reaches all processes of a terminal; the one that was started decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, args=(parent, stopped), daemon=True).start()
+    if prepare is not None:
+        prepare()
 
 
 def _watch(parent: int, stopped: "Event") -> None:

@@ -40,14 +40,14 @@ def main() -> int:
     args = parser.parse_args()
     protocol = read_protocol(args.protocol)
     places = Places(args.runs)
-    training, validation = (protocol.streets.seeds(split) for split in ("training", "validation"))
+    training, validation = protocol.used, protocol.streets.seeds("validation")
     tested = validation[: protocol.generated.validation_streets]
     if args.only in (None, "streets"):
         _each("street", [*training, *validation], lambda seed: make_street(seed, protocol, places))
     if args.only in (None, "scenes"):
         _each("scene", [*training, *tested], lambda seed: make_scene(seed, protocol, places))
     if args.only in (None, "sets"):
-        make_sets(protocol, places, QUICK)
+        make_sets(protocol, places, QUICK, protocol.sets)
     if args.picture:
         picture(args.picture, places, training[_SHOWN])
     if args.only not in (None, "networks"):

@@ -86,6 +86,20 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     realism: Realism
     seeds: list[int]
 
+    @property
+    def sets(self) -> list[str]:
+        """Names of all sets that are learned from or tested on."""
+        learned = [name for names in self.arms.values() for name in names]
+        return list(dict.fromkeys([*learned, "validation", self.realism.tested]))
+
+    @property
+    def used(self) -> range:
+        """Training streets that any of these sets is made of."""
+        training = self.streets.seeds("training")
+        return (
+            training if {"real-all", "generated-of-all"} & set(self.sets) else training[: self.real.streets]
+        )
+
     def regime_of(self, seed: int, network: CvtOptions, trunk: str) -> Regime:
         """How a network is trained."""
         r = self.regime

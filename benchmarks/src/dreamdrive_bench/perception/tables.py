@@ -25,8 +25,10 @@ def counts_of(rows: Sequence[Mapping[str, Any]], arm: str, tested: str, what: st
     )
 
 
-def _at_one_half(counts: Mapping[str, Sequence[float]]) -> list[float]:
-    """Counts at a probability of one half, at which published figures are."""
+def _at_one_half(counts: Mapping[str, Sequence[float]] | Sequence[float]) -> list[float]:
+    """Counts at a probability of one half, at which published figures are; these stay as they are."""
+    if not isinstance(counts, Mapping):
+        return list(counts)
     at = counts["thresholds"].index(0.5)
     return [counts[name][at] for name in ("hits", "false_alarms", "misses")]
 
@@ -82,7 +84,7 @@ def tables(rows: Sequence[Mapping[str, Any]], protocol: Protocol) -> str:
                 row.append("-")
         changed.append(row)
     text += "\n\n" + table(["points, with the 95 % interval over seeds and streets", *CLASSES], changed)
-    return text + "\n\n" + _realism(rows, protocol)
+    return text + "\n\n" + _realism(rows, protocol) if protocol.realism.trained in protocol.arms else text
 
 
 def _realism(rows: Sequence[Mapping[str, Any]], protocol: Protocol) -> str:

@@ -1,6 +1,6 @@
 """Trainings of the experiment and their tests, each kept once it is done."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from shutil import rmtree
@@ -17,7 +17,7 @@ from dreamdrive_bench.common.workers import Task, work_off
 from dreamdrive_bench.perception.protocol import Places, Protocol
 from dreamdrive_bench.perception.together import Held, Student, held, train_together
 
-_SIDE_BY_SIDE = 8
+SIDE_BY_SIDE = 8
 """Networks on a GPU: a step of one takes 6 ms then, 10 alone, and 8 of 25."""
 
 
@@ -88,15 +88,19 @@ class Trial:
 def train_and_test(trials: Sequence[Trial], workers: int, *, cuda: bool) -> list[str]:
     """Train and test; returns the names of those that failed."""
     if not cuda:
-        return [each.name for each in work_off(trials, _on_a_core, workers)]
-    device = torch.device("cuda")
-    samples = {each.arm: held(each.sets, each.regime, device) for each in {t.arm: t for t in trials}.values()}
-    for first in range(0, len(trials), _SIDE_BY_SIDE):
-        _train(trials[first : first + _SIDE_BY_SIDE], samples)
+        return [each.name for each in work_off(trials, train_on_core, workers)]
+    samples = held_by_arm(trials, torch.device("cuda"))
+    for first in range(0, len(trials), SIDE_BY_SIDE):
+        train_on_gpu(trials[first : first + SIDE_BY_SIDE], samples)
     return []
 
 
-def _on_a_core(task: Task) -> None:
+def held_by_arm(trials: Sequence[Trial], device: torch.device) -> dict[str, Held]:
+    """The samples of all arms on a device."""
+    return {each.arm: held(each.sets, each.regime, device) for each in {t.arm: t for t in trials}.values()}
+
+
+def train_on_core(task: Task) -> None:
     """Train and test one; it goes on where it was stopped."""
     assert isinstance(task, Trial)
     student = Student(held(task.sets, task.regime, CPU), task.regime)
@@ -110,12 +114,25 @@ def _on_a_core(task: Task) -> None:
     rmtree(kept, ignore_errors=True)
 
 
-def _train(trials: Sequence[Trial], samples: Mapping[str, Held]) -> None:
-    """Train networks together on samples of their arms, and keep the counts of each."""
+def train_on_gpu(
+    trials: Sequence[Trial],
+    samples: Mapping[str, Held],
+    said: Callable[[int, int], None] | None = None,
+) -> None:
+    """Train networks together on samples of their arms, and keep the counts of each.
+
+    Args:
+        trials: At most ``SIDE_BY_SIDE``, of one protocol.
+        samples: By arms.
+        said: Told of steps done and all steps; without it they are printed.
+    """
     students = [Student(samples[each.arm], each.regime) for each in trials]
-    names = ", ".join(each.name for each in trials)
+    names, steps = ", ".join(each.name for each in trials), trials[0].protocol.regime.steps
     for done in train_together(students):
-        print(f"{names}: {done} of {trials[0].protocol.regime.steps} steps", flush=True)
+        if said is None:
+            print(f"{names}: {done} of {steps} steps", flush=True)
+        else:
+            said(done, steps)
     for trial, student in zip(trials, students, strict=True):
         save(trial.result, trial.key, _counts(trial, student.network))
 

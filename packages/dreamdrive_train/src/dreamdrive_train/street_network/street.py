@@ -15,6 +15,7 @@ from dreamdrive.street_network.encoder import read_encoder
 from dreamdrive.street_network.network import StreetNetwork
 from dreamdrive.street_network.weights import Training, read_network, write_network
 from dreamdrive_train.street_network.data.mixture import Entry, Mixture, read_entries, split
+from dreamdrive_train.street_network.judge import judge
 from dreamdrive_train.street_network.loop import train
 from dreamdrive_train.street_network.options import TrainingOptions
 
@@ -84,6 +85,14 @@ def train_street(
         stop=stop,
         progress=progress,
     )
+
+
+def judge_weights(
+    path: Path, data: tuple[Path, ...], validate: tuple[Path, ...], device: torch.device
+) -> dict[str, float]:
+    """Figures of a file of weights on what folders of records keep out, as a training is judged."""
+    _, kept_out = split(read_entries(data), read_entries(validate))
+    return judge(read_network(path)[0].to(device), kept_out)
 
 
 def _records(training: StreetTraining) -> tuple[list[Entry], list[Entry]]:

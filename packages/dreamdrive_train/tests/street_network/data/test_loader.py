@@ -36,8 +36,8 @@ def test_a_batch_follows_from_seed_and_step(mixture: Mixture) -> None:
     assert not same(loader.batch(5), Loader(mixture, SMALL, 4).batch(5))
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_threads_give_the_same_batches_in_order(mixture: Mixture, workers: int) -> None:
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_thread_and_processes_give_the_same_batches_in_order(mixture: Mixture, workers: int) -> None:
     loader = Loader(mixture, replace(SMALL, workers=workers), 0)
     made = list(loader.batches(2, 5))
     assert len(made) == 5

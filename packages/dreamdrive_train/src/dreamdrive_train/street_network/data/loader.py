@@ -1,12 +1,16 @@
 """Batches of changed pictures; which ones and how follows from the seed and the number of the step alone."""
 
 from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 
 import numpy as np
+import torch
 
+from dreamdrive.compute.machine import workers
 from dreamdrive_train.street_network.data.colours import ColourOptions, exchanged, recoloured
 from dreamdrive_train.street_network.data.mixture import Entry, Mixture
 from dreamdrive_train.street_network.data.picture import (
@@ -61,7 +65,7 @@ class LoaderOptions:
     """Sides of erased boxes in shares of the picture's."""
     colour: ColourOptions = field(default_factory=ColourOptions)
     workers: int = 1
-    """Threads that prepare batches; one keeps up with two cores that learn."""
+    """That prepare batches: one is a thread, which keeps up with two cores that learn; more are processes."""
 
 
 @dataclass(frozen=True)
@@ -73,20 +77,30 @@ class Loader:
     seed: int
 
     def batches(self, first: int, count: int) -> Iterator[Batch]:
-        """Batches of steps from the first, made ahead by threads."""
+        """Batches of steps from the first, made ahead."""
         ahead = 2 * self.options.workers
-        waiting: deque[Future[Batch]] = deque()
-        with ThreadPoolExecutor(self.options.workers) as pool:
+        waiting: deque[Future[_Arrays]] = deque()
+        with self._pool() as (pool, make):
             try:
                 for step in range(first, first + count):
-                    waiting.append(pool.submit(self.batch, step))
+                    waiting.append(pool.submit(make, step))
                     if len(waiting) > ahead:
-                        yield waiting.popleft().result()
+                        yield _batch(waiting.popleft().result())
                 while waiting:
-                    yield waiting.popleft().result()
+                    yield _batch(waiting.popleft().result())
             finally:
                 for each in waiting:
                     each.cancel()
+
+    @contextmanager
+    def _pool(self) -> Generator[tuple[Executor, "Callable[[int], _Arrays]"], None, None]:
+        """Who makes batches, and how it makes that of a step; processes are given the records once."""
+        if self.options.workers > 1:
+            with workers(self.options.workers, partial(_keep, self)) as pool:
+                yield pool, _of_kept
+        else:
+            with ThreadPoolExecutor(1) as pool:
+                yield pool, partial(_arrays, self)
 
     def batch(self, step: int) -> Batch:
         """The batch of one step."""
@@ -106,6 +120,29 @@ class Loader:
             rgb = recoloured(rgb, generator, options.colour)
             changed.append(_erased(replace(picture, rgb=rgb), generator, options))
         return batch_of(changed, taught, clean)
+
+
+_Arrays = dict[str, np.ndarray]
+"""A batch as it goes from one process to another: tensors would take an open file each."""
+_kept: list[Loader] = []
+"""The loader of a process that prepares batches."""
+
+
+def _keep(loader: Loader) -> None:
+    _kept[:] = [loader]
+
+
+def _of_kept(step: int) -> _Arrays:
+    return _arrays(_kept[0], step)
+
+
+def _arrays(loader: Loader, step: int) -> _Arrays:
+    batch = loader.batch(step)
+    return {each.name: getattr(batch, each.name).numpy() for each in fields(batch)}
+
+
+def _batch(arrays: _Arrays) -> Batch:
+    return Batch(**{name: torch.from_numpy(each) for name, each in arrays.items()})
 
 
 def placed_anew(
