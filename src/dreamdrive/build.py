@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float16
 
+from dreamdrive.complete import completed
 from dreamdrive.decompose import (
     Actors,
     Grouping,
@@ -131,9 +132,12 @@ def build_scene(
     parts, scores = decompose(seen, geometry, seeds, static, o, seed=seed, given=given, run=run)
     scene = run(
         "fit",
-        [o.representation, o.fit, o.cast, o.drift, o.trial, o.motion, o.densify, o.device, given.tracks],
+        [
+            *(o.representation, o.fit, o.cast, o.drift, o.trial, o.motion, o.densify, o.completion),
+            *(o.device, given.tracks),
+        ],
         lambda work: _completed(
-            seen, _fitted(seen, geometry, parts, static, o, seeded["fit"], work, device), device
+            seen, geometry, _fitted(seen, geometry, parts, static, o, seeded["fit"], work, device), o
         ),
         check=partial(check.scene, seen),
     )
@@ -161,12 +165,16 @@ def _fitted(
     return replace(scene, camera=clip.camera if len(clip.rig) > 1 else None, **recorded)
 
 
-def _completed(clip: Clip, scene: Scene, device: torch.device) -> Scene:
-    """The scene with how far it is off its frames, and what the prior knows to stand where none looks."""
-    compared = replace(scene, residual=_residual(clip, scene.on(device)))
-    if clip.known.unseen is None or scene.moves_per_frame or not len(scene.static):
-        return compared
-    return compared.with_standing(clip.known.unseen)
+def _completed(clip: Clip, geometry: Geometry, scene: Scene, options: Options) -> Scene:
+    """The scene with what stands where no frame looks, and with how far it is off its frames.
+
+    What the prior knows of stands there, and a guess from around.
+    """
+    device = torch.device(options.device)
+    if clip.known.unseen is not None and not scene.moves_per_frame and len(scene.static):
+        scene = scene.with_standing(clip.known.unseen)
+    made = completed(scene, geometry, options.completion, device)
+    return replace(made, residual=_residual(clip, made.on(device)))
 
 
 def _residual(clip: Clip, scene: Scene) -> Float16[np.ndarray, "f bh bw"]:

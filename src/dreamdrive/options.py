@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from math import ceil
 
+from dreamdrive.complete import CompletionOptions
 from dreamdrive.decompose import ActorOptions, GroupOptions, PerFrameOptions, ScoreOptions
 from dreamdrive.errors import InputError
 from dreamdrive.fit import DensifySettings, FitOptions, SeedOptions, TrialOptions
@@ -31,6 +32,7 @@ class Options:
         drift: The street, where no path of the camera explains the frames.
         trial: The small fit by which frames judge.
         densify: Growing and pruning in the joint fit.
+        completion: What is put where no frame saw anything.
         network: Size of the deformation field; its width is that of every representation.
         representation: ``"hybrid"``, or one of its baselines.
         device: Where networks and both fits are computed.
@@ -49,6 +51,7 @@ class Options:
     drift: PerFrameOptions = field(default_factory=PerFrameOptions)
     trial: TrialOptions = field(default_factory=TrialOptions)
     densify: DensifySettings = field(default_factory=DensifySettings)
+    completion: CompletionOptions = field(default_factory=CompletionOptions)
     network: DeformationConfig = field(default_factory=DeformationConfig)
     representation: RepresentationName = "hybrid"
     device: DeviceName = "cpu"
@@ -130,6 +133,7 @@ def with_method(options: Options, method: MethodName) -> Options:
         drift=replace(options.drift, allowed=False),
         static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
         fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0, stray_weight=0.0),
+        completion=replace(options.completion, aside_m=0.0),
         network=replace(options.network, depth=8, width=256),
     )
 

@@ -1,11 +1,12 @@
 """``dreamdrive render``: new drives through a scene as videos, pictures or arrays."""
 
 import time
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from dreamdrive.cli.scene import blurring, less, open_scene
 from dreamdrive.cli.terminal.arguments import DeviceFlag, parse_size
@@ -19,6 +20,26 @@ from dreamdrive.names import Format, Show
 from dreamdrive.scene.control import check_numbers, check_render_size
 
 
+@dataclass(frozen=True)
+class ShownFlags:
+    """What is shown.
+
+    Attributes:
+        show: Everything, its depth, what moves or what stands alone, or how far it can be believed: red is
+            not to be.
+        completion: Whether guesses are shown where no frame saw anything.
+        size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
+        without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
+        blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
+    """
+
+    show: Show = "colour"
+    completion: bool = True
+    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None
+    without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = ()
+    blur: bool = False
+
+
 def render(
     out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
@@ -26,12 +47,9 @@ def render(
         UseAppendAction[tuple[str, ...]], arg(metavar="NAME|FILE", help_behavior_hint="(required)")
     ],
     shift_m: Annotated[float, arg(metavar="M")] = 2.0,
-    show: Show = "colour",
+    shown: OmitArgPrefixes[ShownFlags] = ShownFlags(),
     format: Format = "mp4",
-    size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None,
     fps: Annotated[float | None, arg(metavar="F", help_behavior_hint="")] = None,
-    without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = (),
-    blur: bool = False,
     stay_within_trust: bool = False,
     device: DeviceFlag = "cpu",
     output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE.mp4|DIR", help_behavior_hint="")] = None,
@@ -43,13 +61,9 @@ def render(
         trajectory: forward, left, right, stop, lane-left, lane-right, shift, or a file with a trajectory. It
             may be given several times.
         shift_m: How far shift goes to the right in metres; negative is to the left.
-        show: Everything, its depth, what moves or what stands alone, or how far it can be believed: red is
-            not to be.
+        shown: What is shown.
         format: A video, or a folder with a picture or with exact arrays a frame.
-        size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         fps: Frames a second; without it a file's own, and for the others 20 at least.
-        without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
-        blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
         stay_within_trust: Bend drives towards the recorded one where less than 22 dB is to be expected.
         device: Where pictures are drawn; cuda takes an NVIDIA GPU and gsplat (docs/gpu.md). Trust is told on
             the CPU.
@@ -57,11 +71,11 @@ def render(
     """
     if not trajectory:
         raise InputError("render needs a drive: give --trajectory NAME|FILE, such as --trajectory shift")
-    wanted = None if size is None else parse_size(size)
+    wanted = None if shown.size is None else parse_size(shown.size)
     if wanted is not None:
         check_render_size(wanted, video=format == "mp4")
     check_numbers(shift_m, fps)
-    if blur and (format == "npz" or show == "depth"):
+    if shown.blur and (format == "npz" or shown.show == "depth"):
         raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
     check_there(out, SCENE)
     use_all_cores()
@@ -71,10 +85,11 @@ def render(
     from dreamdrive.splat import why_unusable
 
     with computing_on(device, why_unusable) as where:
-        options = RenderOptions(show, format, wanted, fps, blurring() if blur else None)
-        scene = less(open_scene(out), without)
+        options = RenderOptions(shown.show, format, wanted, fps, blurring() if shown.blur else None)
+        whole = open_scene(out)
+        scene = less(whole if shown.completion else whole.without_filled(), shown.without)
         drives = drives_of(scene, trajectory, shift_m, fps)
-        trust = trust_of(scene, drives, needed=show == "trust" or stay_within_trust)
+        trust = trust_of(scene, drives, needed=shown.show == "trust" or stay_within_trust)
         if stay_within_trust and trust is not None:
             drives = [bent(drive, trust) for drive in drives]
         if format == "mp4":

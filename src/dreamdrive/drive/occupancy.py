@@ -98,7 +98,7 @@ def obstacles_of(
             "the street of this scene is one of single frames: it has no place in which anything could be hit"
         )
     level = level_from_world(scene)
-    standing = _taken(scene.static_at(0.0), level, options)
+    standing = _taken(scene.without_filled().static_at(0.0), level, options)
     moving = tuple(
         _taken(scene.dynamic_at(t_s) if now_s is None else _carried_on(scene, now_s, t_s), level, options)
         for t_s in times_s

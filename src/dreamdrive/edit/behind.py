@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from dreamdrive.complete import surface
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.edit.doubles import without_doubles
 from dreamdrive.edit.shadow import (
@@ -23,7 +24,7 @@ from dreamdrive.edit.shadow import (
 )
 from dreamdrive.scene.actor import Actor
 from dreamdrive.scene.camera import Camera
-from dreamdrive.scene.gaussians import SH_C0, Gaussians
+from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import SceneView, moment_of, render_scene, shares
 
@@ -191,7 +192,7 @@ def _fill(before: Scene, after: Scene, view: int) -> Gaussians | None:
     z_m = _across(depth_m, (mask == 0) & (depth_m > 0) & (alpha > HOLE_ALPHA), hole)
     rows, columns = np.nonzero(hole & np.isfinite(z_m))
     pixels = np.column_stack([columns + 0.5, rows + 0.5, z_m[rows, columns]])
-    return _surface(camera, pixels, picture[rows, columns] / 255.0, view) if len(rows) else None
+    return surface(camera, pixels, picture[rows, columns] / 255.0, view) if len(rows) else None
 
 
 def _across(
@@ -206,20 +207,3 @@ def _across(
         there, wanted = np.flatnonzero(known[row]), np.flatnonzero(hole[row])
         filled[row, wanted] = 1 / np.interp(wanted, there, 1 / depth_m[row, there])
     return filled
-
-
-def _surface(
-    camera: Camera, pixels: Float[np.ndarray, "n 3"], colours: Float[np.ndarray, "n 3"], view: int
-) -> Gaussians:
-    """A Gaussian for each pixel (column, row, depth), as large as it, facing the camera."""
-    count = len(pixels)
-    size_m = torch.from_numpy(0.6 * pixels[:, 2] / camera.fx_px).float()
-    return Gaussians(
-        means=torch.from_numpy(camera.lift(pixels)).float(),
-        quaternions=torch.tensor([[1.0, 0, 0, 0]]).repeat(count, 1),
-        log_scales=size_m.clamp(min=1e-4).log()[:, None].repeat(1, 3),
-        logit_opacities=torch.full((count,), 3.0),
-        sh=((torch.from_numpy(colours).float() - 0.5) / SH_C0)[:, None],
-        source_frame=torch.full((count,), view, dtype=torch.int64),
-        filled=torch.ones(count, dtype=torch.bool),
-    )

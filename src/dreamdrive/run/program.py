@@ -31,7 +31,13 @@ _OWN: dict[str, tuple[str, ...]] = {
     "score": ("dreamdrive.decompose.errors", "dreamdrive.decompose.score"),
     "group": ("dreamdrive.decompose.group",),
     "fit": (
-        *("dreamdrive.fit", "dreamdrive.decompose", "dreamdrive.motion", "dreamdrive.stored"),
+        *(
+            "dreamdrive.complete",
+            "dreamdrive.fit",
+            "dreamdrive.decompose",
+            "dreamdrive.motion",
+            "dreamdrive.stored",
+        ),
         *("dreamdrive.splat.scene_view", "dreamdrive.vision.residual"),
     ),
 }

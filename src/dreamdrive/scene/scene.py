@@ -267,6 +267,11 @@ class Scene:
         """The scene with more of what never moves; the fewer coefficients of colour are filled with zeros."""
         return replace(self, static=self.static.and_more(more))
 
+    def without_filled(self) -> "Scene":
+        """The scene without what was put where no frame saw anything."""
+        filled = self.static.filled
+        return self if filled is None else replace(self, static=self.static.select(~filled))
+
     def inserted(self, actor: Actor, gaussians: Gaussians, motion: SceneMotion) -> "Scene":
         """The scene with an actor more, the last of its actors, and what moves all of them.
 

@@ -1,0 +1,134 @@
+"""A street between two walls, of which pictures show what lies ahead: views aside see no end of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from dreamdrive.complete import CompletionOptions, completed
+from dreamdrive.complete.borders import beyond_borders
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.geometry import Focal, Geometry, Ground, Scale
+from dreamdrive.scene.scene import Provenance, Scene
+from dreamdrive.splat import render_scene
+
+WALL_M, HEIGHT_M, SPACING_M = 6.0, 1.5, 0.2
+SIZE = (80, 48)
+
+
+def balls(places: np.ndarray, colours: np.ndarray) -> Gaussians:
+    count = len(places)
+    return Gaussians(
+        means=torch.from_numpy(places).float(),
+        quaternions=torch.tensor([[1.0, 0, 0, 0]]).repeat(count, 1),
+        log_scales=torch.full((count, 3), float(np.log(0.6 * SPACING_M))),
+        logit_opacities=torch.full((count,), 4.0),
+        sh=torch.from_numpy((colours - 0.5) / 0.28209).float()[:, None],
+        source_frame=torch.zeros(count, dtype=torch.int64),
+    )
+
+
+@pytest.fixture(scope="module")
+def street() -> tuple[Scene, Geometry]:
+    """What one of four frames sees of a road, of walls on both sides, 3 m high, and of one at its end."""
+    cameras = tuple(Camera(60.0, 60.0, 40.0, 24.0, *SIZE).moved(ahead_m=0.5 * k) for k in range(4))
+    along, across, up = (np.arange(low, high, SPACING_M) for low, high in ((-4, 30), (-6, 6), (-1.5, 1.5)))
+    walls = [np.stack(np.meshgrid([x], up, along), -1).reshape(-1, 3) for x in (-WALL_M, WALL_M)]
+    road = np.stack(np.meshgrid(across, [HEIGHT_M], along), -1).reshape(-1, 3)
+    end = np.stack(np.meshgrid(across, up, [30.0]), -1).reshape(-1, 3)
+    places = np.concatenate([*walls, road, end])
+    colours = np.repeat([[0.8, 0.3, 0.3], [0.3, 0.3, 0.8], [0.4, 0.4, 0.4], [0.8, 0.8, 0.2]],
+                        [len(walls[0]), len(walls[1]), len(road), len(end)], axis=0)  # fmt: skip
+    seen = np.any([each.shows(each.project(places)) for each in cameras], axis=0)
+    scene = Scene(
+        static=balls(places[seen], colours[seen]),
+        dynamic=balls(places[:0], colours[:0]),
+        deformation=None,
+        actors=(),
+        sky=None,
+        exposure=None,
+        cameras=cameras,
+        times_s=0.1 * np.arange(4),
+        held_out=np.zeros(4, bool),
+        provenance=Provenance(up=(0.0, -1.0, 0.0)),
+    )
+    blank = np.zeros((4, *SIZE[::-1]), np.float32)
+    geometry = Geometry(
+        cameras=cameras,
+        depth_m=blank,
+        confidence=blank,
+        sky=np.stack([_sky(scene, k) for k in range(4)]),
+        moving=blank,
+        fixed_regions=blank[:1].astype(np.int64),
+        region_names=(),
+        scale=Scale("poses", 0.0),
+        focal=Focal(60.0, True),
+        ground=Ground(np.array([0.0, -1.0, 0.0]), HEIGHT_M),
+    )
+    return scene, geometry
+
+
+def _sky(scene: Scene, view: int) -> np.ndarray:
+    seen = render_scene(scene, scene.cameras[view], 0.0)
+    return (seen.alpha < 0.5).numpy()
+
+
+def test_walls_go_on_beyond_the_border(street: tuple[Scene, Geometry]) -> None:
+    scene, geometry = street
+    made = beyond_borders(scene, geometry, [0], 9.0)
+    added = made.static.select(made.static.filled)
+    assert 100 < len(added) < len(scene.static)
+    places = added.means.double().numpy()
+    walls = np.abs(np.abs(places[:, 0]) - WALL_M) < 1e-4
+    road = np.abs(places[:, 1] - HEIGHT_M) < 1e-4
+    assert (walls | road).all()
+    assert walls.sum() > 50
+    assert road.sum() > 50
+    right = added.sh[torch.from_numpy(walls & (places[:, 0] > 0)), 0]
+    assert (right[:, 2] > right[:, 0]).all()  # the colour of their own wall
+    for camera in scene.cameras:
+        assert not camera.shows(camera.project(places)).any()
+
+
+@pytest.mark.parametrize("aside_m", [-2.0, 2.0])
+def test_views_aside_have_no_hole(street: tuple[Scene, Geometry], aside_m: float) -> None:
+    scene, geometry = street
+    made = completed(scene, geometry, CompletionOptions())
+    there = scene.cameras[0].moved(aside_m)
+    before, after = (render_scene(each, there, 0.0).alpha.numpy() for each in (scene, made))
+    below = slice(SIZE[1] // 2, None)  # the horizon
+    assert (before[below] < 0.5).sum() > 50
+    assert (after[below] > 0.5).all()
+
+
+def test_what_was_recorded_stays(street: tuple[Scene, Geometry]) -> None:
+    scene, geometry = street
+    made = completed(scene, geometry, CompletionOptions())
+    for camera in scene.cameras:
+        was, now = (render_scene(each, camera, 0.0).colour.numpy() for each in (scene, made))
+        changed = np.abs(was - now).max(axis=2) > 0.05
+        assert not changed[:, 4:-4].any()
+    assert len(made.without_filled().static) == len(scene.static)
+
+
+def test_nothing_made_up_stands_in_the_way(street: tuple[Scene, Geometry]) -> None:
+    scene, geometry = street
+    near = replace(scene, static=balls(np.array([[2.5, 0.0, 4.0]]), np.array([[1.0, 0, 0]])))
+    assert len(beyond_borders(near, geometry, [0], 9.0).static) == 1
+
+
+def test_road_users_are_not_cut_twice(street: tuple[Scene, Geometry]) -> None:
+    scene, geometry = street
+    users = replace(geometry, road_users=np.ones(geometry.sky.shape, np.uint16))
+    assert len(beyond_borders(scene, users, [0], 9.0).static) == len(scene.static)
+
+
+def test_nothing_is_completed_where_that_is_not_asked_or_nothing_stands(
+    street: tuple[Scene, Geometry],
+) -> None:
+    scene, geometry = street
+    assert completed(scene, geometry, CompletionOptions(aside_m=0.0)) is scene
+    empty = replace(scene, static=scene.static.select(torch.zeros(0, dtype=torch.int64)))
+    assert completed(empty, geometry, CompletionOptions()) is empty
