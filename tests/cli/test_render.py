@@ -2,11 +2,13 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+import torch
 
 from dreamdrive.stored import save_scene
 from tests.cli.conftest import Run
@@ -133,6 +135,24 @@ def test_a_moving_thing_is_left_out(run: Run, out: Path) -> None:
         assert any(not np.array_equal(whole[key], less[key]) for key in whole.files)
     result = run(*wanted, "--without", "7", "-o", out.parent / "none")
     assert (result.code, "--without: no actor 7; there are 0" in result.err) == (2, True), result
+
+
+def test_guesses_are_left_out(run: Run, tmp_path: Path) -> None:
+    scene = driving(make_scene())
+    guesses = replace(scene.static.without_features(), filled=torch.ones(len(scene.static), dtype=torch.bool))
+    save_scene(scene.with_standing(guesses), tmp_path / "more" / "scene")
+    save_scene(scene, tmp_path / "out" / "scene")
+    wanted = ("--trajectory", "stop", "--fps", "5", "--show", "static", "--format", "npz")
+    for name, words in {"more": (), "same": ("--no-completion",), "out": ()}.items():
+        source = tmp_path / ("more" if name == "same" else name)
+        assert run("render", source, *wanted, *words, "-o", tmp_path / f"{name}-views").code == 0
+    file = next(each for each in names(tmp_path / "out-views") if each.endswith(".npz"))
+    alpha = {}
+    for name in ("more", "same", "out"):
+        with np.load(tmp_path / f"{name}-views" / file) as view:
+            alpha[name] = view["alpha"]
+    assert np.array_equal(alpha["same"], alpha["out"])
+    assert alpha["more"].mean() > alpha["out"].mean()
 
 
 def test_pictures_of_colours_are_blurred(

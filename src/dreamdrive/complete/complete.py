@@ -1,6 +1,6 @@
 """A scene made complete on both sides of its path."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -26,7 +26,7 @@ class CompletionOptions:
 
     aside_m: float = 3.0
     step_m: float = 1.0
-    views: int = 6
+    views: int = 5
     ahead_m: float = 9.0
 
 
@@ -42,10 +42,13 @@ def completed(
     if not options.aside_m or not len(scene.static) or scene.moves_per_frame:
         return scene
     chosen = _chosen(scene, options.views)
-    made = beyond_borders(scene, geometry, chosen, options.ahead_m)
+    bare = replace(scene, static=scene.static.without_features())  # or each addition would copy them
+    made = beyond_borders(bare, geometry, chosen, options.ahead_m)
     count = round(options.aside_m / options.step_m)
     shifts_m = [side * options.step_m * k for k in range(1, count + 1) for side in (1, -1)]
-    return without_holes(made, geometry, chosen, shifts_m, device)
+    made = without_holes(made, geometry, chosen, shifts_m, device)
+    added = torch.arange(len(scene.static), len(made.static))
+    return scene.with_standing(made.static.select(added)) if len(added) else scene
 
 
 def _chosen(scene: Scene, count: int) -> list[int]:

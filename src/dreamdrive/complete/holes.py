@@ -83,18 +83,20 @@ def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gau
     z_m, beside = _behind(depth_m, known, hole)
     if geometry.ground is not None:
         z_m = np.minimum(z_m, geometry.ground.depth_m(camera))
-    lattice = np.zeros_like(hole)
-    lattice[::_SPACING_PX, ::_SPACING_PX] = True
-    rows, columns = np.nonzero(hole & lattice & np.isfinite(z_m))
+    rows, columns = np.nonzero(hole & np.isfinite(z_m))
     if not len(rows):
         return None
-    picture = cv2.inpaint(seen.picture, wide.astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
     mirrored = 2 * beside[rows, columns] - columns
     inside = mirrored.clip(0, hole.shape[1] - 1)
     there = (mirrored == inside) & known[rows, inside] & (depth_m[rows, inside] > _SAME * z_m[rows, columns])
-    colours = picture[rows, np.where(there, inside, columns)] / 255.0
+    picture = seen.picture
+    picture[rows[there], columns[there]] = picture[rows[there], inside[there]]
+    wide[rows[there], columns[there]] = False
+    picture = cv2.inpaint(picture, wide.astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
+    some = (rows % _SPACING_PX == 0) & (columns % _SPACING_PX == 0)
+    rows, columns = rows[some], columns[some]
     pixels = np.column_stack([columns + 0.5, rows + 0.5, z_m[rows, columns]])
-    return surface(camera, pixels, colours, view, _SPACING_PX)
+    return surface(camera, pixels, picture[rows, columns] / 255.0, view, _SPACING_PX)
 
 
 def _behind(
