@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         C2 as C2,
         SIGMA_PX as SIGMA_PX,
         WINDOW as WINDOW,
+        blurred as blurred,
         mean_ssim as mean_ssim,
         ssim as ssim,
         ssim_map as ssim_map,

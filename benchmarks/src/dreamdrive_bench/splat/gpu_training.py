@@ -16,8 +16,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import l1_loss
 
-from dreamdrive.splat import C1, C2, NEAR_M, rasterize
-from dreamdrive.splat.ssim import blurred
+from dreamdrive.splat import C1, C2, NEAR_M, blurred, rasterize
 
 Step = Callable[[int], Tensor]
 
