@@ -115,7 +115,7 @@ def test_where_all_seeds_score_as_moving_the_road_stays_or_all_of_it_goes(nothin
     # Of the road only what the outline of an upright thing surrounds goes with it, see ``on_road``.
     assert labels.dynamic[low].float().mean() == pytest.approx(0 if clusters == "flow" else 1, abs=0.01)
     scene = build_scene(clip, TINY, given=Given(geometry=geometry, labels=labels)).scene
-    assert len(scene.static) == int((~labels.dynamic).sum())
+    assert len(scene.without_filled().static) == int((~labels.dynamic).sum())
     assert_sane(scene)
 
 
