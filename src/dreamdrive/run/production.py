@@ -107,8 +107,8 @@ class Production(Stages):
         """What the panel of the dynamic scores shows, where the representation has them."""
         if built.scores is None:
             return None
-        gaussians, scores = (each.to(chosen_device()) for each in (built.static.gaussians, built.scores))
-        return Scored(gaussians, scores, self.request.options.group.threshold)
+        gaussians, device = built.static.gaussians, chosen_device()
+        return Scored(gaussians.to(device), built.scores.to(device), self.request.options.group.threshold)
 
     def _recorded(self, clip: Clip, scene: Scene) -> UInt8[np.ndarray, "f h w 3"]:
         """The frames in the source's distortion, at the clip's size."""

@@ -83,8 +83,8 @@ def _onto(
     relative = source.camera_from_world @ reference.world_from_camera
     there = np.linalg.inv(_CENTRES) @ source.matrix
     matrix = there @ relative[:3, :3] @ np.linalg.inv(reference.matrix) @ _CENTRES
-    to = {"dtype": grey.dtype, "device": grey.device}
-    return _Onto(torch.tensor(matrix, **to), torch.tensor(there @ relative[:3, 3], **to), grey, usable)
+    place = torch.from_numpy(np.column_stack([matrix, there @ relative[:3, 3]])).to(grey)
+    return _Onto(place[:, :3], place[:, 3], grey, usable)
 
 
 def _similarity(

@@ -6,9 +6,9 @@ what one frame needs.
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import torch
-from diffusers.models.attention_processor import Attention
 from diffusers.models.autoencoders.autoencoder_kl_temporal_decoder import TemporalDecoder
 from diffusers.models.resnet import SpatioTemporalResBlock
 from jaxtyping import Float
@@ -38,13 +38,14 @@ def decode_by_frames(
     return made[0].transpose(0, 1)
 
 
-def _layers(decoder: TemporalDecoder) -> Iterator[Attention | SpatioTemporalResBlock | nn.Module]:
+def _layers(decoder: TemporalDecoder) -> Iterator[Any]:
     """All between the first convolution and the last, in their order."""
-    middle = decoder.mid_block
+    middle: Any = decoder.mid_block
+    levels: Any = decoder.up_blocks
     yield middle.resnets[0]
     for attention, block in zip(middle.attentions, middle.resnets[1:], strict=False):
         yield from (attention, block)
-    for level in decoder.up_blocks:
+    for level in levels:
         yield from level.resnets
         yield from level.upsamplers or ()
 
