@@ -4,10 +4,12 @@ import gc
 import weakref
 from pathlib import Path
 
+import pytest
 import torch
 
 from dreamdrive.prior.vista.engine import Engine, RoundConditions
 from dreamdrive.prior.vista.kinds import VISTA
+from dreamdrive.prior.vista.memory import Job
 from dreamdrive.prior.vista.stored import open_weights
 
 
@@ -29,3 +31,12 @@ def test_a_network_leaves_when_the_next_one_comes(vista_dir: Path) -> None:
         assert held[1]() is None
     finally:
         gc.enable()
+
+
+def test_what_a_run_will_take_is_told_before(vista_dir: Path, caplog: pytest.LogCaptureFixture) -> None:
+    engine = Engine(open_weights(vista_dir, VISTA), torch.device("cpu"))
+    engine.check_fit(Job((64, 64), 6, 6))
+    assert [record.getMessage() for record in caplog.records] == [
+        "Vista at 64x64 takes image encoder 0.0 GB, encoder 0.0 GB, UNet 0.0 GB, decoder 0.0 GB, "
+        "decoded frames 0.0 GB, one after the other"
+    ]

@@ -1,5 +1,6 @@
 """The stored networks, ready for sampling, decoding and features. Importing this loads diffusers."""
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from dreamdrive.prior.vista.networks import make_empty
 from dreamdrive.prior.vista.sampler import Branches, Velocity
 from dreamdrive.prior.vista.stored import StoredModel
 
+_log = logging.getLogger("dreamdrive")
 Images = Float[Tensor, "n 3 h w"]
 """Frames in [-1, 1]."""
 
@@ -51,9 +53,11 @@ class Engine:
         return int(self.stored.parts["unet"].config.get("num_frames", 25))
 
     def check_fit(self, job: Job) -> None:
-        """Whether there is memory for a job, before anything is loaded."""
+        """Tell what memory a job will take, before anything is loaded; refuse one that does not fit."""
         free = Free(free_bytes(self.device), free_bytes() if self._half else None, shared=not self._half)
-        check_memory(self.stored, job, free, half=self._half)
+        plan = check_memory(self.stored, job, free, half=self._half)
+        # A warning, since less is not shown and it may be all of what the machine has.
+        _log.warning("%s at %dx%d takes %s, one after the other", self.stored.kind.title, *job.size, plan)
 
     def network(self, part: Part) -> Any:
         """A network, loaded unless it is held."""

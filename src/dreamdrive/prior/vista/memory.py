@@ -89,11 +89,17 @@ def plan_memory(stored: StoredModel, job: Job, *, half: bool) -> MemoryUse:
     return MemoryUse({step: steps[step] for step in job.steps}, frames)
 
 
-def check_memory(stored: StoredModel, job: Job, free: Free, *, half: bool) -> None:
-    """Refuse a run that does not fit, naming a size that does; with ``half`` the UNet computes in float16."""
+def check_memory(stored: StoredModel, job: Job, free: Free, *, half: bool) -> MemoryUse:
+    """What a run will take; one that does not fit is refused, naming a size that does.
+
+    With ``half`` the UNet computes in float16.
+
+    Raises:
+        InputError: It does not fit.
+    """
     plan = plan_memory(stored, job, half=half)
     if plan.fits(free):
-        return
+        return plan
     found = next(
         (
             size
