@@ -36,7 +36,8 @@ def without_holes(
     is at the same pixel there. Depth is that of the farther side in each row, for what is nearer ends there,
     and the road at most. That side goes on as its mirror image, else colours are inpainted (Telea 2004).
     """
-    seen = [_Recorded.of(scene.on(device), view) for view in np.flatnonzero(~scene.held_out).tolist()]
+    there = scene.on(device)
+    seen = [_Recorded.of(there, view) for view in np.flatnonzero(~scene.held_out).tolist()]
     for view in reversed(views):
         for shift_m in shifts_m:
             camera = scene.cameras[view].moved(shift_m)
