@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         save_checkpoint as save_checkpoint,
     )
     from dreamdrive.models.efficientnet import LITE0_STAGES as LITE0_STAGES
+    from dreamdrive.models.half_unet import HalfUNet as HalfUNet
     from dreamdrive.models.weights import (
         as_state as as_state,
         check_sizes as check_sizes,

@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from dreamdrive.registry import offer
 
 if TYPE_CHECKING:
-    from dreamdrive.trust.evidence import seen_with as seen_with
+    from dreamdrive.trust.evidence import (
+        GaussianEvidence as GaussianEvidence,
+        evidence_of as evidence_of,
+        rows_at as rows_at,
+        seen_with as seen_with,
+    )
     from dreamdrive.trust.network import (
         CALIBRATED as CALIBRATED,
         MOST as MOST,

@@ -66,7 +66,7 @@ def evidence_of(scene: Scene, squared_error: Float[np.ndarray, "f bh bw"]) -> Ga
     for k, view in enumerate(views):
         camera, t_s = scene.cameras[view], float(scene.times_s[view])
         gaussians, is_dynamic = moment_of(scene, t_s)
-        rows = _rows(scene, t_s)
+        rows = rows_at(scene, t_s)
         shown, off = _shares(gaussians, camera, squared_error[view])
         weight[rows, k] = shown
         error[rows] += off
@@ -99,7 +99,7 @@ def seen_with(
     and that angle in terms of the spread of those directions.
     """
     gaussians, is_dynamic = moment_of(scene, t_s)
-    rows = _rows(scene, t_s)
+    rows = rows_at(scene, t_s)
     directions, away_m = _towards(gaussians, is_dynamic, camera)
     cosine = torch.einsum("nvc,nc->nv", evidence.directions[rows], directions)
     cosine = torch.where(evidence.sees[rows], cosine, -1.0).amax(dim=1)
@@ -116,7 +116,7 @@ def seen_with(
     return view, view.channels / view.alpha.clamp(min=1e-3)[..., None]
 
 
-def _rows(scene: Scene, t_s: float) -> Int[Tensor, " m"]:
+def rows_at(scene: Scene, t_s: float) -> Int[Tensor, " m"]:
     """Which of all Gaussians ``moment_of`` gives at a time."""
     static = torch.arange(len(scene.static))
     return torch.cat([static, len(static) + scene.dynamic.alive_at(t_s)])

@@ -1,17 +1,16 @@
 """The small network that mends a drawn view: it fills holes, sharpens what is stretched, keeps the look."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
-from torch import Tensor, nn
+from torch import Tensor
 
 from dreamdrive.errors import InputError
-from dreamdrive.models import fill_network, read_state
+from dreamdrive.models import HalfUNet, fill_network, read_state
 from dreamdrive.names import FILL_INPAINT, FILL_NETWORK
 from dreamdrive.prior.photo.sight import Sight, places_in
 from dreamdrive.scene.camera import Camera
@@ -24,55 +23,21 @@ _FILE = Path(__file__).with_name("photo.safetensors")
 EXPECTED = "weights of the network of the prior photo, as `dreamdrive train photo` writes them"
 
 
-class _Block(nn.Module):
-    """Two convolutions and what came in."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.first = nn.Conv2d(width, width, 3, padding=1, padding_mode="replicate")
-        self.second = nn.Conv2d(width, width, 3, padding=1, padding_mode="replicate")
-        self.norm = nn.GroupNorm(8, width)
-
-    def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h w"]:
-        return x + self.second(nn.functional.silu(self.first(nn.functional.silu(self.norm(x)))))
-
-
-class PhotoNetwork(nn.Module):
-    """A U-Net on half of the pixels, whose answer is what to add to the view's colours.
+class PhotoNetwork(HalfUNet):
+    """Its answer is what to add to the view's colours.
 
     Its last features, before the answer, are Z_ref.
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
-        super().__init__()
-        self.stem = nn.Conv2d(4 * CHANNELS, widths[0], 3, padding=1, padding_mode="replicate")
-        self.down = nn.ModuleList(nn.Conv2d(a, b, 2, stride=2) for a, b in pairwise(widths))
-        self.enter = nn.ModuleList(nn.Sequential(_Block(width), _Block(width)) for width in widths)
-        self.up = nn.ModuleList(nn.Conv2d(b, a, 1) for a, b in pairwise(widths))
-        self.leave = nn.ModuleList(nn.Sequential(_Block(width), _Block(width)) for width in widths[:-1])
-        self.answer = nn.Conv2d(widths[0], 12, 3, padding=1, padding_mode="replicate")
-        nn.init.zeros_(self.answer.weight)
-        assert self.answer.bias is not None
-        nn.init.zeros_(self.answer.bias)
+        super().__init__(CHANNELS, 3, widths)
 
     def forward(
         self, seen: Float[Tensor, "n 11 h w"]
     ) -> tuple[Float[Tensor, "n 3 h w"], Float[Tensor, "n c h2 w2"]]:
         """The mended view, RGB about [0, 1], and its features; sides are multiples of 2."""
-        x = self.stem(nn.functional.pixel_unshuffle(seen, 2))
-        kept: list[Tensor] = []
-        for level, block in enumerate(self.enter):
-            x = block(x if level == 0 else self.down[level - 1](_even(x)))
-            kept.append(x)
-        for level in reversed(range(len(self.leave))):
-            size = kept[level].shape[2:]
-            wider = nn.functional.interpolate(self.up[level](x), scale_factor=2, mode="nearest")
-            x = self.leave[level](kept[level] + wider[..., : size[0], : size[1]])
-        return seen[:, :3] + nn.functional.pixel_shuffle(self.answer(x), 2), x
-
-
-def _even(x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
-    return nn.functional.pad(x, (0, x.shape[3] % 2, 0, x.shape[2] % 2), mode="replicate")
+        more, features = self.answered(seen)
+        return seen[:, :3] + more, features
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,15 @@
+"""Restorer: a small network that mends views from aside with what the recorded frames show there."""
+
+from typing import TYPE_CHECKING
+
+from dreamdrive.registry import offer
+
+if TYPE_CHECKING:
+    from dreamdrive.restore.carried import Recordings as Recordings
+    from dreamdrive.restore.network import (
+        CHANNELS as CHANNELS,
+        RestorerNetwork as RestorerNetwork,
+        load_restorer as load_restorer,
+    )
+
+__all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,0 +1,133 @@
+"""What the recorded frames show of the surfaces of another view, and what else the restorer is told of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, Int, UInt8
+from torch import Tensor
+
+from dreamdrive.compute.threads import one_torch_thread
+from dreamdrive.restore.network import CHANNELS, FRAMES, OF_FRAME, OF_VIEW
+from dreamdrive.scene.camera import NEAR_M, Camera
+from dreamdrive.scene.gaussians import Gaussians
+from dreamdrive.scene.scene import Scene
+from dreamdrive.splat import SceneView, moment_of, render_scene
+from dreamdrive.trust import GaussianEvidence, rows_at
+
+_LATER_M_S, _TURNED_M = 3.0, 5.0
+"""A frame that much later, or turned by one radian, is as good as one that many metres farther away."""
+_NEAR_M = 2.0
+_FAR_M = 1e5
+_SAME = 0.1
+"""Share of the depth by which one surface may differ between views."""
+_UNSEEN_PX = 0.5
+_ERROR = 4.0
+
+
+@dataclass
+class Recordings:
+    """The recorded frames of a scene, ready to be carried over to other views.
+
+    Attributes:
+        scene: What is seen, on the CPU.
+        evidence: What its recorded views tell of its Gaussians.
+        frame: The frame of a recorded view (H, W, 3), as bytes.
+        views: Indices of the views whose frames may be used (V,).
+    """
+
+    scene: Scene
+    evidence: GaussianEvidence
+    frame: Callable[[int], UInt8[np.ndarray, "h w 3"]]
+    views: Int[np.ndarray, " v"]
+    _inverse: dict[int, Float[np.ndarray, "h2 w2"]] = field(default_factory=dict[int, np.ndarray])
+
+    def nearest(self, camera: Camera, t_s: float, besides: int | None = None) -> list[int]:
+        """The recorded views that are nearest in place, direction and time; less one of them, if told."""
+        poses = np.stack([self.scene.cameras[view].world_from_camera for view in self.views])
+        away_m = np.linalg.norm(poses[:, :3, 3] - camera.world_from_camera[:3, 3], axis=1)
+        turned = np.arccos(np.clip(poses[:, :3, 2] @ camera.world_from_camera[:3, 2], -1, 1))
+        later_s = np.abs(self.scene.times_s[self.views] - t_s)
+        worth = away_m + _TURNED_M * turned + _LATER_M_S * later_s
+        order = self.views[np.argsort(worth, kind="stable")]
+        return [int(view) for view in order if view != besides][:FRAMES]
+
+    @one_torch_thread()
+    @torch.no_grad()
+    def told(
+        self, camera: Camera, t_s: float, besides: int | None = None
+    ) -> tuple[SceneView, Float[np.ndarray, "16 h w"]]:
+        """A view as it is, and what the restorer is told of it, float32 (see ``network.CHANNELS``)."""
+        gaussians, is_dynamic = moment_of(self.scene, t_s)
+        rows = rows_at(self.scene, t_s)
+        views = self.nearest(camera, t_s, besides)
+        known = [
+            self.evidence.error[rows].sqrt()[:, None],
+            torch.exp(-self.evidence.weight_px[rows] / _UNSEEN_PX)[:, None],
+            *(self._places(t_s, view) for view in views),
+        ]
+        seen = render_scene(
+            self.scene, camera, t_s, channels=torch.cat(known, dim=1), moment=(gaussians, is_dynamic)
+        )
+        maps = np.zeros((CHANNELS, camera.height_px, camera.width_px), np.float32)
+        alpha = seen.alpha.clamp(min=1e-3)
+        channels = (seen.channels / alpha[..., None]).numpy()
+        depth_m = seen.seen_depth_m
+        maps[:3] = seen.colour.permute(2, 0, 1).numpy()
+        maps[3] = seen.alpha.numpy()
+        maps[4] = np.where(depth_m > 0, _NEAR_M / np.maximum(depth_m, _NEAR_M), 0)
+        maps[5] = (seen.dynamic_share / alpha).numpy()
+        maps[6] = np.minimum(_ERROR * channels[..., 0], 1)
+        maps[7] = channels[..., 1]
+        for number, view in enumerate(views):
+            places = channels[..., 2 + 3 * number : 5 + 3 * number]
+            first = OF_VIEW + number * OF_FRAME
+            maps[first : first + OF_FRAME] = self._carried(view, camera, places, depth_m > 0)
+        return seen, maps
+
+    def _places(self, t_s: float, view: int) -> Float[Tensor, "m 3"]:
+        """Where what lives at a time is at the time of a recorded view, in its camera's frame."""
+        scene, then_s = self.scene, float(self.scene.times_s[view])
+        means = scene.static_at(then_s).means
+        if len(scene.dynamic):
+            living: Gaussians = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
+            means = torch.cat([means, scene.moved_at(living, then_s).means])
+        pose = torch.from_numpy(scene.cameras[view].camera_from_world).to(means.dtype)
+        return means @ pose[:3, :3].T + pose[:3, 3]
+
+    def _carried(
+        self, view: int, camera: Camera, places: Float[np.ndarray, "h w 3"], solid: np.ndarray
+    ) -> Float[np.ndarray, "4 h w"]:
+        """A recorded frame where it shows the same surface, and how surely it does, 0 to 1."""
+        there = self.scene.cameras[view]
+        turn = there.camera_from_world[:3, :3] @ camera.world_from_camera[:3, :3]
+        local = np.where(solid[..., None], places, _FAR_M * camera.rays() @ turn.T)
+        z_m = local[..., 2].astype(np.float32)
+        ahead_m = np.maximum(z_m, NEAR_M)
+        u = (local[..., 0] / ahead_m * there.fx_px + there.cx_px).astype(np.float32)
+        v = (local[..., 1] / ahead_m * there.fy_px + there.cy_px).astype(np.float32)
+        inside = (z_m > NEAR_M) & (u >= 0) & (u < there.width_px) & (v >= 0) & (v < there.height_px)
+        inverse = self._inverse_depth(view)
+        sy, sx = (
+            np.float32(a / b) for a, b in zip(inverse.shape, (there.height_px, there.width_px), strict=True)
+        )
+        known = cv2.remap(
+            inverse, u * sx - 0.5, v * sy - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        off = np.where(solid, np.abs(ahead_m * known - 1), _NEAR_M * known)
+        sure = inside * np.exp(-off / _SAME)
+        rgb = cv2.remap(self.frame(view), u - 0.5, v - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        carried = np.concatenate([inside[..., None] * rgb / 255.0, sure[..., None]], axis=2)
+        return carried.transpose(2, 0, 1).astype(np.float32)
+
+    def _inverse_depth(self, view: int) -> Float[np.ndarray, "h2 w2"]:
+        """Of a recorded view in 1/m, at half its size; 0 where nothing stands."""
+        if view not in self._inverse:
+            camera = self.scene.cameras[view]
+            half = camera.resized(max(1, camera.width_px // 2), max(1, camera.height_px // 2))
+            seen = render_scene(self.scene, half, float(self.scene.times_s[view]), exposure=False)
+            depth_m = seen.seen_depth_m
+            self._inverse[view] = np.where(depth_m > 0, 1 / np.maximum(depth_m, NEAR_M), 0).astype(np.float32)
+        return self._inverse[view]
