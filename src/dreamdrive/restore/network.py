@@ -16,7 +16,7 @@ CHANNELS = OF_VIEW + FRAMES * OF_FRAME
 """Of the view its RGB, alpha, inverse depth, share of what moves, error of what it shows in the recorded
 views and how little they saw of it; of each recorded frame its RGB and how well it shows the same surface."""
 WIDTHS = (24, 48, 96, 192)
-EXPECTED = "weights of the restorer, as `dreamdrive train restore` writes them"
+EXPECTED = "weights of the restorer, as `dreamdrive train restorer` writes them"
 _FILE = Path(__file__).with_name("restorer.safetensors")
 _SHY = -2.0  # an untrained network takes little over
 
@@ -42,7 +42,7 @@ class RestorerNetwork(HalfUNet):
 
 
 def load_restorer(path: Path = _FILE) -> RestorerNetwork:
-    """The network with the weights that ship, or with those that ``dreamdrive train restore`` wrote to a file.
+    """The network with the weights that ship, or those that ``dreamdrive train restorer`` wrote to a file.
 
     Raises:
         InputError: There is no such file, or it is of something else.

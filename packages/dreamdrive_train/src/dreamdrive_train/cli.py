@@ -1,8 +1,9 @@
 """``dreamdrive train``: networks of our own."""
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import OmitArgPrefixes, OmitSubcommandPrefixes, UseAppendAction, arg
 
@@ -12,6 +13,11 @@ from dreamdrive.cli.terminal.machine import asked_to_stop, use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import WANTED, check_there
+from dreamdrive.names import DeviceName
+
+if TYPE_CHECKING:
+    from dreamdrive_train.pair_training import PairTask, PairTraining
+    from dreamdrive_train.pairs_file import Source
 
 
 def street(
@@ -124,25 +130,13 @@ def photo(
         knowledge: Weights of the street network that sees the pictures.
         licence: Under which the weights may be used; it is written into them.
     """
-    if min(steps, batch, each) < 1 or seed < 0 or not 0 < rate < 1:
-        raise InputError(
-            f"--steps {steps} --batch {batch} --each {each} --seed {seed} --rate {rate:g}: expected at least "
-            "one step, pair and picture, a seed of 0 or more and a rate between 0 and 1"
-        )
+    _check(steps, batch, each, seed, rate)
     for path in pictures:
         check_there(path, "a folder of pictures of streets")
     use_all_cores()
-    from dreamdrive.compute.machine import available_cores
     from dreamdrive.data.pictures.images import SUFFIXES
-    from dreamdrive.files.output import claim_folder
-    from dreamdrive.run import only_run
-    from dreamdrive_train.photo import (
-        FIRST_SEED,
-        PairOptions,
-        PhotoTraining,
-        make_pairs,
-        train_photo,
-    )
+    from dreamdrive_train.pair_training import PairTraining
+    from dreamdrive_train.photo import FIRST_SEED, PHOTO, PairOptions, photo_pairs
 
     found = sorted(p for folder in pictures for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES)
     if not found and (pictures or streets < 1):
@@ -151,29 +145,100 @@ def photo(
             if pictures
             else "nothing to train on; give --pictures DIR, --streets N or both"
         )
-    options = PhotoTraining(steps=steps, seed=seed, rate=rate, batch=batch)
-    console = plain()
-    with only_run(out), asked_to_stop() as stop, Bars(console) as bars:
+    sources = photo_pairs(found, range(FIRST_SEED, FIRST_SEED + streets), knowledge, PairOptions(each=each))
+    options = PairTraining(steps=steps, seed=seed, rate=rate, batch=batch)
+    _learn(PHOTO, sources, out, knowledge, options, licence, "cpu")
+
+
+def restorer(
+    *,
+    drives: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="VIDEO|DIR")] = (),
+    streets: Annotated[int, arg(metavar="N")] = 0,
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    steps: Annotated[int, arg(metavar="N")] = 20_000,
+    each: Annotated[int, arg(metavar="N")] = 16,
+    seed: Annotated[int, arg(metavar="S")] = 0,
+    batch: Annotated[int, arg(metavar="N")] = 4,
+    rate: Annotated[float, arg(metavar="R")] = 4e-4,
+    knowledge: Annotated[str, arg(metavar="street|FILE")] = "street",
+    licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
+    device: DeviceFlag = "cpu",
+) -> None:
+    """Train the network that mends views from aside on drawn streets and on recorded drives.
+
+    Args:
+        drives: Video or folder of images of a drive; every second, fourth and eighth frame makes a scene.
+        streets: How many streets of the second edition are drawn.
+        out: Folder for the pairs, weights, losses and checkpoint; the same command goes on from there.
+        steps: Steps of the whole training.
+        each: Pairs made of each scene.
+        seed: Seed of everything random.
+        batch: Pairs a step.
+        rate: Largest step of the optimiser.
+        knowledge: Weights of the street network that sees the frames.
+        licence: Under which the weights may be used; it is written into them.
+        device: Where the network is trained; scenes are made on the CPU.
+    """
+    _check(steps, batch, each, seed, rate)
+    for path in drives:
+        check_there(path, "a video or a folder of images")
+    if not drives and streets < 1:
+        raise InputError("nothing to train on; give --drives VIDEO|DIR, --streets N or both")
+    use_all_cores()
+    from dreamdrive_train.pair_training import PairTraining
+    from dreamdrive_train.restorer import FIRST_SEED, RESTORER, RestorerPairs, restorer_pairs
+
+    seeds = range(FIRST_SEED, FIRST_SEED + streets)
+    sources = restorer_pairs(drives, seeds, knowledge, RestorerPairs(each=each))
+    options = PairTraining(steps=steps, seed=seed, rate=rate, batch=batch)
+    _learn(RESTORER, sources, out, knowledge, options, licence, device)
+
+
+def _check(steps: int, batch: int, each: int, seed: int, rate: float) -> None:
+    if min(steps, batch, each) < 1 or seed < 0 or not 0 < rate < 1:
+        raise InputError(
+            f"--steps {steps} --batch {batch} --each {each} --seed {seed} --rate {rate:g}: expected at least "
+            "one step, pair and picture, a seed of 0 or more and a rate between 0 and 1"
+        )
+
+
+def _learn(
+    task: "PairTask",
+    sources: "Mapping[str, Source]",
+    out: Path,
+    knowledge: str,
+    options: "PairTraining",
+    licence: str,
+    device: DeviceName,
+) -> None:
+    """Make the pairs that are missing, and train on all."""
+    from dreamdrive.compute.device import computing_on
+    from dreamdrive.compute.machine import available_cores
+    from dreamdrive.files.output import claim_folder
+    from dreamdrive.run import only_run
+    from dreamdrive_train.pair_training import train_on_pairs
+    from dreamdrive_train.pairs_file import make_pairs
+
+    console, name = plain(), Path(task.file).stem
+    with only_run(out), computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:
         claim_folder(out, "training")
         pairs = make_pairs(
-            found,
-            range(FIRST_SEED, FIRST_SEED + streets),
+            sources,
             out / "pairs",
-            knowledge,
-            PairOptions(each=each),
             processes=available_cores(),
             stop=stop,
             progress=lambda done, total: bars("pairs", done, total),
         )
-        learn = partial(train_photo, licence=licence, stop=stop, progress=lambda n, m, _: bars("photo", n, m))
-        weights = None if pairs is None else learn(pairs, out, knowledge, options)
+        learn = partial(train_on_pairs, licence=licence, device=where, stop=stop)
+        learn = partial(learn, progress=lambda step, steps, _: bars(name, step, steps))
+        weights = None if pairs is None else learn(task, pairs, out, knowledge, options)
     if weights is None or pairs is None:
         stop.end()
         return
-    console.print(f"{weights}: {steps} steps on {len(pairs)} pairs")
+    console.print(f"{weights}: {options.steps} steps on {len(pairs)} pairs")
 
 
-_Train = commands_of({"street": street, "photo": photo})
+_Train = commands_of({"street": street, "photo": photo, "restorer": restorer})
 
 
 def train(what: Annotated[_Train, OmitSubcommandPrefixes, OmitArgPrefixes]) -> None:  # pyright: ignore[reportInvalidTypeForm]

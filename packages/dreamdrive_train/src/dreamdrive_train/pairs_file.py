@@ -14,7 +14,7 @@ from dreamdrive.compute.machine import workers
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import claim_folder, new_file
 
-Planes = UInt8[np.ndarray, "c h w"]
+Planes = UInt8[np.ndarray, "p h w"]
 Source = Callable[[np.random.Generator], Iterator[Planes]]
 """Makes the pairs of one source; what is random comes from the generator. It can be sent to a process."""
 

@@ -14,13 +14,15 @@ from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.network import CHANNELS, Before, PhotoNetwork, load_photo_network, mended, told
 from dreamdrive.prior.photo.sight import sight_of
 from dreamdrive.street_network import SHIPPED
-from dreamdrive_train.photo import PairOptions, PhotoTraining, make_pairs, train_photo
-from dreamdrive_train.photo.loop import batch_of
-from dreamdrive_train.photo.pairs import FIRST_SEED, PLANES, street_pairs
+from dreamdrive_train.pair_training import PairTraining, batch_of, train_on_pairs
+from dreamdrive_train.pairs_file import make_pairs
+from dreamdrive_train.photo import PHOTO, PairOptions, photo_pairs
+from dreamdrive_train.photo.pairs import FIRST_SEED, street_pairs
 from streetworld import make_street
 from tests.prior.photo.streets import GROUND, street
 
 SMALL = (240, 136)
+PLANES = CHANNELS + 4
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,8 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     frame = make_street(5, 1, 10.0, SMALL).frames[0]
     cv2.imwrite(str(folder / "street.png"), frame[..., ::-1])
     options = PairOptions(each=2, size=SMALL)
-    return make_pairs([folder / "street.png"], [], folder / "pairs", SHIPPED, options, processes=1)
+    sources = photo_pairs([folder / "street.png"], [], SHIPPED, options)
+    return make_pairs(sources, folder / "pairs", processes=1)
 
 
 def test_an_untrained_network_changes_nothing() -> None:
@@ -81,7 +84,7 @@ def test_a_pair_is_the_picture_and_what_a_drive_makes_of_it(pairs: list[Path]) -
 
 
 def test_a_pair_of_a_drawn_street_knows_what_is_behind_things() -> None:
-    made = list(street_pairs(FIRST_SEED, PairOptions(each=2, size=SMALL), np.random.default_rng(0)))
+    made = list(street_pairs(np.random.default_rng(0), FIRST_SEED, PairOptions(each=2, size=SMALL)))
     assert [planes.shape for planes in made] == [(PLANES, 136, 240)] * 2
     for planes in made:
         off = np.abs(planes[:3].astype(int) - planes[CHANNELS : CHANNELS + 3])[:, planes[-1] > 0]
@@ -105,7 +108,7 @@ def dim(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 def off(network: PhotoNetwork, pairs: list[Path]) -> float:
     """Mean error on squares that the training has not drawn."""
-    seen, truth, counts = batch_of(pairs, 10**6, PhotoTraining(batch=8, crop_px=64))
+    seen, truth, counts = batch_of(PHOTO, pairs, 10**6, PairTraining(batch=8, crop_px=64))
     with torch.inference_mode():
         return float((counts * (network(seen)[0] - truth).abs()).mean())
 
@@ -113,7 +116,7 @@ def off(network: PhotoNetwork, pairs: list[Path]) -> float:
 @pytest.mark.slow
 def test_the_error_falls_and_a_stopped_training_goes_on(dim: list[Path], tmp_path: Path) -> None:
     steps: list[int] = []
-    options = PhotoTraining(steps=20, batch=2, crop_px=64, warm=4, rate=6e-4, average=0.9)
+    options = PairTraining(steps=20, batch=2, crop_px=64, warm=4, rate=6e-4, average=0.9)
 
     def tell(step: int, _: int, __: float) -> None:
         steps.append(step)
@@ -121,8 +124,8 @@ def test_the_error_falls_and_a_stopped_training_goes_on(dim: list[Path], tmp_pat
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train_photo(dim, tmp_path, SHIPPED, options, checkpoint_s=0.0, progress=tell)
-    path = train_photo(dim, tmp_path, SHIPPED, options, progress=tell)
+        train_on_pairs(PHOTO, dim, tmp_path, SHIPPED, options, checkpoint_s=0.0, progress=tell)
+    path = train_on_pairs(PHOTO, dim, tmp_path, SHIPPED, options, progress=tell)
     # The step in which it was stopped is made again.
     assert steps == [*range(1, 9), *range(8, 21)]
     network = PhotoNetwork()
@@ -131,4 +134,4 @@ def test_the_error_falls_and_a_stopped_training_goes_on(dim: list[Path], tmp_pat
     assert off(network, dim) < 0.7 * before
     assert path.stat().st_size < 9e6
     with pytest.raises(InputError, match="other options"):
-        train_photo(dim, tmp_path, SHIPPED, PhotoTraining(steps=13))
+        train_on_pairs(PHOTO, dim, tmp_path, SHIPPED, PairTraining(steps=13))

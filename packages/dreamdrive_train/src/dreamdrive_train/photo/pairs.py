@@ -6,24 +6,21 @@ surfaces and torn edges as on a drive, and the picture itself is the truth. No t
 AdaMPI: Han et al. 2022).
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float, UInt8
 
-from dreamdrive.compute.machine import workers
-from dreamdrive.data.photo import Photo, read_photo
-from dreamdrive.errors import InputError
-from dreamdrive.files.output import claim_folder, new_file
+from dreamdrive.data.photo import read_photo
 from dreamdrive.prior.photo.fill import grown
 from dreamdrive.prior.photo.height import USUAL_M
 from dreamdrive.prior.photo.layers import Layers, layers_of
 from dreamdrive.prior.photo.make import seen_in
-from dreamdrive.prior.photo.network import CHANNELS, Before, told
+from dreamdrive.prior.photo.network import Before, told
 from dreamdrive.prior.photo.sight import places_in, sight_of
 from dreamdrive.prior.photo.street import FAR_M, PhotoStreet
 from dreamdrive.prior.photo.way import free_m, level_axes
@@ -31,14 +28,11 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.street.street_class import StreetClass
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
+from dreamdrive_train.pairs_file import PlaneRange, Source
 from dreamdrive_train.street_network import CLASS_OF
 from streetworld import make_street
 
-PLANES = CHANNELS + 4
-"""What a pair holds, in bytes: what the network is told, the truth, and 255 where that counts."""
-LOW = np.array([0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0], np.float32)
-HIGH = np.array([1, 1, 1, 1, 1, 3, 1, 1, 1, 1, 1], np.float32)
-"""Range of each plane that the network is told."""
+RANGE = PlaneRange((0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0), (1, 1, 1, 1, 1, 3, 1, 1, 1, 1, 1))
 FIRST_SEED = 1_200_000
 """Of the drawn streets: none of these is judged by."""
 HEIGHTS_M = (1.2, 2.1)
@@ -68,56 +62,25 @@ class PairOptions:
     size: tuple[int, int] = (480, 270)
 
 
-def make_pairs(
-    pictures: Sequence[Path],
-    seeds: Sequence[int],
-    folder: Path,
-    knowledge: str,
-    options: PairOptions = PairOptions(),
-    *,
-    processes: int = 2,
-    stop: Callable[[], bool] = lambda: False,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Path] | None:
-    """Write the pairs of pictures and of drawn streets and return all files; those that are there are kept.
+def photo_pairs(
+    pictures: Sequence[Path], seeds: Sequence[int], knowledge: str, options: PairOptions = PairOptions()
+) -> dict[str, Source]:
+    """The sources of pairs by their names: pictures and drawn streets.
 
-    Pictures in which no street is seen give none. ``stop`` is asked after each; then the result is None.
+    Pictures in which no street is seen give no pairs.
     """
-    claim_folder(folder, "set of pairs")
-    names = {f"{path.parent.name}-{path.stem}": path for path in pictures} | {
-        f"street-{seed}": seed for seed in seeds
-    }
-    left = [name for name in names if not (folder / f"{name}.done").exists()]
-    with workers(processes) as pool:
-        jobs = [pool.submit(_write, name, names[name], folder, knowledge, options) for name in left]
-        for number, job in enumerate(as_completed(jobs)):
-            job.result()
-            progress(len(names) - len(left) + number + 1, len(names))
-            if stop():
-                return None
-    return sorted(folder.glob("*.npy"))
-
-
-def _write(name: str, source: Path | int, folder: Path, knowledge: str, options: PairOptions) -> None:
-    generator = np.random.default_rng([*name.encode()])
-    try:
-        made = (
-            street_pairs(source, options, generator)
-            if isinstance(source, int)
-            else picture_pairs(read_photo(source, options.size), knowledge, options, generator)
-        )
-        for number, planes in enumerate(made):
-            with new_file(folder / f"{name}-{number}.npy") as partial, partial.open("wb") as file:
-                np.save(file, planes)
-    except InputError:
-        pass  # nothing solid in it
-    (folder / f"{name}.done").touch()
+    named = {f"{path.parent.name}-{path.stem}": path for path in pictures}
+    return {
+        name: partial(picture_pairs, path=path, knowledge=knowledge, options=options)
+        for name, path in named.items()
+    } | {f"street-{seed}": partial(street_pairs, seed=seed, options=options) for seed in seeds}
 
 
 def picture_pairs(
-    photo: Photo, knowledge: str, options: PairOptions, generator: np.random.Generator
+    generator: np.random.Generator, path: Path, knowledge: str, options: PairOptions
 ) -> Iterator[UInt8[np.ndarray, "15 h w"]]:
     """Pairs of one picture, as planes of bytes."""
+    photo = read_photo(path, options.size)
     street, _, _ = seen_in(photo, knowledge, height_m=USUAL_M)
     layers = layers_of(street)
     own = grown(street.classes == StreetClass.OWN_CAR, 7)
@@ -135,11 +98,11 @@ def picture_pairs(
             earlier,
             generator,
         )
-        yield _planes(told(sight, here, before), street.rgb, ~own)
+        yield RANGE.packed(told(sight, here, before), street.rgb, ~own)
 
 
 def street_pairs(
-    seed: int, options: PairOptions, generator: np.random.Generator
+    generator: np.random.Generator, seed: int, options: PairOptions
 ) -> Iterator[UInt8[np.ndarray, "15 h w"]]:
     """Pairs of one street of the second edition: what is behind things is truly known there."""
     tall_m = float(generator.uniform(*HEIGHTS_M))
@@ -154,7 +117,7 @@ def street_pairs(
         truth, past = made.views([here, earlier], [0.0, 0.0])
         before = _before(past.frame, sight_of(layers, earlier, made.ground).rgb, earlier, generator)
         seen = told(sight_of(layers, here, made.ground), here, before)
-        yield _planes(seen, truth.frame, truth.semantic != Semantic.OWN_CAR)
+        yield RANGE.packed(seen, truth.frame, truth.semantic != Semantic.OWN_CAR)
 
 
 def true_street(made: DriveTruth) -> PhotoStreet:
@@ -165,14 +128,6 @@ def true_street(made: DriveTruth) -> PhotoStreet:
     return PhotoStreet(
         made.frames[0], made.cameras[0], depth.astype(np.float32), classes, road_users, made.ground
     )
-
-
-def _planes(
-    seen: Float[np.ndarray, "11 h w"], truth: UInt8[np.ndarray, "h w 3"], counts: Bool[np.ndarray, "h w"]
-) -> UInt8[np.ndarray, "15 h w"]:
-    scaled = (seen - LOW[:, None, None]) / (HIGH - LOW)[:, None, None]
-    said = np.rint(np.clip(scaled, 0, 1) * 255).astype(np.uint8)
-    return np.concatenate([said, truth.transpose(2, 0, 1), np.where(counts, 255, 0).astype(np.uint8)[None]])
 
 
 def _way_m(options: PairOptions, generator: np.random.Generator) -> float:

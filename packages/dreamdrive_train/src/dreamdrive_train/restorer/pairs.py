@@ -5,8 +5,9 @@ recorded drive scenes are made of every second, fourth and eighth frame, and see
 errors are those that views aside have.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +22,15 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
 from dreamdrive.trust import evidence_of
-from dreamdrive_train.pairs_file import PlaneRange
+from dreamdrive_train.pairs_file import PlaneRange, Source
 from streetworld import make_street
 from streetworld.corruption import corrupt, parse_corruption
 
 RANGE = PlaneRange((0.0,) * CHANNELS, (1.0,) * CHANNELS)
 FIRST_SEED = 1_250_000
 """Of the drawn streets: none of these is judged by."""
+THINNED = (2, 4, 8)
+"""Of recorded drives every so many frames make a scene."""
 _CLOSE_M, _MOST_CLOSE = 1.0, 0.3
 """A view with more than such a share of it so close looks out of something."""
 _CORRUPTED = 0.25
@@ -56,6 +59,23 @@ class RestorerPairs:
     sizes: tuple[tuple[int, int], ...] = ((320, 192), (320, 192), (384, 216))
 
 
+def restorer_pairs(
+    drives: Sequence[Path], seeds: Sequence[int], knowledge: str, options: RestorerPairs = RestorerPairs()
+) -> dict[str, Source]:
+    """The sources of pairs by their names: recorded drives, each thinned in several ways, and drawn streets.
+
+    Drives of which no scene can be made give no pairs.
+    """
+    ways = {f"{path.parent.name}-{path.name}-{every}": (path, every) for path in drives for every in THINNED}
+    return {
+        name: partial(drive_pairs, path=path, every=every, knowledge=knowledge, options=options)
+        for name, (path, every) in ways.items()
+    } | {
+        f"street-{seed}": partial(street_pairs, seed=seed, knowledge=knowledge, options=options)
+        for seed in seeds
+    }
+
+
 def street_pairs(
     generator: np.random.Generator, seed: int, knowledge: str, options: RestorerPairs
 ) -> Iterator[UInt8[np.ndarray, "20 h w"]]:
@@ -82,13 +102,12 @@ def street_pairs(
 def drive_pairs(
     generator: np.random.Generator,
     path: Path,
-    frames: str,
     every: int,
     knowledge: str,
     options: RestorerPairs,
 ) -> Iterator[UInt8[np.ndarray, "20 h w"]]:
-    """Pairs of a recorded drive, some of its frames (``START:STOP``), of which every so many make the scene."""
-    clip = read_clip(path, frames=frames)
+    """Pairs of a recorded drive, of whose frames every so many make the scene."""
+    clip = read_clip(path)
     held_out = np.arange(len(clip)) % every != 0
     clip = replace(clip, held_out=held_out)
     clip = clip.with_features(appearance=appearance(clip.frames, clip.valid))

@@ -1,4 +1,4 @@
-"""The training itself, resumable: what is random follows from the seed and the step."""
+"""Training of networks that mend pictures, on pairs; what is random follows from the seed and the step."""
 
 import json
 import time
@@ -11,22 +11,22 @@ import numpy as np
 import torch
 from jaxtyping import Float
 from safetensors.torch import save_file
-from torch import Tensor
+from torch import Tensor, nn
 
+from dreamdrive.compute.device import CPU
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.files.step_log import StepLog
 from dreamdrive.models import load_checkpoint, save_checkpoint
-from dreamdrive.prior.photo.network import CHANNELS, PhotoNetwork
 from dreamdrive.street_network import StreetNetwork, load_knowledge
-from dreamdrive_train.photo.pairs import HIGH, LOW
+from dreamdrive_train.pairs_file import PlaneRange
 
-WEIGHTS = "photo.safetensors"
 _LOG = "losses.jsonl"
+_LEVELS = 3
 
 
 @dataclass(frozen=True)
-class PhotoTraining:
+class PairTraining:
     """How the network is trained.
 
     Attributes:
@@ -36,7 +36,7 @@ class PhotoTraining:
         rate: Largest step of Adam; it rises for ``warm`` steps and falls as a cosine.
         warm: Steps until then.
         perceptual: Weight of the distance in features of the street network's encoder, beside L1.
-        spoilt: How much more what is made up, empty or stretched counts.
+        spoilt: How much more counts what is spoilt.
         average: Share of the averaged weights that a step keeps.
         seed: Of everything random.
     """
@@ -52,29 +52,50 @@ class PhotoTraining:
     seed: int = 0
 
 
-def train_photo(
+@dataclass(frozen=True)
+class PairTask:
+    """What is learned from pairs.
+
+    Attributes:
+        make: Makes the network.
+        mended: What a network says of what it is told: RGB (N, 3, H, W).
+        spoilt: How spoilt what it is told is, from 0 to 1 (N, 1, H, W).
+        range: Of the maps in a pair.
+        file: Name of the weights.
+    """
+
+    make: Callable[[], nn.Module]
+    mended: Callable[[nn.Module, Tensor], Tensor]
+    spoilt: Callable[[Tensor], Tensor]
+    range: PlaneRange
+    file: str
+
+
+def train_on_pairs(
+    task: PairTask,
     pairs: list[Path],
     out: Path,
     knowledge: str,
-    options: PhotoTraining = PhotoTraining(),
+    options: PairTraining,
     *,
     licence: str = "Apache-2.0",
+    device: torch.device = CPU,
     checkpoint_s: float = 120.0,
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int, int, float], None] = lambda step, steps, loss: None,
 ) -> Path | None:
-    """Train on pairs and write ``photo.safetensors``; the same call goes on where it stopped.
+    """Train on pairs and write the weights; the same call goes on where it stopped.
 
     ``stop`` is asked after each step; then a checkpoint is written and no weights.
     """
     if not pairs:
-        raise InputError("there are no pairs to train on: no street was seen in any of the pictures")
+        raise InputError("there are no pairs to train on: nothing could be made of any of the sources")
     claim_folder(out, "training")
     torch.manual_seed(options.seed)
-    network = PhotoNetwork()
+    network = task.make().to(device)
     averaged = deepcopy(network).requires_grad_(False)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate, betas=(0.9, 0.99))
-    judge = load_knowledge(knowledge)
+    judge = load_knowledge(knowledge).to(device)
     both, data = (network, averaged), dict[str, str]()
     done, before_s = load_checkpoint(out, both, optimiser, options, data)
     log, began = StepLog(out / _LOG, done), time.monotonic()
@@ -82,7 +103,8 @@ def train_photo(
     for step in range(done, options.steps):
         for group in optimiser.param_groups:
             group["lr"] = options.rate * _share(step, options)
-        loss = _step(network, optimiser, judge, batch_of(pairs, step, options), options)
+        batch = tuple(each.to(device) for each in batch_of(task, pairs, step, options))
+        loss = _step(task, network, optimiser, judge, batch, options)
         with torch.no_grad():
             keep = min(options.average, (step + 1) / (step + 10))
             for mean, value in zip(averaged.parameters(), network.parameters(), strict=True):
@@ -97,51 +119,46 @@ def train_photo(
             saved, losses = time.monotonic(), []
         if stopped:
             return None
-    state = {name: value.half().contiguous() for name, value in averaged.state_dict().items()}
-    with new_file(out / WEIGHTS) as partial:
+    return _write(averaged, out / task.file, licence, options)
+
+
+def _write(averaged: nn.Module, path: Path, licence: str, options: PairTraining) -> Path:
+    state = {name: value.half().cpu().contiguous() for name, value in averaged.state_dict().items()}
+    with new_file(path) as partial:
         save_file(state, partial, {"licence": licence, "options": json.dumps(asdict(options))})
-    return out / WEIGHTS
+    return path
 
 
-def _share(step: int, options: PhotoTraining) -> float:
+def _share(step: int, options: PairTraining) -> float:
     left = 0.5 * (1 + np.cos(np.pi * step / options.steps))
     return float(min(1.0, (step + 1) / options.warm) * (0.02 + 0.98 * left))
 
 
 def batch_of(
-    pairs: list[Path], step: int, options: PhotoTraining
-) -> tuple[Float[Tensor, "n 11 y x"], Float[Tensor, "n 3 y x"], Float[Tensor, "n 1 y x"]]:
-    """What the network is told, the truth and what of it counts, of squares of some pairs."""
-    generator, side = np.random.default_rng([options.seed, step]), options.crop_px
-    cuts: list[np.ndarray] = []
-    for index in generator.integers(len(pairs), size=options.batch):
-        planes = np.load(pairs[index], mmap_mode="r", allow_pickle=False)
-        rows, columns = planes.shape[1] - side, planes.shape[2] - side
-        top, left = (int(generator.integers(most // 2 + 1)) * 2 for most in (rows, columns))
-        cut = planes[:, top : top + side, left : left + side]
-        cuts.append(cut[:, :, ::-1] if generator.integers(2) else cut)
-    values = torch.from_numpy(np.stack(cuts).astype(np.float32) / 255)
-    low, high = (torch.from_numpy(each)[:, None, None] for each in (LOW, HIGH))
-    return low + values[:, :CHANNELS] * (high - low), values[:, CHANNELS:-1], values[:, -1:]
+    task: PairTask, pairs: list[Path], step: int, options: PairTraining
+) -> tuple[Float[Tensor, "n c y x"], Float[Tensor, "n 3 y x"], Float[Tensor, "n 1 y x"]]:
+    """What the network is told at a step, the truth and what of it counts."""
+    generator = np.random.default_rng([options.seed, step])
+    return task.range.batch(pairs, generator, options.batch, options.crop_px)
 
 
 def _step(
-    network: PhotoNetwork,
+    task: PairTask,
+    network: nn.Module,
     optimiser: torch.optim.Optimizer,
     judge: StreetNetwork,
-    batch: tuple[Tensor, Tensor, Tensor],
-    options: PhotoTraining,
+    batch: tuple[Tensor, ...],
+    options: PairTraining,
 ) -> float:
-    seen, truth, counts = batch
-    said, _ = network(seen)
-    spoilt = torch.maximum(torch.maximum(1 - seen[:, 3:4], seen[:, 4:5]), 0.5 * seen[:, 5:6].clamp(0, 1))
-    weight = counts * (1 + options.spoilt * spoilt)
+    told, truth, counts = batch
+    said = task.mended(network, told)
+    weight = counts * (1 + options.spoilt * task.spoilt(told))
     loss = (weight * (said - truth).abs()).sum() / (3 * weight.sum() + 1)
     true_there = torch.where(counts > 0.5, truth, said.detach())
     there, wanted = judge.encoder(said), judge.encoder(true_there)
-    for a, b in zip(there[:3], wanted[:3], strict=True):
+    for a, b in zip(there[:_LEVELS], wanted[:_LEVELS], strict=True):
         scale = b.square().mean().sqrt() + 1e-3
-        loss = loss + options.perceptual / 3 * (a - b.detach()).abs().mean() / scale
+        loss = loss + options.perceptual / _LEVELS * (a - b.detach()).abs().mean() / scale
     optimiser.zero_grad(set_to_none=True)
     loss.backward()
     torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
