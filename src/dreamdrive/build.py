@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float, Float16
 
 from dreamdrive.complete import completed
+from dreamdrive.data.pictures.picture_file import kept_frame
 from dreamdrive.decompose import (
     Actors,
     Grouping,
@@ -166,7 +167,7 @@ def _fitted(
 
 
 def _completed(clip: Clip, geometry: Geometry, scene: Scene, options: Options) -> Scene:
-    """The scene with what stands where no frame looks, and with how far it is off its frames.
+    """The scene with what stands where no frame looks, with its frames and how far it is off them.
 
     What the prior made up stands there; where it did not, a guess from around.
     """
@@ -175,7 +176,10 @@ def _completed(clip: Clip, geometry: Geometry, scene: Scene, options: Options) -
         scene = completed(scene, geometry, options.completion, device)
     elif not scene.moves_per_frame and len(scene.static):
         scene = scene.with_standing(unseen)
-    return replace(scene, residual=_residual(clip, scene.on(device)))
+    frames = [
+        b"" if held else kept_frame(each) for each, held in zip(clip.frames, clip.held_out, strict=True)
+    ]
+    return replace(scene, residual=_residual(clip, scene.on(device)), frames=tuple(frames))
 
 
 def _residual(clip: Clip, scene: Scene) -> Float16[np.ndarray, "f bh bw"]:

@@ -30,6 +30,7 @@ class ShownFlags:
         completion: Whether guesses are shown where no frame saw anything.
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
+        restore: Mend views with what the recorded frames show of the same surfaces.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
     """
 
@@ -37,6 +38,7 @@ class ShownFlags:
     completion: bool = True
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = ()
+    restore: bool = False
     blur: bool = False
 
 
@@ -77,10 +79,13 @@ def render(
     check_numbers(shift_m, fps)
     if shown.blur and (format == "npz" or shown.show == "depth"):
         raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
+    if shown.restore and shown.show != "colour":
+        raise InputError(f"--restore mends colours; leave it out with --show {shown.show}")
     check_there(out, SCENE)
     use_all_cores()
     from dreamdrive.compute.device import computing_on
     from dreamdrive.drive import drives_of
+    from dreamdrive.restore import Restorer
     from dreamdrive.show import RenderOptions, places, video_rate, write_drive
     from dreamdrive.splat import why_unusable
 
@@ -89,17 +94,21 @@ def render(
         whole = open_scene(out)
         scene = less(whole if shown.completion else whole.without_filled(), shown.without)
         drives = drives_of(scene, trajectory, shift_m, fps)
-        trust = trust_of(scene, drives, needed=shown.show == "trust" or stay_within_trust)
+        needed = shown.show == "trust" or shown.restore or stay_within_trust
+        trust = trust_of(scene, drives, needed=needed)
         if stay_within_trust and trust is not None:
             drives = [bent(drive, trust) for drive in drives]
         if format == "mp4":
             for drive in drives:
                 video_rate(drive, options)
         there, console = scene.on(where), plain()
+        restorer = Restorer.of(there, trust.evidence, where) if trust and shown.restore else None
         for drive, place in zip(drives, places(out, output, drives, options), strict=True):
             start, count = time.perf_counter(), len(drive.path)
             with Bars(console) as bars:
-                write_drive(place, there, drive, options, partial(bars, "render", total=count), trust)
+                write_drive(
+                    place, there, drive, options, partial(bars, "render", total=count), trust, restorer
+                )
             seconds = time.perf_counter() - start
             rate = f"{count} frames in {seconds:.2f} s, {count / seconds:.1f} frames/s"
             console.print(f"{place}: {rate}")

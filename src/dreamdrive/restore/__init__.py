@@ -11,5 +11,6 @@ if TYPE_CHECKING:
         RestorerNetwork as RestorerNetwork,
         load_restorer as load_restorer,
     )
+    from dreamdrive.restore.restorer import Restorer as Restorer
 
 __all__ = offer(__name__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -10,6 +11,8 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from dreamdrive.compute.threads import one_torch_thread
+from dreamdrive.data.pictures.picture_file import frame_of
+from dreamdrive.errors import InputError
 from dreamdrive.restore.network import CHANNELS, FRAMES, OF_FRAME, OF_VIEW
 from dreamdrive.scene.camera import NEAR_M, Camera
 from dreamdrive.scene.gaussians import Gaussians
@@ -24,6 +27,8 @@ _FAR_M = 1e5
 _SAME = 0.1
 """Share of the depth by which one surface may differ between views."""
 _UNSEEN_PX = 0.5
+_KEPT = 8
+"""Frames that are decoded at a time."""
 _ERROR = 4.0
 
 
@@ -32,7 +37,7 @@ class Recordings:
     """The recorded frames of a scene, ready to be carried over to other views.
 
     Attributes:
-        scene: What is seen, on the CPU.
+        scene: What is seen.
         evidence: What its recorded views tell of its Gaussians.
         frame: The frame of a recorded view (H, W, 3), as bytes.
         views: Indices of the views whose frames may be used (V,).
@@ -43,6 +48,27 @@ class Recordings:
     frame: Callable[[int], UInt8[np.ndarray, "h w 3"]]
     views: Int[np.ndarray, " v"]
     _inverse: dict[int, Float[np.ndarray, "h2 w2"]] = field(default_factory=dict[int, np.ndarray])
+
+    @classmethod
+    def of(cls, scene: Scene, evidence: GaussianEvidence) -> "Recordings":
+        """Those that the scene holds; frames are decoded when they are needed.
+
+        Raises:
+            InputError: The scene was changed, or does not hold its recorded frames.
+        """
+        kept = scene.frames
+        if kept is None or not any(kept):
+            raise InputError(
+                "views are restored from the scene's recorded frames, and it holds none: it was changed, or an "
+                "earlier version made it; generate it again"
+            )
+
+        @lru_cache(maxsize=_KEPT)
+        def frame(view: int) -> UInt8[np.ndarray, "h w 3"]:
+            camera = scene.cameras[view]
+            return frame_of(kept[view], (camera.width_px, camera.height_px))
+
+        return cls(scene, evidence, frame, np.array([view for view, data in enumerate(kept) if data]))
 
     def nearest(self, camera: Camera, t_s: float, besides: int | None = None) -> list[int]:
         """The recorded views that are nearest in place, direction and time; less one of them, if told."""
@@ -64,8 +90,8 @@ class Recordings:
         rows = rows_at(self.scene, t_s)
         views = self.nearest(camera, t_s, besides)
         known = [
-            self.evidence.error[rows].sqrt()[:, None],
-            torch.exp(-self.evidence.weight_px[rows] / _UNSEEN_PX)[:, None],
+            self.evidence.error.to(rows.device)[rows].sqrt()[:, None],
+            torch.exp(-self.evidence.weight_px.to(rows.device)[rows] / _UNSEEN_PX)[:, None],
             *(self._places(t_s, view) for view in views),
         ]
         seen = render_scene(
@@ -94,7 +120,7 @@ class Recordings:
         if len(scene.dynamic):
             living: Gaussians = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
             means = torch.cat([means, scene.moved_at(living, then_s).means])
-        pose = torch.from_numpy(scene.cameras[view].camera_from_world).to(means.dtype)
+        pose = torch.from_numpy(scene.cameras[view].camera_from_world).to(means)
         return means @ pose[:3, :3].T + pose[:3, 3]
 
     def _carried(

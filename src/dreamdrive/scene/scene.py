@@ -109,6 +109,8 @@ class Scene:
             is one camera only.
         residual: How far each view is off its frame, see ``vision.residual`` (F, H // 8, W // 8); None where
             no frames were compared.
+        frames: The recorded frames as JPEG, a frame a view, empty where it is held out; None where none were
+            kept, or where the scene was changed, so that they show something else.
     """
 
     static: Gaussians
@@ -123,13 +125,14 @@ class Scene:
     provenance: Provenance = field(default_factory=Provenance)
     camera: Int[np.ndarray, " f"] | None = None
     residual: Float16[np.ndarray, "f bh bw"] | None = None
+    frames: tuple[bytes, ...] | None = None
 
     def __post_init__(self) -> None:
         counts = [len(self.cameras), len(self.times_s), len(self.held_out)]
-        counts += [] if self.camera is None else [len(self.camera)]
+        counts += [len(each) for each in (self.camera, self.frames) if each is not None]
         if len(set(counts)) > 1:
             raise ValueError(
-                f"scene: numbers of cameras, times, held-out marks (and rig indices) differ: {counts}"
+                f"scene: numbers of cameras, times, held-out marks (and rig indices, frames) differ: {counts}"
             )
 
     def on(self, device: torch.device | str) -> "Scene":
@@ -187,7 +190,8 @@ class Scene:
             ValueError: There is no such actor.
         """
         dynamic = self.dynamic.select(torch.nonzero(~self._members(self.actor(id))).squeeze(1))
-        return replace(self, dynamic=dynamic, actors=tuple(a for a in self.actors if a.id != id))
+        actors = tuple(each for each in self.actors if each.id != id)
+        return replace(self, dynamic=dynamic, actors=actors, frames=None)
 
     def moved(self, id: int, ahead_m: float = 0.0, left_m: float = 0.0) -> "Scene":
         """The scene with an actor's whole track elsewhere: so far ahead and to the left of it as it points.
@@ -241,6 +245,7 @@ class Scene:
             deformation=motion,
             dynamic=Gaussians.concatenate(self.dynamic, twin),
             actors=(*self.actors, named),
+            frames=None,
         )
         return both.moved(new, ahead_m, left_m)
 
@@ -261,7 +266,7 @@ class Scene:
         painted = grey[..., None] * scale
         painted[:, 0] = ((light[:, None] * scale).clamp(max=1) - 0.5) / SH_C0
         sh[members] = painted
-        return replace(self, dynamic=replace(self.dynamic, sh=sh))
+        return replace(self, dynamic=replace(self.dynamic, sh=sh), frames=None)
 
     def with_standing(self, more: Gaussians) -> "Scene":
         """The scene with more of what never moves; the fewer coefficients of colour are filled with zeros."""
@@ -291,6 +296,7 @@ class Scene:
             dynamic=self.dynamic.and_more(gaussians),
             deformation=motion,
             actors=(*self.actors, actor),
+            frames=None,
         )
 
     def with_track(self, id: int, track: Track) -> "Scene":
@@ -310,6 +316,7 @@ class Scene:
             self,
             deformation=self.deformation.steered(id, track),
             actors=tuple(steered if each.id == id else each for each in self.actors),
+            frames=None,
         )
 
     def _members(self, actor: Actor) -> Bool[Tensor, " n"]:
@@ -328,6 +335,7 @@ class Scene:
             self,
             deformation=self.deformation.shifted(actor.id, by_m, turn_rad),
             actors=tuple(replace(a, track=track) if a.id == actor.id else a for a in self.actors),
+            frames=None,
         )
 
     def _retimed(self, actor: Actor, track: Track, later_s: float, slower: float) -> "Scene":

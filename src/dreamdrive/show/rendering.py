@@ -18,6 +18,7 @@ from dreamdrive.errors import InputError
 from dreamdrive.files.output import new_folder
 from dreamdrive.files.paths import inside
 from dreamdrive.names import Format, Show
+from dreamdrive.restore import Restorer
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.control import RATES_HZ
 from dreamdrive.scene.scene import Scene
@@ -56,6 +57,7 @@ def write_drive(
     options: RenderOptions,
     progress: Callable[[int], None],
     trust: SceneTrust | None = None,
+    restorer: Restorer | None = None,
 ) -> None:
     """Render a drive and write it; the result appears when it is whole, in place of one from here.
 
@@ -65,7 +67,7 @@ def write_drive(
     W, 3) in [0, 1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is
     nothing; ``alpha`` float32 (H, W), the share of the pixel that Gaussians cover; ``trust`` float32 (H // 8,
     W // 8), where it is shown, of blocks of pixels. ``render.json`` beside them has calibration, poses, times
-    and the PSNR to expect where trust is shown. One frame is held at a time.
+    and the PSNR to expect where trust is shown. One frame is held at a time. A restorer mends the colours.
     ``progress`` is called with the number of frames done.
     """
     camera = view_camera(scene.cameras[0], options.size)
@@ -76,7 +78,9 @@ def write_drive(
     def views() -> Iterator[SceneView | TrustedView]:
         for i, pose in enumerate(drive.path.world_from_camera):
             here, t_s = camera.at(pose), float(drive.path.times_s[i])
-            if trust is None:
+            if restorer is not None:
+                yield restorer.view(here, t_s)
+            elif trust is None:
                 yield render_scene(scene, here, t_s, part=part)
             else:
                 seen = trust.view(here, t_s)

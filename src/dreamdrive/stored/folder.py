@@ -199,6 +199,9 @@ def _tensors(scene: Scene) -> dict[str, dict[str, Tensor]]:
             tensors["exposure"]["camera"] = torch.from_numpy(scene.exposure.camera)
     if scene.residual is not None:
         tensors["residual"] = {"rms": torch.from_numpy(scene.residual)}
+    if scene.frames is not None:
+        kept = {str(view): frame for view, frame in enumerate(scene.frames) if frame}
+        tensors["frames"] = {k: torch.frombuffer(bytearray(v), dtype=torch.uint8) for k, v in kept.items()}
     return tensors
 
 
@@ -296,7 +299,7 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
         raise KeyError("no static or no dynamic Gaussians")
     ranges = {} if stored.sky is None else msgspec.structs.asdict(stored.sky)
     sky, exposure, motion = part("sky"), part("exposure"), part("deformation")
-    residual = part("residual")
+    residual, frames = part("residual"), part("frames")
     return Scene(
         static=build(Gaussians, static),
         dynamic=build(Gaussians, dynamic),
@@ -310,7 +313,14 @@ def _rebuild(stored: _StoredIndex, part: Callable[[str], dict[str, Tensor] | Non
         camera=None if stored.camera is None else np.array(stored.camera, dtype=np.int64),
         provenance=stored.provenance,
         residual=None if residual is None else residual["rms"].numpy(),
+        frames=None if frames is None else _frames(frames, len(stored.cameras)),
     )
+
+
+def _frames(part: dict[str, Tensor], count: int) -> tuple[bytes, ...]:
+    if strange := set(part) - {str(view) for view in range(count)}:
+        raise ValueError(f"frames are of no view: {', '.join(sorted(strange))[:80]}")
+    return tuple(part[k].numpy().tobytes() if (k := str(view)) in part else b"" for view in range(count))
 
 
 def _exposure(part: dict[str, Tensor]) -> Exposure:

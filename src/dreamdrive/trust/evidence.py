@@ -118,7 +118,7 @@ def seen_with(
 
 def rows_at(scene: Scene, t_s: float) -> Int[Tensor, " m"]:
     """Which of all Gaussians ``moment_of`` gives at a time."""
-    static = torch.arange(len(scene.static))
+    static = torch.arange(len(scene.static), device=scene.static.means.device)
     return torch.cat([static, len(static) + scene.dynamic.alive_at(t_s)])
 
 

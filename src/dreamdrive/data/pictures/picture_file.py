@@ -8,7 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Shaped
+from jaxtyping import Shaped, UInt8
 from PIL import Image, ImageOps
 
 from dreamdrive.data.pictures.exif import PILLOW_RAISES, quiet_pillow
@@ -62,7 +62,11 @@ def read_picture(path: Path, where: str = "") -> Shaped[np.ndarray, "h w *c"]:
 def read_pages(path: Path, where: str = "") -> tuple[Shaped[np.ndarray, "h w *c"], int]:
     """The picture as of ``read_picture``, and its number of pages: 1, or 2 for several."""
     where = where or str(path)
-    data = read_bytes(path, where, at_most=PICTURE_BYTES)
+    return decoded(read_bytes(path, where, at_most=PICTURE_BYTES), where)
+
+
+def decoded(data: bytes, where: str) -> tuple[Shaped[np.ndarray, "h w *c"], int]:
+    """The picture in a file's bytes as of ``read_picture``, and its number of pages: 1, or 2 for several."""
     if not data:
         raise InputError(f"{where} is empty; expected an image")
     if _cut_short(data):
@@ -99,7 +103,29 @@ def write_picture(
     options = [cv2.IMWRITE_JPEG_QUALITY, quality]
     if path.suffix.lower() == ".png":
         options = [] if compression is None else [cv2.IMWRITE_PNG_COMPRESSION, compression]
-    path.write_bytes(cv2.imencode(path.suffix, np.ascontiguousarray(picture), options)[1].tobytes())
+    path.write_bytes(_encoded(picture, path.suffix, options))
+
+
+def kept_frame(rgb: UInt8[np.ndarray, "h w 3"]) -> bytes:
+    """A recorded frame as it is kept with a scene: a JPEG; the same frame gives the same bytes."""
+    return _encoded(rgb[..., ::-1], ".jpg", [cv2.IMWRITE_JPEG_QUALITY, 95])
+
+
+def frame_of(kept: bytes, size: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"]:
+    """The RGB of a frame that was kept, of a width and height; ``InputError`` where it is none."""
+    header = parse_header(kept)
+    if header is None or (header.kind, header.width_px, header.height_px) != ("JPEG", *size):
+        raise InputError(f"a recorded frame is damaged: expected a JPEG of {size[0]}x{size[1]} pixels")
+    picture, _ = decoded(kept, "a recorded frame")
+    if picture.shape != (size[1], size[0], 3):
+        raise InputError(
+            f"a recorded frame is {picture.shape}; expected {size[0]}x{size[1]} pixels in colour"
+        )
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _encoded(picture: Shaped[np.ndarray, "h w *c"], suffix: str, options: list[int]) -> bytes:
+    return cv2.imencode(suffix, np.ascontiguousarray(picture), options)[1].tobytes()
 
 
 def _decoded_by_pillow(data: bytes, where: str) -> Shaped[np.ndarray, "h w *c"]:
