@@ -59,8 +59,8 @@ class Recordings:
         kept = scene.frames
         if kept is None or not any(kept):
             raise InputError(
-                "views are restored from the scene's recorded frames, and it holds none: it was changed, or an "
-                "earlier version made it; generate it again"
+                "views are restored from recorded frames, and the scene holds none: it was changed, or an earlier "
+                "version made it; generate it again"
             )
 
         @lru_cache(maxsize=_KEPT)

@@ -35,7 +35,8 @@ class Restorer:
         Raises:
             InputError: The scene was changed, or does not hold its recorded frames.
         """
-        network = load_restorer().to(device).to(memory_format=torch.channels_last)
+        network = load_restorer().to(device)
+        network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         return cls(Recordings.of(scene, evidence), network, device)
 
     def view(self, camera: Camera, t_s: float, besides: int | None = None) -> SceneView:
