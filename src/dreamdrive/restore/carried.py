@@ -15,7 +15,6 @@ from dreamdrive.data.pictures.picture_file import frame_of
 from dreamdrive.errors import InputError
 from dreamdrive.restore.network import CHANNELS, FRAMES, OF_FRAME, OF_VIEW
 from dreamdrive.scene.camera import NEAR_M, Camera
-from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import SceneView, moment_of, render_scene
 from dreamdrive.trust import GaussianEvidence, rows_at
@@ -59,8 +58,8 @@ class Recordings:
         kept = scene.frames
         if kept is None or not any(kept):
             raise InputError(
-                "views are restored from recorded frames, and the scene holds none: it was changed, or an earlier "
-                "version made it; generate it again"
+                "views are restored from recorded frames, and the scene holds none: it was changed, or made "
+                "by an earlier version; generate it again"
             )
 
         @lru_cache(maxsize=_KEPT)
@@ -92,7 +91,7 @@ class Recordings:
         known = [
             self.evidence.error.to(rows.device)[rows].sqrt()[:, None],
             torch.exp(-self.evidence.weight_px.to(rows.device)[rows] / _UNSEEN_PX)[:, None],
-            *(self._places(t_s, view) for view in views),
+            *(self._shifts_m(t_s, view) for view in views),
         ]
         seen = render_scene(
             self.scene, camera, t_s, channels=torch.cat(known, dim=1), moment=(gaussians, is_dynamic)
@@ -108,28 +107,35 @@ class Recordings:
         maps[6] = np.minimum(_ERROR * channels[..., 0], 1)
         maps[7] = channels[..., 1]
         for number, view in enumerate(views):
-            places = channels[..., 2 + 3 * number : 5 + 3 * number]
+            shift_m = channels[..., 2 + 3 * number : 5 + 3 * number]
             first = OF_VIEW + number * OF_FRAME
-            maps[first : first + OF_FRAME] = self._carried(view, camera, places, depth_m > 0)
+            maps[first : first + OF_FRAME] = self._carried(view, camera, depth_m, shift_m)
         return seen, maps
 
-    def _places(self, t_s: float, view: int) -> Float[Tensor, "m 3"]:
-        """Where what lives at a time is at the time of a recorded view, in its camera's frame."""
+    def _shifts_m(self, t_s: float, view: int) -> Float[Tensor, "m 3"]:
+        """How far what lives at a time is from there at the time of a recorded view."""
         scene, then_s = self.scene, float(self.scene.times_s[view])
-        means = scene.static_at(then_s).means
-        if len(scene.dynamic):
-            living: Gaussians = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
-            means = torch.cat([means, scene.moved_at(living, then_s).means])
-        pose = torch.from_numpy(scene.cameras[view].camera_from_world).to(means)
-        return means @ pose[:3, :3].T + pose[:3, 3]
+        static = scene.static_at(t_s).means
+        shifts = scene.static_at(then_s).means - static if scene.moves_per_frame else torch.zeros_like(static)
+        if not len(scene.dynamic):
+            return shifts
+        living = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
+        here, there = (scene.moved_at(living, each).means for each in (t_s, then_s))
+        return torch.cat([shifts, there - here])
 
     def _carried(
-        self, view: int, camera: Camera, places: Float[np.ndarray, "h w 3"], solid: np.ndarray
+        self,
+        view: int,
+        camera: Camera,
+        depth_m: Float[np.ndarray, "h w"],
+        shift_m: Float[np.ndarray, "h w 3"],
     ) -> Float[np.ndarray, "4 h w"]:
         """A recorded frame where it shows the same surface, and how surely it does, 0 to 1."""
-        there = self.scene.cameras[view]
-        turn = there.camera_from_world[:3, :3] @ camera.world_from_camera[:3, :3]
-        local = np.where(solid[..., None], places, _FAR_M * camera.rays() @ turn.T)
+        there, solid = self.scene.cameras[view], depth_m > 0
+        rays = camera.rays() @ camera.world_from_camera[:3, :3].T
+        away = np.where(solid, depth_m, _FAR_M)[..., None] * rays + camera.world_from_camera[:3, 3]
+        pose = there.camera_from_world
+        local = (away + shift_m) @ pose[:3, :3].T + pose[:3, 3]
         z_m = local[..., 2].astype(np.float32)
         ahead_m = np.maximum(z_m, NEAR_M)
         u = (local[..., 0] / ahead_m * there.fx_px + there.cx_px).astype(np.float32)
