@@ -126,6 +126,7 @@ def test_an_untrained_network_takes_a_little_from_sure_frames_alone() -> None:
 
 def test_a_mended_view_has_the_colours_of_the_network(tmp_path: Path) -> None:
     network = RestorerNetwork()
+    assert network.answer.bias is not None
     with torch.no_grad():
         network.answer.bias[:12] = 0.25  # of each of four pixels, in red, green and blue
         network.answer.bias[12:] = -30  # nothing is taken over

@@ -85,57 +85,55 @@ class Recordings:
         self, camera: Camera, t_s: float, besides: int | None = None
     ) -> tuple[SceneView, Float[np.ndarray, "16 h w"]]:
         """A view as it is, and what the restorer is told of it, float32 (see ``network.CHANNELS``)."""
-        gaussians, is_dynamic = moment_of(self.scene, t_s)
-        rows = rows_at(self.scene, t_s)
+        moment, rows = moment_of(self.scene, t_s), rows_at(self.scene, t_s)
         views = self.nearest(camera, t_s, besides)
-        known = [
+        evidence = [
             self.evidence.error.to(rows.device)[rows].sqrt()[:, None],
             torch.exp(-self.evidence.weight_px.to(rows.device)[rows] / _UNSEEN_PX)[:, None],
-            *(self._shifts_m(t_s, view) for view in views),
         ]
+        # What stands or is seen at the same time is not elsewhere: most views need no shifts.
+        elsewhere = [view for view in views if self.scene.times_s[view] != t_s and self._moves]
+        shifts = [self._shifts_m(moment[0].means, t_s, view) for view in elsewhere]
         seen = render_scene(
-            self.scene, camera, t_s, channels=torch.cat(known, dim=1), moment=(gaussians, is_dynamic)
+            self.scene, camera, t_s, channels=torch.cat([*evidence, *shifts], dim=1), moment=moment
         )
+        channels = (seen.channels / seen.alpha.clamp(min=1e-3)[..., None]).numpy()
         maps = np.zeros((CHANNELS, camera.height_px, camera.width_px), np.float32)
-        alpha = seen.alpha.clamp(min=1e-3)
-        channels = (seen.channels / alpha[..., None]).numpy()
-        depth_m = seen.seen_depth_m
-        maps[:3] = seen.colour.permute(2, 0, 1).numpy()
-        maps[3] = seen.alpha.numpy()
-        maps[4] = np.where(depth_m > 0, _NEAR_M / np.maximum(depth_m, _NEAR_M), 0)
-        maps[5] = (seen.dynamic_share / alpha).numpy()
-        maps[6] = np.minimum(_ERROR * channels[..., 0], 1)
-        maps[7] = channels[..., 1]
+        maps[:OF_VIEW] = _of_view(seen, channels)
         for number, view in enumerate(views):
-            shift_m = channels[..., 2 + 3 * number : 5 + 3 * number]
+            shift_m = None
+            if view in elsewhere:
+                first = 2 + 3 * elsewhere.index(view)
+                shift_m = channels[..., first : first + 3]
             first = OF_VIEW + number * OF_FRAME
-            maps[first : first + OF_FRAME] = self._carried(view, camera, depth_m, shift_m)
+            maps[first : first + OF_FRAME] = self._carried(view, camera, seen.seen_depth_m, shift_m)
         return seen, maps
 
-    def _shifts_m(self, t_s: float, view: int) -> Float[Tensor, "m 3"]:
+    @property
+    def _moves(self) -> bool:
+        return len(self.scene.dynamic) > 0 or self.scene.moves_per_frame
+
+    def _shifts_m(self, means: Float[Tensor, "m 3"], t_s: float, view: int) -> Float[Tensor, "m 3"]:
         """How far what lives at a time is from there at the time of a recorded view."""
         scene, then_s = self.scene, float(self.scene.times_s[view])
-        static = scene.static_at(t_s).means
-        shifts = scene.static_at(then_s).means - static if scene.moves_per_frame else torch.zeros_like(static)
-        if not len(scene.dynamic):
-            return shifts
         living = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
-        here, there = (scene.moved_at(living, each).means for each in (t_s, then_s))
-        return torch.cat([shifts, there - here])
+        there = scene.moved_at(living, then_s).means if len(living) else living.means
+        return torch.cat([scene.static_at(then_s).means, there]) - means
 
     def _carried(
         self,
         view: int,
         camera: Camera,
         depth_m: Float[np.ndarray, "h w"],
-        shift_m: Float[np.ndarray, "h w 3"],
+        shift_m: Float[np.ndarray, "h w 3"] | None,
     ) -> Float[np.ndarray, "4 h w"]:
         """A recorded frame where it shows the same surface, and how surely it does, 0 to 1."""
         there, solid = self.scene.cameras[view], depth_m > 0
         rays = camera.rays() @ camera.world_from_camera[:3, :3].T
         away = np.where(solid, depth_m, _FAR_M)[..., None] * rays + camera.world_from_camera[:3, 3]
+        away = away if shift_m is None else away + shift_m
         pose = there.camera_from_world
-        local = (away + shift_m) @ pose[:3, :3].T + pose[:3, 3]
+        local = away @ pose[:3, :3].T + pose[:3, 3]
         z_m = local[..., 2].astype(np.float32)
         ahead_m = np.maximum(z_m, NEAR_M)
         u = (local[..., 0] / ahead_m * there.fx_px + there.cx_px).astype(np.float32)
@@ -163,3 +161,13 @@ class Recordings:
             depth_m = seen.seen_depth_m
             self._inverse[view] = np.where(depth_m > 0, 1 / np.maximum(depth_m, NEAR_M), 0).astype(np.float32)
         return self._inverse[view]
+
+
+def _of_view(seen: SceneView, channels: Float[np.ndarray, "h w _"]) -> Float[np.ndarray, "8 h w"]:
+    """What the restorer is told of the view itself; the channels begin with error and what was unseen."""
+    depth_m = seen.seen_depth_m
+    inverse = np.where(depth_m > 0, _NEAR_M / np.maximum(depth_m, _NEAR_M), 0)
+    moves = (seen.dynamic_share / seen.alpha.clamp(min=1e-3)).numpy()
+    error = np.minimum(_ERROR * channels[..., 0], 1)
+    rest = [seen.alpha.numpy(), inverse, moves, error, channels[..., 1]]
+    return np.concatenate([seen.colour.permute(2, 0, 1).numpy(), np.stack(rest)]).astype(np.float32)
