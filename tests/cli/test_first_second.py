@@ -63,6 +63,7 @@ WRONG = """
     prior convert none.safetensors o
     train street --data none -o o
     train photo --pictures none -o o
+    train restorer --drives none -o o
 """
 RUN = """
 import json, sys

@@ -117,11 +117,17 @@ WRITERS = {
         goes_on=True,
         moments=8,  # a run takes ten seconds: it starts another process
     ),
+    "train restorer": Writer(
+        "train restorer --drives IN/drive/frames --each 1 --steps 1 --batch 1 -o OUT",
+        goes_on=True,
+        moments=2,  # it makes three scenes, in two other processes
+    ),
 }
 
 
 _INPUTS = (
     "world make --seed 1 --frames 3 --size 64x40 --one-ray -o IN/world",
+    "world make --seed 1 --frames 3 --size 240x144 --one-ray -o IN/drive",
     "world make --seed 1 --frames 2 --size 96x54 --one-ray --cameras surround -o IN/surround",
     "generate IN/world --knowledge none --quality draft -o IN/run",
     "export IN/surround --to nuscenes -o IN/street",

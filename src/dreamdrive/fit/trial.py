@@ -110,7 +110,7 @@ def trial(
     small, shown = _reduced(clip, geometry, options.width_px)
     held_out = small.held_out.copy()
     held_out[list(frames)] = True
-    if (~held_out).sum() < 2:
+    if not frames or (~held_out).sum() < 2:
         return None
     small = replace(small, held_out=held_out)
     gaussians = initialise(small, shown, seeds)

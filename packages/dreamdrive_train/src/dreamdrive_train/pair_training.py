@@ -19,7 +19,7 @@ from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.files.step_log import StepLog
 from dreamdrive.models import load_checkpoint, save_checkpoint
 from dreamdrive.street_network import StreetNetwork, load_knowledge
-from dreamdrive_train.pairs_file import PlaneRange
+from dreamdrive_train.pairs_file import CROP_PX, PlaneRange
 
 _LOG = "losses.jsonl"
 _LEVELS = 3
@@ -43,7 +43,7 @@ class PairTraining:
 
     steps: int = 12_000
     batch: int = 4
-    crop_px: int = 144
+    crop_px: int = CROP_PX
     rate: float = 4e-4
     warm: int = 200
     perceptual: float = 0.2

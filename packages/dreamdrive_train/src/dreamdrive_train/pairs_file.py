@@ -17,6 +17,8 @@ from dreamdrive.files.output import claim_folder, new_file
 Planes = UInt8[np.ndarray, "p h w"]
 Source = Callable[[np.random.Generator], Iterator[Planes]]
 """Makes the pairs of one source; what is random comes from the generator. It can be sent to a process."""
+CROP_PX = 144
+"""Side of the square that is cut from a pair, unless told."""
 
 
 @dataclass(frozen=True)

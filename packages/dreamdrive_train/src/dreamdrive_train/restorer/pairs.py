@@ -15,6 +15,7 @@ from jaxtyping import UInt8
 
 from dreamdrive.build import Built, build_scene
 from dreamdrive.data.clip_reader import read_clip
+from dreamdrive.errors import InputError
 from dreamdrive.options import QUALITIES
 from dreamdrive.prior import appearance
 from dreamdrive.restore import CHANNELS, Recordings
@@ -22,7 +23,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
 from dreamdrive.trust import evidence_of
-from dreamdrive_train.pairs_file import PlaneRange, Source
+from dreamdrive_train.pairs_file import CROP_PX, PlaneRange, Source
 from streetworld import make_street
 from streetworld.corruption import corrupt, parse_corruption
 
@@ -108,6 +109,11 @@ def drive_pairs(
 ) -> Iterator[UInt8[np.ndarray, "20 h w"]]:
     """Pairs of a recorded drive, of whose frames every so many make the scene."""
     clip = read_clip(path)
+    if min(clip.size) < CROP_PX:
+        width, height = clip.size
+        raise InputError(
+            f"{path} is {width}x{height}; expected {CROP_PX} pixels on either side, to learn from"
+        )
     held_out = np.arange(len(clip)) % every != 0
     clip = replace(clip, held_out=held_out)
     clip = clip.with_features(appearance=appearance(clip.frames, clip.valid))
