@@ -55,7 +55,7 @@ class RestorerPairs:
     aside_m: float = 3.5
     down_m: tuple[float, float] = (-0.8, 0.4)
     turned_rad: float = 0.07
-    frames: int = 24
+    frames: int = 16
     hold_out: int = 8
     sizes: tuple[tuple[int, int], ...] = ((320, 192), (320, 192), (384, 216))
 
