@@ -9,7 +9,7 @@ import torch
 from dreamdrive_bench.common.places import DATA
 from dreamdrive_bench.gpu.figures import Figures
 from dreamdrive_bench.training import street
-from dreamdrive_bench.training.limit import Limit
+from dreamdrive_bench.training.limit import SAVING_S, Limit
 from dreamdrive_bench.training.packed import MOST_BYTES, save_pack, unpack
 from dreamdrive_bench.training.street import StreetPlan
 from dreamdrive_train.street_network import DrawnOptions, LoaderOptions, StreetTraining, TrainingOptions
@@ -63,7 +63,7 @@ def test_a_training_is_stopped_by_its_limit_and_goes_on(pack, tmp_path):
 def test_as_many_steps_are_taken_as_fit_unless_they_are_told(pack, tmp_path):
     unpack(pack, tmp_path)
     training = StreetTraining((tmp_path / "real",), tmp_path / "network", PLAN.options, init=PLAN.init)
-    assert street._steps(training, CPU, Limit(street._SAVING_S + 60.0), PLAN) > 2
+    assert street._steps(training, CPU, Limit(SAVING_S + 60.0), PLAN) > 2
     assert street._steps(training, CPU, Limit(1.0), PLAN) == 1
     assert street._steps(training, CPU, Limit(1.0), replace(PLAN, steps=7)) == 7
     assert not training.out.exists()

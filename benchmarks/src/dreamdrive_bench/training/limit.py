@@ -1,13 +1,17 @@
 """How long a training may take, and how far it is, told while it goes."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from dreamdrive_bench.gpu.figures import Figures
 
 _SAID_EACH_S = 5.0
+SAVING_S = 20.0
+"""What the end of a training takes."""
+_SURE = 0.85
+"""Share of the rest that is filled with steps."""
 
 
 @dataclass(frozen=True)
@@ -64,3 +68,10 @@ class Pace:
         rate = (done - first) / (now - since) if done > first else None
         told = {"steps": done, "of": total, "steps_per_second": rate}
         self.figures.put(self.name, told | self.more())
+
+
+def steps_that_fit(times_s: Sequence[float], limit: Limit) -> int:
+    """How many steps fit into what is left, from the times of some; the later half of them counts."""
+    later = times_s[len(times_s) // 2 :]
+    per_second = (len(later) - 1) / (later[-1] - later[0])
+    return max(1, int(_SURE * per_second * (limit.left_s - SAVING_S)))

@@ -2,10 +2,10 @@
 
 ``training NAME --make --pack FILE`` makes a pack here, of at most ``--most-mb``. ``training NAME --pack FILE
 --runs DIR --device cuda --minutes 8 --json FILE`` trains there within that time: ``street`` the street
-network, ``perception`` the networks of that experiment. Figures are in the file as they come: how fast it
-goes, losses, what is judged. The same command goes on in the same ``--runs``; ``perception`` also takes the
-``--found`` figures of an earlier call. All is seeded; only how many steps are taken and streets drawn may
-follow from the time, and is told.
+network, ``restorer`` what mends views, ``perception`` the networks of that experiment. Figures are in the
+file as they come: how fast it goes, losses, what is judged. The same command goes on in the same ``--runs``;
+``perception`` also takes the ``--found`` figures of an earlier call. All is seeded; only how many steps are
+taken and streets drawn may follow from the time, and is told.
 """
 
 # Nothing here needs the compiled core before it is there.
@@ -48,7 +48,8 @@ def main() -> int:
     with computing_on(options.device) as device:
         figures = Figures(options.json or options.runs / f"{options.name}.json", device)
         figures.put("machine", machine())
-        train, done = {"street": _train_street, "perception": _train_perception}[options.name], False
+        trainings = {"street": _train_street, "restorer": _train_restorer, "perception": _train_perception}
+        train, done = trainings[options.name], False
         with figures.attempt(options.name):
             done = train(options, device, limit, figures)
         figures.put("seconds", limit.spent_s)
@@ -57,7 +58,7 @@ def main() -> int:
 
 def _options() -> argparse.Namespace:
     parser = parser_of(__doc__, runs="runs/training")
-    parser.add_argument("name", choices=("street", "perception"))
+    parser.add_argument("name", choices=("street", "restorer", "perception"))
     parser.add_argument("--pack", type=Path, required=True, metavar="FILE")
     parser.add_argument("--make", action="store_true", help="make the pack, train nothing")
     parser.add_argument("--most-mb", type=float, default=24.0, metavar="MB", help="that a pack may take")
@@ -65,19 +66,24 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--device", default="cpu", metavar="cpu|cuda")
     parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="that all may take")
     parser.add_argument("--core", action="store_true", help="compile the core of this checkout before")
-    street = parser.add_argument_group("street")
+    parser.add_argument(
+        "--sets",
+        type=Path,
+        metavar="DIR",
+        help="with --make: the --runs of `perception`, or the pairs of `dreamdrive train restorer`",
+    )
+    street = parser.add_argument_group("street, restorer")
     street.add_argument("--streets", type=int, default=192, metavar="N", help="drawn to learn from, at most")
     street.add_argument("--steps", type=int, metavar="N", help="as many as fit, if not told")
     street.add_argument("--batch", type=int, default=16, metavar="N", help="pictures a step")
-    street.add_argument("--rate", type=float, default=1e-3, metavar="R", help="largest step of the optimiser")
+    street.add_argument(
+        "--rate", type=float, default=1e-3, metavar="R", help="largest step of the optimiser, for street"
+    )
     street.add_argument("--seed", type=int, default=0, metavar="S")
     street.add_argument(
         "--init", type=Path, metavar="FILE", help="weights to start from; the twin's if not told"
     )
     perception = parser.add_argument_group("perception")
-    perception.add_argument(
-        "--sets", type=Path, metavar="DIR", help="with --make: the --runs of `perception`"
-    )
     perception.add_argument("--protocol", type=Path, metavar="FILE", help="longer.json if not told")
     perception.add_argument("--found", type=Path, metavar="FILE", help="figures of an earlier call")
     return parser.parse_args()
@@ -96,13 +102,15 @@ def _make(options: argparse.Namespace) -> int:
         from dreamdrive_bench.training import street
 
         size, quality = street.make_pack(options.pack, most, options.wheels)
+    elif options.sets is None:
+        raise InputError("--sets is missing; expected the folder that was filled before, see --help")
+    elif options.name == "restorer":
+        from dreamdrive_bench.training import restorer
+
+        size, quality = restorer.make_pack(options.pack, options.sets, most, options.wheels)
     else:
         from dreamdrive_bench.training import perception
 
-        if options.sets is None:
-            raise InputError(
-                "--sets is missing; expected the folder that `perception --only sets` has filled"
-            )
         protocol = _protocol(options)
         size, quality = perception.make_pack(options.pack, options.sets, protocol, most, options.wheels)
     pictures = "pictures as they are" if quality is None else f"pictures as WebP of quality {quality}"
@@ -120,6 +128,17 @@ def _train_street(
     training = replace(plan.options, rate=options.rate, seed=options.seed, loader=loader)
     plan = replace(plan, options=training, init=options.init or plan.init)
     return train(options.pack, options.runs / "street", device, limit, figures, plan)
+
+
+def _train_restorer(
+    options: argparse.Namespace, device: "torch.device", limit: Limit, figures: Figures
+) -> bool:
+    from dreamdrive_bench.training.restorer import RestorerPlan, train
+
+    plan = RestorerPlan(steps=options.steps)
+    training = replace(plan.options, seed=options.seed, batch=options.batch)
+    plan = replace(plan, options=training)
+    return train(options.pack, options.runs / "restorer", device, limit, figures, plan)
 
 
 def _train_perception(

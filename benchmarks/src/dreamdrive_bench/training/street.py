@@ -19,7 +19,7 @@ from dreamdrive.files.output import scratch_beside
 from dreamdrive_bench.common.places import DATA, ROOT
 from dreamdrive_bench.common.twin import TWIN
 from dreamdrive_bench.gpu.figures import Figures
-from dreamdrive_bench.training.limit import Limit, Pace
+from dreamdrive_bench.training.limit import SAVING_S, Limit, Pace, steps_that_fit
 from dreamdrive_bench.training.packed import MOST_BYTES, save_pack, unpack, with_packages
 from dreamdrive_train.street_network import (
     LOG,
@@ -55,8 +55,6 @@ _DRAWN_SHARE = 2.0
 """How often drawn pictures are taken against all real ones."""
 _DRAWING = 0.4
 """Share of the time after which no more streets are drawn."""
-_SAVING_S, _SURE = 20.0, 0.85
-"""What the end takes, and which share of the rest is filled with steps."""
 _JUDGEMENTS = 4
 
 
@@ -131,7 +129,7 @@ def train(
     found = train_street(
         replace(training, options=options),
         device=device,
-        stop=lambda: limit.left_s < _SAVING_S,
+        stop=lambda: limit.left_s < SAVING_S,
         progress=pace,
     )
     if found is None:
@@ -202,9 +200,7 @@ def _steps(training: StreetTraining, device: torch.device, limit: Limit, plan: S
         options = replace(plan.options, steps=plan.tried, validate_each=plan.tried)
         tried = replace(training, out=thrown / "network", options=options)
         train_street(tried, device=device, stop=stop, progress=note)
-    later = times[len(times) // 2 :]
-    per_second = (len(later) - 1) / (later[-1] - later[0])
-    return max(1, int(_SURE * per_second * (limit.left_s - _SAVING_S)))
+    return steps_that_fit(times, limit)
 
 
 def _last(log: Path) -> dict[str, Any]:

@@ -16,8 +16,7 @@ from dreamdrive.files.given import WANTED, check_there
 from dreamdrive.names import DeviceName
 
 if TYPE_CHECKING:
-    from dreamdrive_train.pair_training import PairTask, PairTraining
-    from dreamdrive_train.pairs_file import Source
+    from dreamdrive_train.pairs import PairTask, PairTraining, Source
 
 
 def street(
@@ -135,7 +134,7 @@ def photo(
         check_there(path, "a folder of pictures of streets")
     use_all_cores()
     from dreamdrive.data.pictures.images import SUFFIXES
-    from dreamdrive_train.pair_training import PairTraining
+    from dreamdrive_train.pairs import PairTraining
     from dreamdrive_train.photo import FIRST_SEED, PHOTO, PairOptions, photo_pairs
 
     found = sorted(p for folder in pictures for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES)
@@ -185,7 +184,7 @@ def restorer(
     if not drives and streets < 1:
         raise InputError("nothing to train on; give --drives VIDEO|DIR, --streets N or both")
     use_all_cores()
-    from dreamdrive_train.pair_training import PairTraining
+    from dreamdrive_train.pairs import PairTraining
     from dreamdrive_train.restorer import FIRST_SEED, RESTORER, RestorerPairs, restorer_pairs
 
     seeds = range(FIRST_SEED, FIRST_SEED + streets)
@@ -216,8 +215,7 @@ def _learn(
     from dreamdrive.compute.machine import available_cores
     from dreamdrive.files.output import claim_folder
     from dreamdrive.run import only_run
-    from dreamdrive_train.pair_training import train_on_pairs
-    from dreamdrive_train.pairs_file import make_pairs
+    from dreamdrive_train.pairs import make_pairs, train_on_pairs
 
     console, name = plain(), Path(task.file).stem
     with only_run(out), computing_on(device) as where, asked_to_stop() as stop, Bars(console) as bars:

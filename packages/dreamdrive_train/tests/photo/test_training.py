@@ -14,8 +14,7 @@ from dreamdrive.prior.photo.fill import inpainted
 from dreamdrive.prior.photo.network import CHANNELS, Before, PhotoNetwork, load_photo_network, mended, told
 from dreamdrive.prior.photo.sight import sight_of
 from dreamdrive.street_network import SHIPPED
-from dreamdrive_train.pair_training import PairTraining, batch_of, train_on_pairs
-from dreamdrive_train.pairs_file import make_pairs
+from dreamdrive_train.pairs import PairTraining, batch_of, make_pairs, train_on_pairs
 from dreamdrive_train.photo import PHOTO, PairOptions, photo_pairs
 from dreamdrive_train.photo.pairs import FIRST_SEED, street_pairs
 from streetworld import make_street

@@ -13,8 +13,7 @@ from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.errors import InputError
 from dreamdrive.restore import CHANNELS, RestorerNetwork
 from dreamdrive.street_network import SHIPPED
-from dreamdrive_train.pair_training import PairTraining, batch_of, train_on_pairs
-from dreamdrive_train.pairs_file import make_pairs
+from dreamdrive_train.pairs import PairTraining, batch_of, make_pairs, train_on_pairs
 from dreamdrive_train.restorer import FIRST_SEED, RESTORER, RestorerPairs, restorer_pairs
 from dreamdrive_train.restorer.pairs import drive_pairs, street_pairs
 from streetworld import make_street

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from dreamdrive.prior.photo.network import PhotoNetwork
-from dreamdrive_train.pair_training import PairTask
+from dreamdrive_train.pairs import PairTask
 from dreamdrive_train.photo.pairs import RANGE
 
 

@@ -28,7 +28,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.geometry import Ground
 from dreamdrive.scene.street.street_class import StreetClass
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
-from dreamdrive_train.pairs_file import PlaneRange, Source
+from dreamdrive_train.pairs import PlaneRange, Source
 from dreamdrive_train.street_network import CLASS_OF
 from streetworld import make_street
 

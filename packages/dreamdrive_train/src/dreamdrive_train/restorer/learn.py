@@ -4,7 +4,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from dreamdrive.restore import RestorerNetwork
-from dreamdrive_train.pair_training import PairTask
+from dreamdrive_train.pairs import PairTask
 from dreamdrive_train.restorer.pairs import RANGE
 
 _MOVES, _ERROR, _UNSEEN = 5, 6, 7

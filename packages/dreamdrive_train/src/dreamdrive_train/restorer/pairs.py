@@ -23,7 +23,7 @@ from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
 from dreamdrive.trust import evidence_of
-from dreamdrive_train.pairs_file import CROP_PX, PlaneRange, Source
+from dreamdrive_train.pairs import CROP_PX, PlaneRange, Source
 from streetworld import make_street
 from streetworld.corruption import corrupt, parse_corruption
 

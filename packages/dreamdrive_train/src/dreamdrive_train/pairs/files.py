@@ -54,7 +54,16 @@ class PlaneRange:
             top, left = (int(generator.integers(most // 2 + 1)) * 2 for most in (rows, columns))
             cut = planes[:, top : top + side_px, left : left + side_px]
             cuts.append(cut[:, :, ::-1] if generator.integers(2) else cut)
-        values = torch.from_numpy(np.stack(cuts).astype(np.float32) / 255)
+        return self._unpacked(np.stack(cuts))
+
+    def whole(
+        self, pair: Path
+    ) -> tuple[Float[Tensor, "1 c h w"], Float[Tensor, "1 3 h w"], Float[Tensor, "1 1 h w"]]:
+        """What a pair holds: what the network is told, the truth and what of it counts."""
+        return self._unpacked(np.load(pair, allow_pickle=False)[None])
+
+    def _unpacked(self, planes: UInt8[np.ndarray, "n p h w"]) -> tuple[Tensor, Tensor, Tensor]:
+        values = torch.from_numpy(planes.astype(np.float32) / 255)
         low, high = (torch.tensor(each)[:, None, None] for each in (self.low, self.high))
         return low + values[:, :-4] * (high - low), values[:, -4:-1], values[:, -1:]
 

@@ -19,7 +19,7 @@ from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.files.step_log import StepLog
 from dreamdrive.models import load_checkpoint, save_checkpoint
 from dreamdrive.street_network import StreetNetwork, load_knowledge
-from dreamdrive_train.pairs_file import CROP_PX, PlaneRange
+from dreamdrive_train.pairs.files import CROP_PX, PlaneRange
 
 _LOG = "losses.jsonl"
 _LEVELS = 3
