@@ -17,6 +17,7 @@ _NEAREST_M, _FARTHEST_M = 0.3, 60.0
 _FREE_M = 4.5  # beside the path nothing stands that is made up: views aside drive there
 _LOW_M = 0.3  # above the road: what lies on it
 _CELL_M = 0.5
+_MOST_CELLS = 1 << 20  # along an axis
 _SOFT = 0.3  # share of the length over which it ends
 
 
@@ -52,21 +53,22 @@ def beyond_borders(scene: Scene, geometry: Geometry, views: Sequence[int], lengt
     users are left out: they would be cut twice.
     """
     source = _source(scene, geometry)
-    taken = np.empty((0, 3), np.int64)
+    taken = np.empty(0, np.int64)
     for view in views:
         for side in (1, -1):
             border = _Border.of(scene.cameras[view], scene.up, side)
-            added = _mirrored(source, border, length_m)
-            free = (
-                _unseen(added, scene.cameras)
-                & ~_among(_cells(added), taken)
-                & _off_the_way(added, scene, geometry)
-            )
-            added = added.select(torch.from_numpy(np.flatnonzero(free)))
+            added = _chosen(_mirrored(source, border, length_m), taken, scene, geometry)
             if len(added):
-                taken = np.unique(np.concatenate([taken, _cells(added)]), axis=0)
+                taken = np.union1d(taken, _cells(added))
                 scene = scene.with_standing(added)
     return scene
+
+
+def _chosen(added: Gaussians, taken: Int[np.ndarray, " m"], scene: Scene, geometry: Geometry) -> Gaussians:
+    """Those that no view shows, in cells that are not taken yet and off the way; the dear test comes last."""
+    added = added.select(torch.from_numpy(np.flatnonzero(~np.isin(_cells(added), taken))))
+    added = added.select(torch.from_numpy(np.flatnonzero(_off_the_way(added, scene, geometry))))
+    return added.select(torch.from_numpy(np.flatnonzero(_unseen(added, scene.cameras))))
 
 
 def _source(scene: Scene, geometry: Geometry) -> Gaussians:
@@ -146,14 +148,7 @@ def _off_the_way(added: Gaussians, scene: Scene, geometry: Geometry) -> Bool[np.
     return low | (away > _FREE_M)
 
 
-def _cells(gaussians: Gaussians) -> Int[np.ndarray, "n 3"]:
-    return np.floor(gaussians.means.double().numpy() / _CELL_M).astype(np.int64)
-
-
-def _among(cells: Int[np.ndarray, "n 3"], taken: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " n"]:
-    """Which cells are taken already."""
-    if not len(taken):
-        return np.zeros(len(cells), bool)
-    both = np.concatenate([taken, cells])
-    _, number = np.unique(both, axis=0, return_inverse=True)
-    return np.isin(number[len(taken) :], number[: len(taken)])
+def _cells(gaussians: Gaussians) -> Int[np.ndarray, " n"]:
+    """The cell of space that each is in, as one number."""
+    steps = np.floor(gaussians.means.double().numpy() / _CELL_M).astype(np.int64)
+    return (steps & _MOST_CELLS - 1) @ np.array([1, _MOST_CELLS, _MOST_CELLS**2])

@@ -16,9 +16,9 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene
 
 _SOLID_ALPHA = 0.5
-_LEAST_PX = 12
-_AROUND_PX = 5.0
-_SPACING_PX = 2
+_COARSER = 2  # than the recording are views that holes are looked for in: a guess is no finer
+_LEAST_PX = 3
+_AROUND_PX = 2.5
 _SAME = 0.8  # of the depth of a hole, from which on what lies beside it goes on there
 _OPAQUE = 0.9
 _BEHIND = 0.99  # of the depth that a view sees there
@@ -40,7 +40,7 @@ def without_holes(
     seen = [_Recorded.of(there, view) for view in np.flatnonzero(~scene.held_out).tolist()]
     for view in reversed(views):
         for shift_m in shifts_m:
-            camera = scene.cameras[view].moved(shift_m)
+            camera = _coarse(scene.cameras[view]).moved(shift_m)
             added = _filling(scene.on(device), geometry, camera, view)
             if added is not None:
                 hidden = np.all([each.hides(added.means.double().numpy()) for each in seen], axis=0)
@@ -57,10 +57,11 @@ class _Recorded:
 
     @staticmethod
     def of(scene: Scene, view: int) -> "_Recorded":
-        seen = render_scene(scene, scene.cameras[view], float(scene.times_s[view]), part="static")
+        camera = _coarse(scene.cameras[view])
+        seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
         far = torch.where(seen.alpha > _OPAQUE, seen.depth_m, torch.inf).numpy()
         # What is put at an outline would reach out of it.
-        return _Recorded(scene.cameras[view], cv2.dilate(far, np.ones((3, 3), np.uint8)))
+        return _Recorded(camera, cv2.dilate(far, np.ones((3, 3), np.uint8)))
 
     def hides(self, places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         """Which places it does not see: outside of it, or behind what stands."""
@@ -72,11 +73,17 @@ class _Recorded:
         return hidden
 
 
+def _coarse(camera: Camera) -> Camera:
+    """The same view at the resolution of guesses."""
+    return camera.resized(max(1, camera.width_px // _COARSER), max(1, camera.height_px // _COARSER))
+
+
 def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gaussians | None:
     """Gaussians for the holes of a view; None where there are none, or nothing is around them."""
     seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
     depth_m, alpha = seen.depth_m.numpy(), seen.alpha.numpy()
-    hole = (alpha < _SOLID_ALPHA) & ~geometry.sky[view]
+    sky = cv2.resize(geometry.sky[view].astype(np.uint8), alpha.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    hole = (alpha < _SOLID_ALPHA) & (sky == 0)
     if hole.sum() < _LEAST_PX:
         return None
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -94,10 +101,8 @@ def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gau
     picture[rows[there], columns[there]] = picture[rows[there], inside[there]]
     wide[rows[there], columns[there]] = False
     picture = cv2.inpaint(picture, wide.astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
-    some = (rows % _SPACING_PX == 0) & (columns % _SPACING_PX == 0)
-    rows, columns = rows[some], columns[some]
     pixels = np.column_stack([columns + 0.5, rows + 0.5, z_m[rows, columns]])
-    return surface(camera, pixels, picture[rows, columns] / 255.0, view, _SPACING_PX)
+    return surface(camera, pixels, picture[rows, columns] / 255.0, view)
 
 
 def _behind(
