@@ -26,11 +26,16 @@ _BEHIND = 0.99  # of the depth that a view sees there
 
 @torch.no_grad()
 def without_holes(
-    scene: Scene, geometry: Geometry, views: Sequence[int], shifts_m: Sequence[float], device: torch.device
+    scene: Scene,
+    geometry: Geometry,
+    views: Sequence[int],
+    shifts_m: Sequence[float],
+    users: Bool[torch.Tensor, " n"],
+    device: torch.device,
 ) -> Scene:
     """The scene with the holes of recorded views filled that are moved to the right, one after the other.
 
-    What a recorded view looks through stays free.
+    What a recorded view looks through stays free. What is of road users, ``users``, does not go on.
 
     A hole is what Gaussians cover less than half of, where the view from the path shows no sky: what is far
     is at the same pixel there. Depth is that of the farther side in each row, for what is nearer ends there,
@@ -41,7 +46,7 @@ def without_holes(
     for view in reversed(views):
         for shift_m in shifts_m:
             camera = _coarse(scene.cameras[view]).moved(shift_m)
-            added = _filling(scene.on(device), geometry, camera, view)
+            added = _filling(scene.on(device), geometry, camera, view, users)
             if added is not None:
                 hidden = np.all([each.hides(added.means.double().numpy()) for each in seen], axis=0)
                 scene = scene.with_standing(added.select(torch.from_numpy(np.flatnonzero(hidden))))
@@ -78,16 +83,22 @@ def _coarse(camera: Camera) -> Camera:
     return camera.resized(max(1, camera.width_px // _COARSER), max(1, camera.height_px // _COARSER))
 
 
-def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gaussians | None:
+def _filling(
+    scene: Scene, geometry: Geometry, camera: Camera, view: int, users: Bool[torch.Tensor, " n"]
+) -> Gaussians | None:
     """Gaussians for the holes of a view; None where there are none, or nothing is around them."""
-    seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
+    marks = torch.zeros(len(scene.static), 1)
+    marks[: len(users), 0] = users.float()
+    t_s = float(scene.times_s[view])
+    seen = render_scene(scene, camera, t_s, exposure=False, part="static", channels=marks)
     depth_m, alpha = seen.depth_m.numpy(), seen.alpha.numpy()
     sky = cv2.resize(geometry.sky[view].astype(np.uint8), alpha.shape[::-1], interpolation=cv2.INTER_NEAREST)
     hole = (alpha < _SOLID_ALPHA) & (sky == 0)
     if hole.sum() < _LEAST_PX:
         return None
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    known = ~wide & (alpha > _SOLID_ALPHA) & (depth_m > 0)
+    user = seen.channels[..., 0].numpy() > _SOLID_ALPHA
+    known = ~wide & ~user & (alpha > _SOLID_ALPHA) & (depth_m > 0)
     z_m, beside = _behind(depth_m, known, hole)
     if geometry.ground is not None:
         z_m = np.minimum(z_m, geometry.ground.depth_m(camera))
@@ -100,7 +111,7 @@ def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gau
     picture = seen.picture
     picture[rows[there], columns[there]] = picture[rows[there], inside[there]]
     wide[rows[there], columns[there]] = False
-    picture = cv2.inpaint(picture, wide.astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
+    picture = cv2.inpaint(picture, (wide | user).astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
     pixels = np.column_stack([columns + 0.5, rows + 0.5, z_m[rows, columns]])
     return surface(camera, pixels, picture[rows, columns] / 255.0, view)
 
