@@ -62,7 +62,7 @@ class _Recorded:
 
     @staticmethod
     def of(scene: Scene, view: int) -> "_Recorded":
-        camera = _coarse(scene.cameras[view])
+        camera = scene.cameras[view]
         seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
         far = torch.where(seen.alpha > _OPAQUE, seen.depth_m, torch.inf).numpy()
         # What is put at an outline would reach out of it.
