@@ -128,6 +128,24 @@ def test_road_users_are_not_cut_twice(street: tuple[Scene, Geometry]) -> None:
     assert len(beyond_borders(scene, users, [0], 9.0).static) == len(scene.static)
 
 
+def test_near_the_path_walls_go_on_and_trees_do_not(street: tuple[Scene, Geometry]) -> None:
+    scene, geometry = street
+    along, up = np.arange(9, 18, 0.2), np.arange(-1.5, 1, 0.2)
+    places = np.stack(np.meshgrid([6.0], up, along), -1).reshape(-1, 3)
+    spread = np.random.default_rng(0).uniform(-1.4, 1.4, len(places))
+    tree = places + spread[:, None] * [1.0, 0, 0]
+    path = scene.trajectory.world_from_camera[:, :3, 3]
+    near = []
+    for each in (places, tree):
+        made = beyond_borders(replace(scene, static=balls(each, np.ones_like(each))), geometry, [0], 9.0)
+        added = made.static.means[len(each) :, [0, 2]].double().numpy()
+        assert len(added)
+        away = np.linalg.norm(added[:, None] - path[None, :, [0, 2]], axis=2).min(axis=1)
+        near.append(int((away < 7.9).sum()))
+    assert near[0] > 50
+    assert near[1] == 0
+
+
 CAR_M, AT_M = 3.0, 4.0
 
 

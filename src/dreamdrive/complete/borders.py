@@ -14,7 +14,9 @@ from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 
 _NEAREST_M, _FARTHEST_M = 0.3, 60.0
-_FREE_M = 8.0  # beside the path no copy stands: views aside drive there, and near them a tree is tufts
+_FREE_M = 4.5  # beside the path no copy stands: views aside drive there
+_NEAR_M = 8.0  # beside the path copies are walls alone: so near to views aside a tree is tufts
+_WALL_M, _WALL = 0.5, 0.7  # thick, and the share of what stands near that is one
 _LOW_M = 0.3  # above the road: what lies on it
 _CELL_M = 0.5
 _MOST_CELLS = 1 << 20  # along an axis
@@ -97,7 +99,7 @@ def _mirrored(source: Gaussians, border: Border, length_m: float) -> Gaussians:
 
 
 def _off_the_way(added: Gaussians, scene: Scene, geometry: Geometry) -> Bool[np.ndarray, " n"]:
-    """What lies on the road, or so far from the path that views aside pass it."""
+    """What lies on the road, is a wall, or is so far from the path that views aside pass it."""
     if geometry.ground is None:
         return np.ones(len(added), bool)
     places = added.means.double().numpy()
@@ -105,7 +107,18 @@ def _off_the_way(added: Gaussians, scene: Scene, geometry: Geometry) -> Bool[np.
     path = scene.trajectory.world_from_camera[:, :3, 3]
     flat = np.eye(3) - np.outer(scene.up, scene.up)
     away = np.min([np.linalg.norm((places - each) @ flat, axis=1) for each in path], axis=0)
-    return low | (away > _FREE_M)
+    near = ~low & (away > _FREE_M) & (away < _NEAR_M)
+    kept = low | (away >= _NEAR_M)
+    kept[near] = _in_a_wall(away[near])
+    return kept
+
+
+def _in_a_wall(away_m: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Which of what is so far beside the path is one wall along it; none where there is no wall."""
+    slices = (away_m / _WALL_M).astype(int)
+    counts = np.bincount(slices, minlength=1)
+    inside = np.abs(slices - counts.argmax()) <= 1
+    return inside & (inside.sum() >= _WALL * len(away_m))
 
 
 def _cells(gaussians: Gaussians) -> Int[np.ndarray, " n"]:
