@@ -16,7 +16,7 @@ from dreamdrive.scene.scene import Scene
 _NEAREST_M, _FARTHEST_M = 0.3, 60.0
 _FREE_M = 4.5  # beside the path no copy stands: views aside drive there
 _NEAR_M = 8.0  # beside the path copies are walls alone: so near to views aside a tree is tufts
-_WALL_M, _WALL = 0.5, 0.7  # thick, and the share of what stands near that is one
+_WALL_M, _WALL = 0.5, 0.75  # thick, and the share of what stands near that is one
 _LOW_M = 0.3  # above the road: what lies on it
 _CELL_M = 0.5
 _MOST_CELLS = 1 << 20  # along an axis
@@ -68,8 +68,8 @@ def beyond_borders(scene: Scene, geometry: Geometry, views: Sequence[int], lengt
 
 def _chosen(added: Gaussians, taken: Int[np.ndarray, " m"], scene: Scene, geometry: Geometry) -> Gaussians:
     """Those that no view shows, in cells that are not taken yet and off the way; the dear test comes last."""
-    added = added.select(torch.from_numpy(np.flatnonzero(~np.isin(_cells(added), taken))))
     added = added.select(torch.from_numpy(np.flatnonzero(_off_the_way(added, scene, geometry))))
+    added = added.select(torch.from_numpy(np.flatnonzero(~np.isin(_cells(added), taken))))
     return added.select(torch.from_numpy(np.flatnonzero(unseen(added, scene.cameras))))
 
 
