@@ -119,7 +119,8 @@ def test_what_was_recorded_stays(street: tuple[Scene, Geometry]) -> None:
 def test_nothing_made_up_stands_in_the_way(street: tuple[Scene, Geometry]) -> None:
     scene, geometry = street
     near = replace(scene, static=balls(np.array([[2.5, 0.0, 4.0]]), np.array([[1.0, 0, 0]])))
-    assert len(beyond_borders(near, geometry, [0], 9.0).static) == 1
+    for ground in (geometry.ground, None):
+        assert len(beyond_borders(near, replace(geometry, ground=ground), [0], 9.0).static) == 1
 
 
 def test_road_users_are_not_cut_twice(street: tuple[Scene, Geometry]) -> None:

@@ -100,10 +100,8 @@ def _mirrored(source: Gaussians, border: Border, length_m: float) -> Gaussians:
 
 def _off_the_way(added: Gaussians, scene: Scene, geometry: Geometry) -> Bool[np.ndarray, " n"]:
     """What lies on the road, is a wall, or is so far from the path that views aside pass it."""
-    if geometry.ground is None:
-        return np.ones(len(added), bool)
-    places = added.means.double().numpy()
-    low = np.abs(geometry.ground.height_m(places)) < _LOW_M
+    places, ground = added.means.double().numpy(), geometry.ground
+    low = np.zeros(len(added), bool) if ground is None else np.abs(ground.height_m(places)) < _LOW_M
     path = scene.trajectory.world_from_camera[:, :3, 3]
     flat = np.eye(3) - np.outer(scene.up, scene.up)
     away = np.min([np.linalg.norm((places - each) @ flat, axis=1) for each in path], axis=0)
