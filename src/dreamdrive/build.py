@@ -169,13 +169,12 @@ def _fitted(
 def _completed(clip: Clip, geometry: Geometry, scene: Scene, options: Options) -> Scene:
     """The scene with what stands where no frame looks, with its frames and how far it is off them.
 
-    What the prior made up stands there; where it did not, a guess from around.
+    What the prior made up stands there; and where it did not, a guess from around.
     """
     device, unseen = torch.device(options.device), clip.known.unseen
-    if unseen is None:
-        scene = completed(scene, geometry, options.completion, device)
-    elif not scene.moves_per_frame and len(scene.static):
+    if unseen is not None and not scene.moves_per_frame and len(scene.static):
         scene = scene.with_standing(unseen)
+    scene = completed(scene, geometry, options.completion, device)
     frames = [
         b"" if held else kept_frame(each) for each, held in zip(clip.frames, clip.held_out, strict=True)
     ]

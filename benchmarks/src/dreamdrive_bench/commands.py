@@ -13,6 +13,7 @@ COMMANDS = {
     "ablation": "ablation.main",
     "bring": "drives.bring",
     "clips": "clips",
+    "completion": "completion",
     "control": "control.main",
     "cuts": "cuts.main",
     "devkit": "devkit.main",

@@ -6,22 +6,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
-from scipy.spatial.transform import Rotation
 
+from dreamdrive.complete.mirror import plain, road_user_of, turned, unseen
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.gaussians import Gaussians
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 
 _NEAREST_M, _FARTHEST_M = 0.3, 60.0
-_FREE_M = 4.5  # beside the path nothing stands that is made up: views aside drive there
+_FREE_M = 4.5  # beside the path no copy stands: views aside drive there
+_NEAR_M = 8.0  # beside the path copies are walls alone: so near to views aside a tree is tufts
+_WALL_M, _WALL = 0.5, 0.75  # thick, and the share of what stands near that is one
 _LOW_M = 0.3  # above the road: what lies on it
 _CELL_M = 0.5
+_MOST_CELLS = 1 << 20  # along an axis
 _SOFT = 0.3  # share of the length over which it ends
 
 
 @dataclass(frozen=True)
-class _Border:
+class Border:
     """One side of a view: the axes of the road there, and where the picture ends.
 
     A point ``x`` m aside is in the picture from ``x / slope`` m ahead on.
@@ -33,7 +36,7 @@ class _Border:
     slope: float
 
     @staticmethod
-    def of(camera: Camera, up: Float[np.ndarray, "3"], side: int) -> "_Border":
+    def of(camera: Camera, up: Float[np.ndarray, "3"], side: int) -> "Border":
         """The right border of a view with side 1, the left one with -1."""
         pose = camera.world_from_camera
         ahead = pose[:3, 2] - up * (pose[:3, 2] @ up)
@@ -41,7 +44,7 @@ class _Border:
         right = np.cross(ahead, up)
         right *= np.sign(right @ pose[:3, 0])
         reach_px = camera.width_px - camera.cx_px if side > 0 else camera.cx_px
-        return _Border(pose[:3, 3], ahead, side * right, reach_px / camera.fx_px)
+        return Border(pose[:3, 3], ahead, side * right, reach_px / camera.fx_px)
 
 
 def beyond_borders(scene: Scene, geometry: Geometry, views: Sequence[int], length_m: float) -> Scene:
@@ -49,47 +52,34 @@ def beyond_borders(scene: Scene, geometry: Geometry, views: Sequence[int], lengt
 
     A point as far ahead of the border as a place is behind it, at the same distance from the path, stands in
     for what is there: road goes on as road and a facade in its plane, without an edge at the border. Road
-    users are left out: they would be cut twice.
+    users are left out, see ``vehicles``: they would be cut twice.
     """
     source = _source(scene, geometry)
-    taken = np.empty((0, 3), np.int64)
+    taken = np.empty(0, np.int64)
     for view in views:
         for side in (1, -1):
-            border = _Border.of(scene.cameras[view], scene.up, side)
-            added = _mirrored(source, border, length_m)
-            free = (
-                _unseen(added, scene.cameras)
-                & ~_among(_cells(added), taken)
-                & _off_the_way(added, scene, geometry)
-            )
-            added = added.select(torch.from_numpy(np.flatnonzero(free)))
+            border = Border.of(scene.cameras[view], scene.up, side)
+            added = _chosen(_mirrored(source, border, length_m), taken, scene, geometry)
             if len(added):
-                taken = np.unique(np.concatenate([taken, _cells(added)]), axis=0)
+                taken = np.union1d(taken, _cells(added))
                 scene = scene.with_standing(added)
     return scene
 
 
+def _chosen(added: Gaussians, taken: Int[np.ndarray, " m"], scene: Scene, geometry: Geometry) -> Gaussians:
+    """Those that no view shows, in cells that are not taken yet and off the way; the dear test comes last."""
+    added = added.select(torch.from_numpy(np.flatnonzero(_off_the_way(added, scene, geometry))))
+    added = added.select(torch.from_numpy(np.flatnonzero(~np.isin(_cells(added), taken))))
+    return added.select(torch.from_numpy(np.flatnonzero(unseen(added, scene.cameras))))
+
+
 def _source(scene: Scene, geometry: Geometry) -> Gaussians:
     """What stands and is no road user."""
-    static = scene.static.without_features()
-    plain = {
-        name: value for name, value in static.tensors().items() if name not in ("actor", "lifespan", "filled")
-    }
-    source = Gaussians(**{**plain, "sh": static.sh[:, :1].contiguous()})
-    if geometry.road_users is None:
-        return source
-    means, frames = source.means.double().numpy(), source.source_frame.numpy()
-    stands = np.ones(len(source), bool)
-    for frame in np.unique(frames).tolist():
-        rows = np.flatnonzero(frames == frame)
-        camera = geometry.cameras[frame]
-        columns, lines = camera.project(means[rows])[:, :2].astype(int).T
-        inside = lines.clip(0, camera.height_px - 1), columns.clip(0, camera.width_px - 1)
-        stands[rows] = geometry.road_users[frame][inside] == 0
-    return source.select(torch.from_numpy(np.flatnonzero(stands)))
+    source = plain(scene.static)
+    return source.select(torch.from_numpy(np.flatnonzero(road_user_of(source, geometry) == 0)))
 
 
-def _mirrored(source: Gaussians, border: _Border, length_m: float) -> Gaussians:
+def _mirrored(source: Gaussians, border: Border, length_m: float) -> Gaussians:
     """What lies within a length inside of the border, at as much beyond it."""
     away = source.means.double().numpy() - border.place
     aside, ahead = away @ border.aside, away @ border.ahead
@@ -102,58 +92,34 @@ def _mirrored(source: Gaussians, border: _Border, length_m: float) -> Gaussians:
     return replace(
         found,
         means=torch.from_numpy(places).float(),
-        quaternions=_turned(found.quaternions.double().numpy(), border.ahead),
+        quaternions=turned(found.quaternions.double().numpy(), border.ahead),
         logit_opacities=torch.logit(opacity.clamp(1e-4, 1 - 1e-4)),
         filled=torch.ones(len(found), dtype=torch.bool),
     )
 
 
-def _turned(
-    quaternions: Float[np.ndarray, "n 4"], normal: Float[np.ndarray, "3"]
-) -> Float[torch.Tensor, "n 4"]:
-    """Rotations of what is seen in a mirror; a Gaussian is its own image along its axes."""
-    if not len(quaternions):
-        return torch.zeros(0, 4)
-    axes = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix()
-    axes = (np.eye(3) - 2 * np.outer(normal, normal)) @ axes
-    axes[:, :, 2] *= -1
-    return torch.from_numpy(Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]]).float()
-
-
-def _unseen(added: Gaussians, cameras: Sequence[Camera]) -> Bool[np.ndarray, " n"]:
-    """Which ones no camera shows, nor half of what they spread to."""
-    places, size_m = added.means.double().numpy(), added.log_scales.amax(dim=1).exp().double().numpy()
-    unseen = np.ones(len(places), bool)
-    for camera in cameras:
-        left = np.flatnonzero(unseen)
-        at = camera.project(places[left])
-        reach_px = size_m[left] * camera.fx_px / np.maximum(at[:, 2], _NEAREST_M)
-        sides = ((at[:, 0], camera.width_px), (at[:, 1], camera.height_px))
-        inside = [(value > -reach_px) & (value < size + reach_px) for value, size in sides]
-        unseen[left] = ~((at[:, 2] > 0) & inside[0] & inside[1])
-    return unseen
-
-
 def _off_the_way(added: Gaussians, scene: Scene, geometry: Geometry) -> Bool[np.ndarray, " n"]:
-    """What lies on the road, or so far from the path that views aside pass it."""
-    if geometry.ground is None:
-        return np.ones(len(added), bool)
-    places = added.means.double().numpy()
-    low = np.abs(geometry.ground.height_m(places)) < _LOW_M
+    """What lies on the road, is a wall, or is so far from the path that views aside pass it."""
+    places, ground = added.means.double().numpy(), geometry.ground
+    low = np.zeros(len(added), bool) if ground is None else np.abs(ground.height_m(places)) < _LOW_M
     path = scene.trajectory.world_from_camera[:, :3, 3]
     flat = np.eye(3) - np.outer(scene.up, scene.up)
     away = np.min([np.linalg.norm((places - each) @ flat, axis=1) for each in path], axis=0)
-    return low | (away > _FREE_M)
+    near = ~low & (away > _FREE_M) & (away < _NEAR_M)
+    kept = low | (away >= _NEAR_M)
+    kept[near] = _in_a_wall(away[near])
+    return kept
 
 
-def _cells(gaussians: Gaussians) -> Int[np.ndarray, "n 3"]:
-    return np.floor(gaussians.means.double().numpy() / _CELL_M).astype(np.int64)
+def _in_a_wall(away_m: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Which of what is so far beside the path is one wall along it; none where there is no wall."""
+    slices = (away_m / _WALL_M).astype(int)
+    counts = np.bincount(slices, minlength=1)
+    inside = np.abs(slices - counts.argmax()) <= 1
+    return inside & (inside.sum() >= _WALL * len(away_m))
 
 
-def _among(cells: Int[np.ndarray, "n 3"], taken: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " n"]:
-    """Which cells are taken already."""
-    if not len(taken):
-        return np.zeros(len(cells), bool)
-    both = np.concatenate([taken, cells])
-    _, number = np.unique(both, axis=0, return_inverse=True)
-    return np.isin(number[len(taken) :], number[: len(taken)])
+def _cells(gaussians: Gaussians) -> Int[np.ndarray, " n"]:
+    """The cell of space that each is in, as one number."""
+    steps = np.floor(gaussians.means.double().numpy() / _CELL_M).astype(np.int64)
+    return (steps & _MOST_CELLS - 1) @ np.array([1, _MOST_CELLS, _MOST_CELLS**2])

@@ -8,6 +8,8 @@ from jaxtyping import Bool
 
 from dreamdrive.complete.borders import beyond_borders
 from dreamdrive.complete.holes import without_holes
+from dreamdrive.complete.mirror import road_user_of
+from dreamdrive.complete.vehicles import with_vehicles_closed
 from dreamdrive.compute.device import CPU
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
@@ -35,18 +37,22 @@ def completed(
 ) -> Scene:
     """The scene with what views aside of its path would meet and no frame saw, marked as filled.
 
-    What a picture's border cuts off goes on as what lies inside of it, mirrored at the border along the
-    road; then holes that are left are filled from around, from views in steps outwards. What moves is no part
-    of it. A street that moves per frame stays as it is. Views are drawn on ``device``.
+    Vehicles that the border of all pictures cuts off are closed there. What else a border cuts off goes on as
+    what lies inside of it, mirrored along the road; then holes that are left are filled from around, from
+    views in steps outwards. What moves is no part of it. A street that moves per frame stays as it is. Views
+    are drawn on ``device``.
     """
     if not options.aside_m or not len(scene.static) or scene.moves_per_frame:
         return scene
     chosen = _chosen(scene, options.views)
     bare = replace(scene, static=scene.static.without_features())  # or each addition would copy them
-    made = beyond_borders(bare, geometry, chosen, options.ahead_m)
+    made = with_vehicles_closed(bare, geometry)
+    users = torch.ones(len(made.static), dtype=torch.bool)
+    users[: len(bare.static)] = torch.from_numpy(road_user_of(bare.static, geometry) > 0)
+    made = beyond_borders(made, geometry, chosen, options.ahead_m)
     count = round(options.aside_m / options.step_m)
     shifts_m = [side * options.step_m * k for k in range(1, count + 1) for side in (1, -1)]
-    made = without_holes(made, geometry, chosen, shifts_m, device)
+    made = without_holes(made, geometry, chosen, shifts_m, users, device)
     added = torch.arange(len(scene.static), len(made.static))
     return scene.with_standing(made.static.select(added)) if len(added) else scene
 

@@ -16,9 +16,9 @@ from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import render_scene
 
 _SOLID_ALPHA = 0.5
-_LEAST_PX = 12
-_AROUND_PX = 5.0
-_SPACING_PX = 2
+_COARSER = 2  # than the recording are views that holes are looked for in: a guess is no finer
+_LEAST_PX = 3
+_AROUND_PX = 2.5
 _SAME = 0.8  # of the depth of a hole, from which on what lies beside it goes on there
 _OPAQUE = 0.9
 _BEHIND = 0.99  # of the depth that a view sees there
@@ -26,11 +26,16 @@ _BEHIND = 0.99  # of the depth that a view sees there
 
 @torch.no_grad()
 def without_holes(
-    scene: Scene, geometry: Geometry, views: Sequence[int], shifts_m: Sequence[float], device: torch.device
+    scene: Scene,
+    geometry: Geometry,
+    views: Sequence[int],
+    shifts_m: Sequence[float],
+    users: Bool[torch.Tensor, " n"],
+    device: torch.device,
 ) -> Scene:
     """The scene with the holes of recorded views filled that are moved to the right, one after the other.
 
-    What a recorded view looks through stays free.
+    What a recorded view looks through stays free. What is of road users, ``users``, does not go on.
 
     A hole is what Gaussians cover less than half of, where the view from the path shows no sky: what is far
     is at the same pixel there. Depth is that of the farther side in each row, for what is nearer ends there,
@@ -40,8 +45,8 @@ def without_holes(
     seen = [_Recorded.of(there, view) for view in np.flatnonzero(~scene.held_out).tolist()]
     for view in reversed(views):
         for shift_m in shifts_m:
-            camera = scene.cameras[view].moved(shift_m)
-            added = _filling(scene.on(device), geometry, camera, view)
+            camera = _coarse(scene.cameras[view]).moved(shift_m)
+            added = _filling(scene.on(device), geometry, camera, view, users)
             if added is not None:
                 hidden = np.all([each.hides(added.means.double().numpy()) for each in seen], axis=0)
                 scene = scene.with_standing(added.select(torch.from_numpy(np.flatnonzero(hidden))))
@@ -57,10 +62,11 @@ class _Recorded:
 
     @staticmethod
     def of(scene: Scene, view: int) -> "_Recorded":
-        seen = render_scene(scene, scene.cameras[view], float(scene.times_s[view]), part="static")
+        camera = scene.cameras[view]
+        seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
         far = torch.where(seen.alpha > _OPAQUE, seen.depth_m, torch.inf).numpy()
         # What is put at an outline would reach out of it.
-        return _Recorded(scene.cameras[view], cv2.dilate(far, np.ones((3, 3), np.uint8)))
+        return _Recorded(camera, cv2.dilate(far, np.ones((3, 3), np.uint8)))
 
     def hides(self, places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         """Which places it does not see: outside of it, or behind what stands."""
@@ -72,15 +78,27 @@ class _Recorded:
         return hidden
 
 
-def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gaussians | None:
+def _coarse(camera: Camera) -> Camera:
+    """The same view at the resolution of guesses."""
+    return camera.resized(max(1, camera.width_px // _COARSER), max(1, camera.height_px // _COARSER))
+
+
+def _filling(
+    scene: Scene, geometry: Geometry, camera: Camera, view: int, users: Bool[torch.Tensor, " n"]
+) -> Gaussians | None:
     """Gaussians for the holes of a view; None where there are none, or nothing is around them."""
-    seen = render_scene(scene, camera, float(scene.times_s[view]), exposure=False, part="static")
+    marks = torch.zeros(len(scene.static), 1)
+    marks[: len(users), 0] = users.float()
+    t_s = float(scene.times_s[view])
+    seen = render_scene(scene, camera, t_s, exposure=False, part="static", channels=marks)
     depth_m, alpha = seen.depth_m.numpy(), seen.alpha.numpy()
-    hole = (alpha < _SOLID_ALPHA) & ~geometry.sky[view]
+    sky = cv2.resize(geometry.sky[view].astype(np.uint8), alpha.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    hole = (alpha < _SOLID_ALPHA) & (sky == 0)
     if hole.sum() < _LEAST_PX:
         return None
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    known = ~wide & (alpha > _SOLID_ALPHA) & (depth_m > 0)
+    user = seen.channels[..., 0].numpy() > _SOLID_ALPHA
+    known = ~wide & ~user & (alpha > _SOLID_ALPHA) & (depth_m > 0)
     z_m, beside = _behind(depth_m, known, hole)
     if geometry.ground is not None:
         z_m = np.minimum(z_m, geometry.ground.depth_m(camera))
@@ -93,11 +111,9 @@ def _filling(scene: Scene, geometry: Geometry, camera: Camera, view: int) -> Gau
     picture = seen.picture
     picture[rows[there], columns[there]] = picture[rows[there], inside[there]]
     wide[rows[there], columns[there]] = False
-    picture = cv2.inpaint(picture, wide.astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
-    some = (rows % _SPACING_PX == 0) & (columns % _SPACING_PX == 0)
-    rows, columns = rows[some], columns[some]
+    picture = cv2.inpaint(picture, (wide | user).astype(np.uint8), _AROUND_PX, cv2.INPAINT_TELEA)
     pixels = np.column_stack([columns + 0.5, rows + 0.5, z_m[rows, columns]])
-    return surface(camera, pixels, picture[rows, columns] / 255.0, view, _SPACING_PX)
+    return surface(camera, pixels, picture[rows, columns] / 255.0, view)
 
 
 def _behind(

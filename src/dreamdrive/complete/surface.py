@@ -16,14 +16,13 @@ def surface(
     pixels: Float[np.ndarray, "n 3"],
     colours: Float[np.ndarray, "n 3"],
     view: int,
-    spacing_px: int = 1,
 ) -> Gaussians:
     """A ball for each place (column, row, depth in metres), as large as their distance in the view.
 
     Colours are in [0, 1]; ``view`` is the recorded one that it is nearest to. All are marked as filled.
     """
     count = len(pixels)
-    size_m = torch.from_numpy(_FOOTPRINT * spacing_px * pixels[:, 2] / camera.fx_px).float()
+    size_m = torch.from_numpy(_FOOTPRINT * pixels[:, 2] / camera.fx_px).float()
     return Gaussians(
         means=torch.from_numpy(camera.lift(pixels)).float(),
         quaternions=torch.tensor([[1.0, 0, 0, 0]]).repeat(count, 1),
