@@ -88,6 +88,7 @@ def along(scene: Scene, path: Trajectory) -> Scene:
         provenance=replace(about, source_index=None, camera_height_m=height_m),
         camera=None if scene.camera is None else np.tile(list(rig), len(path)),
         residual=None,
+        frames=None,
     )
 
 
