@@ -113,31 +113,48 @@ def test_the_nearest_frames_are_taken_and_none_that_is_withheld() -> None:
     assert found.nearest(*aside(7, 0.0)) == [6, 5]
 
 
-def test_an_untrained_network_takes_a_little_from_sure_frames_alone() -> None:
+def test_an_untrained_network_keeps_a_view_that_no_frame_surely_shows() -> None:
     told = torch.rand(1, CHANNELS, 8, 8)
     told[:, [11, 15]] = 0
     with torch.inference_mode():
-        torch.testing.assert_close(RestorerNetwork()(told), told[:, :3])
-        told[:, 11] = 1
-        share = torch.sigmoid(torch.tensor(-2.0))
-        expected = told[:, :3] + share * (told[:, 8:11] - told[:, :3])
-        torch.testing.assert_close(RestorerNetwork()(told), expected)
+        kept = RestorerNetwork()(told)
+    assert (kept - told[:, :3]).abs().max() < 0.015
+    # 13 places of a sure frame have the weight of exp(-4) each beside the view's own pixel.
+    flat = told.clone()
+    flat[:, 8:11], flat[:, 11] = 0.5, 1
+    with torch.inference_mode():
+        mixed = RestorerNetwork()(flat)
+    share = 13 * np.exp(-4) / (1 + 13 * np.exp(-4))
+    expected = flat[:, :3] + share * (0.5 - flat[:, :3])
+    torch.testing.assert_close(mixed, expected, atol=0.01, rtol=0)
 
 
-def test_a_mended_view_has_the_colours_of_the_network(tmp_path: Path) -> None:
+def weights(folder: Path, copied: int) -> Path:
+    """A network that copies every pixel from one of its places."""
     network = RestorerNetwork()
     assert network.answer.bias is not None
     with torch.no_grad():
-        network.answer.bias[:12] = 0.25  # of each of four pixels, in red, green and blue
-        network.answer.bias[12:] = -30  # nothing is taken over
-    save_file(
-        {name: value.half() for name, value in network.state_dict().items()}, tmp_path / "r.safetensors"
+        network.answer.bias[4 * copied : 4 * copied + 4] = 60
+    path = folder / "restorer.safetensors"
+    save_file({name: value.half() for name, value in network.state_dict().items()}, path)
+    return path
+
+
+def test_a_mended_view_is_copied_from_where_the_network_says(tmp_path: Path) -> None:
+    scene = filmed(wall())
+    found = recordings(scene)
+    camera, t_s = aside(3, 1.0)
+    seen, told = found.told(camera, t_s)
+    assert scene.residual is not None
+    evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
+    # After the view's own pixel come nine around that of the first frame, whose middle is the fifth.
+    restorer = Restorer.of(scene, evidence, weights(tmp_path, 1 + 4))
+    torch.testing.assert_close(
+        restorer.view(camera, t_s).colour.permute(2, 0, 1), torch.from_numpy(told[SAME]), atol=2e-3, rtol=0
     )
-    scene = filmed(street())
-    restorer = Restorer(recordings(scene), load_restorer(tmp_path / "r.safetensors"))
-    camera = replace(aside(3, 40.0)[0], width_px=95, height_px=63)  # looks past the wall: nothing is there
-    seen = restorer.view(camera, 0.3)
-    torch.testing.assert_close(seen.colour, torch.full((63, 95, 3), 0.25))
+    odd = replace(camera, width_px=95, height_px=63)
+    assert restorer.view(odd, t_s).colour.shape == (63, 95, 3)
+    assert seen.colour.shape == (64, 96, 3)
     with pytest.raises(InputError, match="no such file"):
         load_restorer(tmp_path / "none.safetensors")
 

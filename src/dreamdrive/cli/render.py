@@ -15,7 +15,7 @@ from dreamdrive.cli.terminal.machine import use_all_cores
 from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.trust import believed, bent, trust_of
 from dreamdrive.errors import InputError
-from dreamdrive.files.given import SCENE, check_there
+from dreamdrive.files.given import SCENE, WANTED, check_there
 from dreamdrive.names import Format, Show
 from dreamdrive.scene.control import check_numbers, check_render_size
 
@@ -30,7 +30,8 @@ class ShownFlags:
         completion: Whether guesses are shown where no frame saw anything.
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
-        restore: Mend views with what the recorded frames show of the same surfaces.
+        restore: Mend views with what the recorded frames show of the same surfaces, by weights of dreamdrive
+            train restorer.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
     """
 
@@ -38,7 +39,7 @@ class ShownFlags:
     completion: bool = True
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = ()
-    restore: bool = False
+    restore: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     blur: bool = False
 
 
@@ -79,8 +80,9 @@ def render(
     check_numbers(shift_m, fps)
     if shown.blur and (format == "npz" or shown.show == "depth"):
         raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
-    if shown.restore and shown.show != "colour":
+    if shown.restore is not None and shown.show != "colour":
         raise InputError(f"--restore mends colours; leave it out with --show {shown.show}")
+    check_there(shown.restore, WANTED["weights"])
     check_there(out, SCENE)
     use_all_cores()
     from dreamdrive.compute.device import computing_on
@@ -94,7 +96,7 @@ def render(
         whole = open_scene(out)
         scene = less(whole if shown.completion else whole.without_filled(), shown.without)
         drives = drives_of(scene, trajectory, shift_m, fps)
-        needed = shown.show == "trust" or shown.restore or stay_within_trust
+        needed = shown.show == "trust" or shown.restore is not None or stay_within_trust
         trust = trust_of(scene, drives, needed=needed)
         if stay_within_trust and trust is not None:
             drives = [bent(drive, trust) for drive in drives]
@@ -102,7 +104,9 @@ def render(
             for drive in drives:
                 video_rate(drive, options)
         there, console = scene.on(where), plain()
-        restorer = Restorer.of(there, trust.evidence, where) if trust and shown.restore else None
+        restorer = None
+        if trust is not None and shown.restore is not None:
+            restorer = Restorer.of(there, trust.evidence, shown.restore, where)
         for drive, place in zip(drives, places(out, output, drives, options), strict=True):
             start, count = time.perf_counter(), len(drive.path)
             with Bars(console) as bars:

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from dreamdrive.restore.carried import Recordings as Recordings
     from dreamdrive.restore.network import (
         CHANNELS as CHANNELS,
+        FIRST_PLANES as FIRST_PLANES,
         RestorerNetwork as RestorerNetwork,
         load_restorer as load_restorer,
     )

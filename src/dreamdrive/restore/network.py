@@ -1,4 +1,4 @@
-"""The network that mends a view: it takes colours over from recorded frames, and adds a little of its own."""
+"""The network that mends a view: it says of each pixel where its colour is copied from."""
 
 from pathlib import Path
 
@@ -15,34 +15,63 @@ OF_VIEW, OF_FRAME = 8, 4
 CHANNELS = OF_VIEW + FRAMES * OF_FRAME
 """Of the view its RGB, alpha, inverse depth, share of what moves, error of what it shows in the recorded
 views and how little they saw of it; of each recorded frame its RGB and how well it shows the same surface."""
+FIRST_PLANES = range(OF_VIEW, CHANNELS, OF_FRAME)
+"""Where each recorded frame begins in these."""
 WIDTHS = (24, 48, 96, 192)
 EXPECTED = "weights of the restorer, as `dreamdrive train restorer` writes them"
-_FILE = Path(__file__).with_name("restorer.safetensors")
-_SHY = -2.0  # an untrained network takes little over
+_AROUND = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+_BESIDE = tuple((0, dx) for dx in (-3, -2, 2, 3))
+_TAPS = ((0, 0),), *[_AROUND + _BESIDE] * FRAMES
+"""Rows and columns away from a pixel that it may be copied from: of the view, and of each recorded frame.
+
+What is seen from aside and at a wrong depth lies too far left or right.
+"""
+_MOST_PX = 3
+_LEAST = 0.02
+"""Share of a frame that surely shows something else."""
+_FIRM = 4.0
+"""Logit of the view's own pixel in an untrained network."""
 
 
 class RestorerNetwork(HalfUNet):
-    """Its answer is what to add to the view's colours, and how much of each recorded frame to take instead.
+    """Its answer is how much of each place in the view and in the recorded frames goes into a pixel.
 
-    What it takes over it copies pixel by pixel: no detail passes through its layers.
+    These shares add up to 1, so that it copies and cannot invent: no colour passes through its layers.
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
-        super().__init__(CHANNELS, 3 + FRAMES, widths)
+        super().__init__(CHANNELS, sum(map(len, _TAPS)), widths)
 
     def forward(self, told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n 3 h w"]:
-        """The mended view, RGB about [0, 1]; sides are multiples of 2."""
-        answer, _ = self.answered(told)
-        said = told[:, :3] + answer[:, :3]
-        for frame in range(FRAMES):
-            first = OF_VIEW + frame * OF_FRAME
-            share = torch.sigmoid(answer[:, 3 + frame : 4 + frame] + _SHY) * told[:, first + 3 : first + 4]
-            said = said + share * (told[:, first : first + 3] - told[:, :3])
+        """The mended view, RGB within that of what it is told; sides are multiples of 2."""
+        logits, _ = self.answered(told)
+        pictures = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
+        prior = [_constant(told, 1.0)] + [told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES]
+        taps = [(k, shift) for k, shifts in enumerate(_TAPS) for shift in shifts]
+        wide = [torch.nn.functional.pad(each, [_MOST_PX] * 4, mode="replicate") for each in pictures]
+        sure = [torch.nn.functional.pad(each.log(), [_MOST_PX] * 4, mode="replicate") for each in prior]
+        own = [_FIRM if (k, shift) == (0, (0, 0)) else 0.0 for k, shift in taps]
+        known = torch.cat([_shifted(sure[k], shift) for k, shift in taps], dim=1)
+        shares = torch.softmax(logits + known + told.new_tensor(own)[:, None, None], dim=1)
+        said = torch.zeros_like(told[:, :3])
+        for number, (k, shift) in enumerate(taps):
+            said = said + shares[:, number : number + 1] * _shifted(wide[k], shift)
         return said
 
 
-def load_restorer(path: Path = _FILE) -> RestorerNetwork:
-    """The network with the weights that ship, or those that ``dreamdrive train restorer`` wrote to a file.
+def _constant(like: Float[Tensor, "n c h w"], value: float) -> Float[Tensor, "n 1 h w"]:
+    return torch.full_like(like[:, :1], value)
+
+
+def _shifted(wide: Float[Tensor, "n c h2 w2"], shift: tuple[int, int]) -> Float[Tensor, "n c h w"]:
+    """What lies so many rows and columns away, of a padded picture."""
+    height, width = (size - 2 * _MOST_PX for size in wide.shape[2:])
+    top, left = (_MOST_PX + each for each in shift)
+    return wide[..., top : top + height, left : left + width]
+
+
+def load_restorer(path: Path) -> RestorerNetwork:
+    """The network with the weights that ``dreamdrive train restorer`` wrote to a file.
 
     Raises:
         InputError: There is no such file, or it is of something else.

@@ -1,6 +1,7 @@
 """Views as the restorer mends them."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import torch
 from torch import Tensor
@@ -29,13 +30,15 @@ class Restorer:
     device: torch.device = CPU
 
     @classmethod
-    def of(cls, scene: Scene, evidence: GaussianEvidence, device: torch.device = CPU) -> "Restorer":
-        """That of a scene, with the network that ships.
+    def of(
+        cls, scene: Scene, evidence: GaussianEvidence, weights: Path, device: torch.device = CPU
+    ) -> "Restorer":
+        """That of a scene, with weights of ``dreamdrive train restorer``.
 
         Raises:
-            InputError: The scene was changed, or does not hold its recorded frames.
+            InputError: The scene was changed or does not hold its recorded frames, or no such weights are there.
         """
-        network = load_restorer().to(device)
+        network = load_restorer(weights).to(device)
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         return cls(Recordings.of(scene, evidence), network, device)
 

@@ -51,7 +51,8 @@ def test_a_pair_of_a_drive_is_a_frame_that_no_fit_has_seen(tmp_path: Path) -> No
 
 
 def test_a_drive_smaller_than_what_is_cut_from_it_gives_no_pairs(tmp_path: Path) -> None:
-    write_picture(tmp_path / "0.png", np.zeros((80, 128, 3), np.uint8))
+    for number in range(3):
+        write_picture(tmp_path / f"{number}.png", np.full((80, 128, 3), 80 * number, np.uint8))
     with pytest.raises(InputError, match="128x80; expected 144 pixels"):
         next(drive_pairs(np.random.default_rng(0), tmp_path, 2, SHIPPED, SMALL))
 
@@ -83,7 +84,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.mark.slow
 def test_it_learns_to_copy_from_a_frame(shown: list[Path], tmp_path: Path) -> None:
-    options = PairTraining(steps=25, batch=2, crop_px=64, warm=4, rate=2e-3, average=0.9)
+    options = PairTraining(steps=40, batch=2, crop_px=64, warm=4, rate=2e-3, average=0.9)
     path = train_on_pairs(RESTORER, shown, tmp_path, SHIPPED, options)
     assert path is not None
     told, truth, _ = batch_of(RESTORER, shown, 10**6, PairTraining(batch=8, crop_px=64))

@@ -52,6 +52,10 @@ class PairTraining:
     seed: int = 0
 
 
+def _as_it_is(told: Tensor, truth: Tensor, generator: np.random.Generator) -> tuple[Tensor, Tensor]:
+    return told, truth
+
+
 @dataclass(frozen=True)
 class PairTask:
     """What is learned from pairs.
@@ -62,6 +66,7 @@ class PairTask:
         spoilt: How spoilt what it is told is, from 0 to 1 (N, 1, H, W).
         range: Of the maps in a pair.
         file: Name of the weights.
+        varied: Changes what the network is told and the truth alike, by what a generator draws.
     """
 
     make: Callable[[], nn.Module]
@@ -69,6 +74,7 @@ class PairTask:
     spoilt: Callable[[Tensor], Tensor]
     range: PlaneRange
     file: str
+    varied: Callable[[Tensor, Tensor, np.random.Generator], tuple[Tensor, Tensor]] = _as_it_is
 
 
 def train_on_pairs(
@@ -139,7 +145,8 @@ def batch_of(
 ) -> tuple[Float[Tensor, "n c y x"], Float[Tensor, "n 3 y x"], Float[Tensor, "n 1 y x"]]:
     """What the network is told at a step, the truth and what of it counts."""
     generator = np.random.default_rng([options.seed, step])
-    return task.range.batch(pairs, generator, options.batch, options.crop_px)
+    told, truth, counts = task.range.batch(pairs, generator, options.batch, options.crop_px)
+    return *task.varied(told, truth, generator), counts
 
 
 def _step(
