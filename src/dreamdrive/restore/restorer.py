@@ -36,7 +36,7 @@ class Restorer:
         """That of a scene, with weights of ``dreamdrive train restorer``.
 
         Raises:
-            InputError: The scene was changed or does not hold its recorded frames, or no such weights are there.
+            InputError: The scene was changed or holds no recorded frames, or there are no such weights.
         """
         network = load_restorer(weights).to(device)
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
