@@ -57,6 +57,13 @@ def test_a_drive_smaller_than_what_is_cut_from_it_gives_no_pairs(tmp_path: Path)
         next(drive_pairs(np.random.default_rng(0), tmp_path, 2, SHIPPED, SMALL))
 
 
+def test_a_drive_too_short_for_a_scene_gives_no_pairs(tmp_path: Path) -> None:
+    for number in range(3):
+        write_picture(tmp_path / f"{number}.png", np.full((144, 240, 3), 80 * number, np.uint8))
+    with pytest.raises(InputError, match="has 3 frames; expected more than 4"):
+        next(drive_pairs(np.random.default_rng(0), tmp_path, 4, SHIPPED, SMALL))
+
+
 @pytest.mark.slow
 def test_sources_are_named_and_what_cannot_be_used_gives_no_pairs(tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()

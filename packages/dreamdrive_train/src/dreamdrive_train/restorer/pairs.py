@@ -115,6 +115,8 @@ def drive_pairs(
             f"{path} is {width}x{height}; expected {CROP_PX} pixels on either side, to learn from"
         )
     held_out = np.arange(len(clip)) % every != 0
+    if (~held_out).sum() < 2:
+        raise InputError(f"{path} has {len(clip)} frames; expected more than {every}, for a scene of two")
     clip = replace(clip, held_out=held_out)
     clip = clip.with_features(appearance=appearance(clip.frames, clip.valid))
     built = build_scene(clip, replace(QUALITIES["draft"], knowledge=knowledge))
