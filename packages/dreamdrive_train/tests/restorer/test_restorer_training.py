@@ -31,8 +31,10 @@ def test_a_pair_is_a_view_from_aside_and_its_truth() -> None:
         counts = planes[-1] > 0
         off = np.abs(planes[:3].astype(int) - planes[TRUTH])[:, counts]
         assert 0.5 < off.mean() < 40
-        sure = counts & (planes[11] > 200)
-        assert np.abs(planes[8:11].astype(int) - planes[TRUTH])[:, sure].mean() < 20
+        # What surely shows the same is nearer to the truth than the frame is elsewhere.
+        sure, other = counts & (planes[11] > 200), counts & (planes[11] < 50)
+        off = np.abs(planes[8:11].astype(int) - planes[TRUTH]).mean(axis=0)
+        assert off[sure].mean() < 0.7 * off[other].mean()
 
 
 @pytest.mark.slow
