@@ -9,11 +9,11 @@ import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import UInt8
 
+from dreamdrive.data.pictures.picture_file import read_picture, write_picture
 from dreamdrive.errors import InputError
 from dreamdrive.files.output import new_file, scratch_beside
 from dreamdrive.restore import CHANNELS, RestorerNetwork, load_restorer
@@ -25,7 +25,6 @@ from dreamdrive_train.pairs import PairTraining, train_on_pairs
 from dreamdrive_train.restorer import RESTORER
 
 _MOST_PAIRS = 320
-_JPEG = 95
 _PLANES = CHANNELS + 4
 _JUDGED = 10
 """Every so many pairs one is kept out."""
@@ -129,13 +128,12 @@ def _write_pictures(planes: UInt8[np.ndarray, "p h w"], folder: Path) -> None:
     folder.mkdir(parents=True)
     for number, first in enumerate(range(0, len(planes), 3)):
         three = planes[[min(first + k, len(planes) - 1) for k in range(3)]]
-        picture = np.ascontiguousarray(three.transpose(1, 2, 0))
-        cv2.imwrite(str(folder / f"{number}.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG])
+        write_picture(folder / f"{number}.jpg", three.transpose(1, 2, 0))
 
 
 def _read_pictures(folder: Path) -> UInt8[np.ndarray, "p h w"]:
     files = sorted(folder.glob("*.jpg"), key=lambda file: int(file.stem))
-    planes = np.concatenate([cv2.imread(str(file)).transpose(2, 0, 1) for file in files])
+    planes = np.concatenate([read_picture(file).transpose(2, 0, 1) for file in files])
     return planes[:_PLANES]
 
 
