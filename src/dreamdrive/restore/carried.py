@@ -25,7 +25,6 @@ _NEAR_M = 2.0
 _FAR_M = 1e5
 _SAME = 0.1
 """Share of the depth by which one surface may differ between views."""
-_UNSEEN_PX = 0.5
 _KEPT = 8
 """Frames that are decoded at a time."""
 _ERROR = 4.0
@@ -87,15 +86,12 @@ class Recordings:
         """A view as it is, and what the restorer is told of it, float32 (see ``network.CHANNELS``)."""
         moment, rows = moment_of(self.scene, t_s), rows_at(self.scene, t_s)
         views = self.nearest(camera, t_s, besides)
-        evidence = [
-            self.evidence.error.to(rows.device)[rows].sqrt()[:, None],
-            torch.exp(-self.evidence.weight_px.to(rows.device)[rows] / _UNSEEN_PX)[:, None],
-        ]
+        evidence = torch.stack(self.evidence.error_and_unseen(rows), dim=1)
         # What stands or is seen at the same time is not elsewhere: most views need no shifts.
         elsewhere = [view for view in views if self.scene.times_s[view] != t_s and self._moves]
         shifts = [self._shifts_m(moment[0].means, t_s, view) for view in elsewhere]
         seen = render_scene(
-            self.scene, camera, t_s, channels=torch.cat([*evidence, *shifts], dim=1), moment=moment
+            self.scene, camera, t_s, channels=torch.cat([evidence, *shifts], dim=1), moment=moment
         )
         channels = (seen.channels / seen.alpha.clamp(min=1e-3)[..., None]).numpy()
         maps = np.zeros((CHANNELS, camera.height_px, camera.width_px), np.float32)

@@ -46,6 +46,11 @@ class GaussianEvidence:
     nearest_m: Float[Tensor, " n"]
     spread_rad: Float[Tensor, " n"]
 
+    def error_and_unseen(self, rows: Int[Tensor, " m"]) -> tuple[Float[Tensor, " m"], Float[Tensor, " m"]]:
+        """Root of the squared error of some, and how little they were seen, 0 to 1, where the rows are."""
+        error, weight_px = (each.to(rows.device)[rows] for each in (self.error, self.weight_px))
+        return error.sqrt(), torch.exp(-weight_px / _UNSEEN_PX)
+
 
 def asked_views(scene: Scene, most: int) -> list[int]:
     """Views that the fit has seen, evenly in time of each camera of the rig."""
@@ -106,8 +111,7 @@ def seen_with(
     angle = torch.arccos(cosine.clamp(-1, 1)).clamp(max=_FARTHEST_RAD)
     closer = (evidence.nearest_m[rows] / away_m).clamp(1.0, _MOST_CLOSER).log()
     told = [
-        evidence.error[rows].sqrt(),
-        torch.exp(-evidence.weight_px[rows] / _UNSEEN_PX),
+        *evidence.error_and_unseen(rows),
         angle,
         closer,
         (angle / (evidence.spread_rad[rows] + _FIRM_RAD)).clamp(max=_MOST_RATIO),
