@@ -26,6 +26,9 @@ _TAPS = ((0, 0),), *[_AROUND + _BESIDE] * FRAMES
 
 What is seen from aside and at a wrong depth lies too far left or right.
 """
+_DETAIL = _AROUND[:4] + _AROUND[5:] + ((-2, 0), (0, -2), (0, 2), (2, 0))
+"""Those in the view whose difference from a pixel is added to it or taken away: it sharpens or smooths."""
+_MOST_DETAIL = 0.5
 _MOST_PX = 3
 _LEAST = 0.02
 """Share of a frame that surely shows something else."""
@@ -36,15 +39,17 @@ _FIRM = 4.0
 class RestorerNetwork(HalfUNet):
     """Its answer is how much of each place in the view and in the recorded frames goes into a pixel.
 
-    These shares add up to 1, so that it copies and cannot invent: no colour passes through its layers.
+    These shares add up to 1, and what sharpens the view adds 0 to one colour, so that it copies and cannot
+    invent: no colour passes through its layers.
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
-        super().__init__(CHANNELS, sum(map(len, _TAPS)), widths)
+        super().__init__(CHANNELS, sum(map(len, _TAPS)) + len(_DETAIL), widths)
 
     def forward(self, told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n 3 h w"]:
-        """The mended view, RGB within that of what it is told; sides are multiples of 2."""
-        logits, _ = self.answered(told)
+        """The mended view in RGB; sides are multiples of 2."""
+        answer, _ = self.answered(told)
+        logits, detail = answer[:, : -len(_DETAIL)], _MOST_DETAIL * torch.tanh(answer[:, -len(_DETAIL) :])
         pictures = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
         prior = [_constant(told, 1.0)] + [told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES]
         taps = [(k, shift) for k, shifts in enumerate(_TAPS) for shift in shifts]
@@ -56,6 +61,8 @@ class RestorerNetwork(HalfUNet):
         said = torch.zeros_like(told[:, :3])
         for number, (k, shift) in enumerate(taps):
             said = said + shares[:, number : number + 1] * _shifted(wide[k], shift)
+        for number, shift in enumerate(_DETAIL):
+            said = said + detail[:, number : number + 1] * (_shifted(wide[0], shift) - pictures[0])
         return said
 
 

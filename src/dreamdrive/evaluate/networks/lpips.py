@@ -30,7 +30,7 @@ class Trunk(nn.Module):
 
     def forward(self, images: Float[Tensor, "n 3 h w"]) -> list[Tensor]:
         """Values at the taps, of images in [-1, 1]."""
-        shift, scale = (torch.tensor(values)[:, None, None] for values in (_SHIFT, _SCALE))
+        shift, scale = (images.new_tensor(values)[:, None, None] for values in (_SHIFT, _SCALE))
         x, values = (images - shift) / scale, list[Tensor]()
         for index, layer in enumerate(self.features):
             x = layer(x)
@@ -72,11 +72,18 @@ class PerceptualDistance:
         Values in [-1, 1] are the definition; 3DGS and its relatives hand in [0, 1] and get lower values.
         """
         with torch.inference_mode():
-            parts = [
-                self._heads([_difference(x, y) for x, y in zip(self.trunk(p), self.trunk(q), strict=True)])
-                for p, q in zip(a.split(_PAIRS), b.split(_PAIRS), strict=True)
-            ]
+            parts = [self.of(p, q) for p, q in zip(a.split(_PAIRS), b.split(_PAIRS), strict=True)]
         return torch.cat(parts)
+
+    def to(self, device: torch.device) -> "PerceptualDistance":
+        """The same on a device, its weights fixed."""
+        for network in (self.trunk, self._heads):
+            network.to(device).requires_grad_(False)
+        return self
+
+    def of(self, a: Float[Tensor, "n 3 h w"], b: Float[Tensor, "n 3 h w"]) -> Float[Tensor, " n"]:
+        """The same all at once, with gradients where the images have them."""
+        return self._heads([_difference(x, y) for x, y in zip(self.trunk(a), self.trunk(b), strict=True)])
 
 
 def _difference(x: Tensor, y: Tensor) -> Tensor:

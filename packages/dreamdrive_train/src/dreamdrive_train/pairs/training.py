@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from dreamdrive.compute.device import CPU
 from dreamdrive.errors import InputError
+from dreamdrive.evaluate.networks import lpips, stlpips
 from dreamdrive.files.output import claim_folder, new_file
 from dreamdrive.files.step_log import StepLog
 from dreamdrive.models import load_checkpoint, save_checkpoint
@@ -36,6 +37,8 @@ class PairTraining:
         rate: Largest step of Adam; it rises for ``warm`` steps and falls as a cosine.
         warm: Steps until then.
         perceptual: Weight of the distance in features of the street network's encoder, beside L1.
+        stlpips: Weight of the shift-tolerant LPIPS of AlexNet, which the extra ``metrics`` installs; at 0 it
+            is not needed.
         spoilt: How much more counts what is spoilt.
         average: Share of the averaged weights that a step keeps.
         seed: Of everything random.
@@ -47,9 +50,18 @@ class PairTraining:
     rate: float = 4e-4
     warm: int = 200
     perceptual: float = 0.2
+    stlpips: float = 0.0
     spoilt: float = 3.0
     average: float = 0.999
     seed: int = 0
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Networks in whose features a picture is compared with the truth."""
+
+    street: StreetNetwork
+    distance: lpips.PerceptualDistance | None
 
 
 def _as_it_is(told: Tensor, truth: Tensor, generator: np.random.Generator) -> tuple[Tensor, Tensor]:
@@ -101,7 +113,7 @@ def train_on_pairs(
     network = task.make().to(device)
     averaged = deepcopy(network).requires_grad_(False)
     optimiser = torch.optim.Adam(network.parameters(), lr=options.rate, betas=(0.9, 0.99))
-    judge = load_knowledge(knowledge).to(device)
+    judge = Judge(load_knowledge(knowledge).to(device), _distance(options, device))
     both, data = (network, averaged), dict[str, str]()
     done, before_s = load_checkpoint(out, both, optimiser, options, data)
     log, began = StepLog(out / _LOG, done), time.monotonic()
@@ -126,6 +138,12 @@ def train_on_pairs(
         if stopped:
             return None
     return _write(averaged, out / task.file, licence, options)
+
+
+def _distance(options: PairTraining, device: torch.device) -> lpips.PerceptualDistance | None:
+    if not options.stlpips:
+        return None
+    return stlpips.load_stlpips("alex").to(device)
 
 
 def _write(averaged: nn.Module, path: Path, licence: str, options: PairTraining) -> Path:
@@ -153,7 +171,7 @@ def _step(
     task: PairTask,
     network: nn.Module,
     optimiser: torch.optim.Optimizer,
-    judge: StreetNetwork,
+    judge: Judge,
     batch: tuple[Tensor, ...],
     options: PairTraining,
 ) -> float:
@@ -162,7 +180,9 @@ def _step(
     weight = counts * (1 + options.spoilt * task.spoilt(told))
     loss = (weight * (said - truth).abs()).sum() / (3 * weight.sum() + 1)
     true_there = torch.where(counts > 0.5, truth, said.detach())
-    there, wanted = judge.encoder(said), judge.encoder(true_there)
+    if judge.distance is not None:
+        loss = loss + options.stlpips * judge.distance.of(2 * said - 1, 2 * true_there - 1).mean()
+    there, wanted = judge.street.encoder(said), judge.street.encoder(true_there)
     for a, b in zip(there[:_LEVELS], wanted[:_LEVELS], strict=True):
         scale = b.square().mean().sqrt() + 1e-3
         loss = loss + options.perceptual / _LEVELS * (a - b.detach()).abs().mean() / scale
