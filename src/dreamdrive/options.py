@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import ceil
+from typing import Any
 
 from dreamdrive.complete import CompletionOptions
 from dreamdrive.decompose import ActorOptions, GroupOptions, PerFrameOptions, ScoreOptions
@@ -124,6 +125,8 @@ def with_method(options: Options, method: MethodName) -> Options:
     if method == "dreamdrive":
         return options
     s, g = options.score, options.group
+    weights = dict.fromkeys(("depth_weight", "sky_weight", "solid_weight", "stray_weight"), 0.0)
+    as_printed: dict[str, Any] = {"loss": "paper", **weights}
     return replace(
         options,
         method="paper",
@@ -131,8 +134,8 @@ def with_method(options: Options, method: MethodName) -> Options:
         group=replace(g, clusters="density", threshold=_PAPER_TAU, majority=0.5),
         cast=replace(options.cast, tracks=False),
         drift=replace(options.drift, allowed=False),
-        static=replace(options.static, loss="paper", depth_weight=0.0, sky_weight=0.0),
-        fit=replace(options.fit, loss="paper", depth_weight=0.0, sky_weight=0.0, stray_weight=0.0),
+        static=replace(options.static, **as_printed),
+        fit=replace(options.fit, **as_printed),
         completion=replace(options.completion, aside_m=0.0),
         network=replace(options.network, depth=8, width=256),
     )
@@ -144,7 +147,7 @@ QUALITIES: dict[QualityName, Options] = {
         "draft",
         FitOptions(steps=75, least_visits=_VISITS),
         ScoreOptions(),
-        FitOptions(steps=150, least_visits=_VISITS, plane_rate=5e-2),
+        FitOptions(steps=225, least_visits=_VISITS, plane_rate=5e-2),
     ),
     "standard": Options(),
     "high": Options(

@@ -155,3 +155,20 @@ def test_what_strays_over_what_stands_costs_and_fades(parts) -> None:
     assert dear > free
     assert (dynamic_then - dynamic).mean() > 0
     assert (static_then - static).mean() < 0
+
+
+def test_what_nothing_covers_costs_and_closes(parts) -> None:
+    """Where there is no sky Gaussians win opacity by it, where there is they do not."""
+    views, _, sky = parts
+    wins = []
+    for is_sky in (False, True):
+        view = replace(views[0], sky=torch.full_like(views[0].sky, is_sky))
+        pulls = []
+        for weight in (0.0, 10.0):
+            trainer = trainer_of(parts)
+            trainer.options = replace(OPTIONS, solid_weight=weight, sky_weight=0.0)
+            trainer.step(0, view, sky.colour(view.camera))
+            pulls.append(torch.cat([part.moments["logit_opacities"].mean for part in trainer.model.parts()]))
+        wins.append((pulls[0] - pulls[1]).sum())
+    assert wins[0] > 0
+    assert wins[1] == 0

@@ -38,6 +38,8 @@ class FitOptions:
         sh_after: Share of the steps after which view-dependent colour is learned.
         depth_weight: Weight of the inverse-depth term (1/m).
         sky_weight: Weight of coverage in sky pixels: floaters cover the sky without it.
+        solid_weight: Weight of what is uncovered where no sky is: a road that lets its backdrop through looks
+            right from the path and has holes from aside.
         stray_weight: Weight of what dynamic Gaussians cover where nothing moves: they take the road along.
         warm_up: Share of the steps before the deformation network learns (Deformable-3DGS: 3,000 of 40,000).
         deformation_rate: Adam's step for the deformation network, decayed to a tenth.
@@ -52,6 +54,7 @@ class FitOptions:
     sh_after: float = 0.4
     depth_weight: float = 1.0
     sky_weight: float = 0.05
+    solid_weight: float = 0.05
     stray_weight: float = 0.1
     warm_up: float = 0.1
     deformation_rate: float = 2e-3
@@ -275,6 +278,8 @@ def _loss(
         options.depth_weight,
         options.sky_weight,
     )
+    if options.solid_weight:
+        loss = loss + options.solid_weight * ((1 - rendered.alpha) * view.solid).mean()
     if rendered.channels.shape[-1]:
         loss = loss + options.stray_weight * (rendered.channels[..., 0] * view.still).mean()
     return loss

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -43,6 +44,11 @@ class View:
     depth_m: Float[Tensor, "h w"]
     depth_weight: Float[Tensor, "h w"]
     still: Bool[Tensor, "h w"]
+
+    @cached_property
+    def solid(self) -> Bool[Tensor, "h w"]:
+        """Pixels that something should cover (H, W)."""
+        return self.mask & ~self.sky
 
     def whole(self) -> "View":
         """Itself."""
