@@ -28,6 +28,7 @@ _SAME = 0.1
 _KEPT = 8
 """Frames that are decoded at a time."""
 _ERROR = 4.0
+_MOVES = 5
 
 
 @dataclass
@@ -103,6 +104,9 @@ class Recordings:
                 shift_m = channels[..., first : first + 3]
             first = OF_VIEW + number * OF_FRAME
             maps[first : first + OF_FRAME] = self._carried(view, camera, seen.seen_depth_m, shift_m)
+            if self.scene.times_s[view] != t_s:
+                # A path is never so precise that what moves would be as sharp as in the view.
+                maps[first + 3] *= 1 - maps[_MOVES].clip(0, 1)
         return seen, maps
 
     @property
@@ -144,7 +148,7 @@ class Recordings:
         )
         off = np.where(solid, np.abs(ahead_m * known - 1), _NEAR_M * known)
         sure = inside * np.exp(-off / _SAME)
-        rgb = cv2.remap(self.frame(view), u - 0.5, v - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        rgb = cv2.remap(self.frame(view), u - 0.5, v - 0.5, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         carried = np.concatenate([inside[..., None] * rgb / 255.0, sure[..., None]], axis=2)
         return carried.transpose(2, 0, 1).astype(np.float32)
 
