@@ -89,7 +89,7 @@ class Recordings:
         views = self.nearest(camera, t_s, besides)
         evidence = torch.stack(self.evidence.error_and_unseen(rows), dim=1)
         # What stands or is seen at the same time is not elsewhere: most views need no shifts.
-        elsewhere = [view for view in views if self.scene.times_s[view] != t_s and self._moves]
+        elsewhere = [view for view in views if self.scene.times_s[view] != t_s and self.scene.moves_per_frame]
         shifts = [self._shifts_m(moment[0].means, t_s, view) for view in elsewhere]
         seen = render_scene(
             self.scene, camera, t_s, channels=torch.cat([evidence, *shifts], dim=1), moment=moment
@@ -105,20 +105,14 @@ class Recordings:
             first = OF_VIEW + number * OF_FRAME
             maps[first : first + OF_FRAME] = self._carried(view, camera, seen.seen_depth_m, shift_m)
             if self.scene.times_s[view] != t_s:
-                # A path is never so precise that what moves would be as sharp as in the view.
+                # What moves is elsewhere, and no track is so precise that it would be found there as sharp.
                 maps[first + 3] *= 1 - maps[_MOVES].clip(0, 1)
         return seen, maps
 
-    @property
-    def _moves(self) -> bool:
-        return len(self.scene.dynamic) > 0 or self.scene.moves_per_frame
-
     def _shifts_m(self, means: Float[Tensor, "m 3"], t_s: float, view: int) -> Float[Tensor, "m 3"]:
-        """How far what lives at a time is from there at the time of a recorded view."""
-        scene, then_s = self.scene, float(self.scene.times_s[view])
-        living = scene.dynamic.without_features().select(scene.dynamic.alive_at(t_s))
-        there = scene.moved_at(living, then_s).means if len(living) else living.means
-        return torch.cat([scene.static_at(then_s).means, there]) - means
+        """How far a per-frame street at a time is from where it is at the time of a recorded view."""
+        there = self.scene.static_at(float(self.scene.times_s[view])).means
+        return torch.cat([there - means[: len(there)], torch.zeros_like(means[len(there) :])])
 
     def _carried(
         self,
