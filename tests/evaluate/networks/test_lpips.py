@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from dreamdrive.errors import InputError
-from dreamdrive.evaluate.networks.lpips import CHANNELS, TRUNKS, load_lpips
+from dreamdrive.evaluate.networks.lpips import CHANNELS, TRUNKS, Heads, PerceptualDistance, load_lpips
 from tests.evaluate.networks.seeded import seeded_state
 from tests.golden.reading import cases, tensors, values
 
@@ -48,3 +48,30 @@ def test_files_of_different_networks_are_refused(tmp_path: Path) -> None:
         load_lpips(trunk, heads)
     with pytest.raises(InputError, match="holds neither network"):
         load_lpips(heads, heads)
+
+
+def test_it_can_be_learned_from() -> None:
+    torch.manual_seed(0)
+    heads = Heads(CHANNELS["alex"])
+    for weight in heads.parameters():
+        torch.nn.init.uniform_(weight, 0, 0.1)
+    distance = PerceptualDistance("alex", TRUNKS["alex"](), heads).to(torch.device("cpu"))
+    a, b = torch.rand(2, 2, 3, 64, 64) * 2 - 1
+    a.requires_grad_(True)
+    told = distance.of(a, b)
+    torch.testing.assert_close(told.detach(), distance(a.detach(), b))
+    told.sum().backward()
+    assert a.grad is not None
+    assert (a.grad != 0).any()
+    assert all(weight.grad is None for weight in [*distance.trunk.parameters(), *heads.parameters()])
+
+
+def test_where_no_channel_answers_it_still_has_a_gradient() -> None:
+    trunk = TRUNKS["alex"]()
+    for value in trunk.parameters():
+        torch.nn.init.zeros_(value)
+    distance = PerceptualDistance("alex", trunk, Heads(CHANNELS["alex"])).to(torch.device("cpu"))
+    a = torch.rand(1, 3, 64, 64).requires_grad_(True)
+    distance.of(a, torch.rand(1, 3, 64, 64)).sum().backward()
+    assert a.grad is not None
+    assert a.grad.isfinite().all()

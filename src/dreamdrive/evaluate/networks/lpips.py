@@ -88,7 +88,8 @@ class PerceptualDistance:
 
 def _difference(x: Tensor, y: Tensor) -> Tensor:
     """Squared difference of values scaled to unit length over the channels."""
-    x, y = (v / (v.square().sum(dim=1, keepdim=True).sqrt() + _EPS) for v in (x, y))
+    # Where all channels are 0 the root has no gradient.
+    x, y = (v / (v.square().sum(dim=1, keepdim=True).clamp(min=_EPS**2).sqrt() + _EPS) for v in (x, y))
     return (x - y).square()
 
 
