@@ -49,7 +49,9 @@ class RestorerNetwork(HalfUNet):
     def forward(self, told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n 3 h w"]:
         """The mended view in RGB; sides are multiples of 2."""
         answer, _ = self.answered(told)
-        logits, detail = answer[:, : -len(_DETAIL)], _MOST_DETAIL * torch.tanh(answer[:, -len(_DETAIL) :])
+        logits, signed = answer.split([answer.shape[1] - len(_DETAIL), len(_DETAIL)], dim=1)
+        # Gently, or the first steps drive it to its ends, where it learns no more.
+        detail = _MOST_DETAIL * torch.tanh(signed / _FIRM)
         pictures = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
         prior = [_constant(told, 1.0)] + [told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES]
         taps = [(k, shift) for k, shifts in enumerate(_TAPS) for shift in shifts]
