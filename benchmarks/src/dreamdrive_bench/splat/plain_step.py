@@ -146,7 +146,8 @@ class PlainTrainer:
         loss = loss + geometry_loss(
             rendered.depth_m, rendered.alpha, view.depth_m, view.depth_weight, view.sky, *weights
         )
-        loss = loss + options.solid_weight * ((1 - rendered.alpha) * view.solid).mean()
+        if options.solid_weight:
+            loss = loss + options.solid_weight * ((1 - rendered.alpha) * view.solid).mean()
         loss = loss + options.stray_weight * (rendered.channels[..., 0] * view.still).mean()
         loss.backward()
         moving = 0.1**done if done >= options.warm_up else 0.0
