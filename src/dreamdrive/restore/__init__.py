@@ -8,7 +8,10 @@ if TYPE_CHECKING:
     from dreamdrive.restore.carried import Recordings as Recordings
     from dreamdrive.restore.network import (
         CHANNELS as CHANNELS,
+        ERROR as ERROR,
         FIRST_PLANES as FIRST_PLANES,
+        MOVES as MOVES,
+        UNSEEN as UNSEEN,
         RestorerNetwork as RestorerNetwork,
         load_restorer as load_restorer,
     )

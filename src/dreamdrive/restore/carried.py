@@ -13,7 +13,7 @@ from torch import Tensor
 from dreamdrive.compute.threads import one_torch_thread
 from dreamdrive.data.pictures.picture_file import frame_of
 from dreamdrive.errors import InputError
-from dreamdrive.restore.network import CHANNELS, FRAMES, OF_FRAME, OF_VIEW
+from dreamdrive.restore.network import CHANNELS, FRAMES, MOVES, OF_FRAME, OF_VIEW
 from dreamdrive.scene.camera import NEAR_M, Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import SceneView, moment_of, render_scene
@@ -28,7 +28,6 @@ _SAME = 0.1
 _KEPT = 8
 """Frames that are decoded at a time."""
 _ERROR = 4.0
-_MOVES = 5
 
 
 @dataclass
@@ -106,7 +105,7 @@ class Recordings:
             maps[first : first + OF_FRAME] = self._carried(view, camera, seen.seen_depth_m, shift_m)
             if self.scene.times_s[view] != t_s:
                 # What moves is elsewhere, and no track is so precise that it would be found there as sharp.
-                maps[first + 3] *= 1 - maps[_MOVES].clip(0, 1)
+                maps[first + 3] *= 1 - maps[MOVES].clip(0, 1)
         return seen, maps
 
     def _shifts_m(self, means: Float[Tensor, "m 3"], t_s: float, view: int) -> Float[Tensor, "m 3"]:

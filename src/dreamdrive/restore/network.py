@@ -15,6 +15,8 @@ OF_VIEW, OF_FRAME = 8, 4
 CHANNELS = OF_VIEW + FRAMES * OF_FRAME
 """Of the view its RGB, alpha, inverse depth, share of what moves, error of what it shows in the recorded
 views and how little they saw of it; of each recorded frame its RGB and how well it shows the same surface."""
+MOVES, ERROR, UNSEEN = 5, 6, 7
+"""Where three of the view are: what moves, how far off it is, how little it was seen."""
 FIRST_PLANES = range(OF_VIEW, CHANNELS, OF_FRAME)
 """Where each recorded frame begins in these."""
 WIDTHS = (24, 48, 96, 192)
