@@ -120,7 +120,7 @@ WRITERS = {
     "train restorer": Writer(
         "train restorer --drives IN/drive/frames --each 1 --steps 1 --batch 1 -o OUT",
         goes_on=True,
-        moments=2,  # it makes three scenes, in two other processes
+        moments=4,  # it makes three scenes, in two other processes
     ),
 }
 
