@@ -1,5 +1,6 @@
 """States of a scene beside each other: what they add, their pictures, their figures."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -8,33 +9,74 @@ import pytest
 import torch
 
 from dreamdrive.build import Built
+from dreamdrive.scene.camera import Camera
+from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
+from dreamdrive.splat import SceneView, render_scene
 from dreamdrive_bench import completion
 from dreamdrive_bench.oracle.views import Seen
 from tests.scene.scenes import make_scene
 
 
-def doubled(scene: Scene, _: Geometry) -> Scene:
+def doubled(scene: Scene, *_: object) -> Scene:
     return scene.with_standing(scene.static)
+
+
+def darkened(built: Built, scene: Scene) -> SimpleNamespace:
+    def view(camera: Camera, t_s: float) -> SceneView:
+        seen = render_scene(scene, camera, t_s)
+        return replace(seen, colour=0.5 * seen.colour)
+
+    return SimpleNamespace(view=view)
 
 
 @pytest.fixture
 def built(monkeypatch: pytest.MonkeyPatch) -> Built:
-    monkeypatch.setattr(completion, "STATES", {"bare": completion.as_fitted, "doubled": doubled})
+    monkeypatch.setattr(completion, "completed", doubled)
+    monkeypatch.setattr(completion, "restorer_of", darkened)
     return cast("Built", SimpleNamespace(scene=make_scene(), geometry=None))
 
 
 def test_each_state_is_made_and_shown(built: Built) -> None:
-    scenes, made = completion.states_of(built)
-    assert scenes["bare"] is built.scene
-    assert made["bare"]["added"] == 0
-    assert made["doubled"]["added"] == len(built.scene.static)
-    sheet = completion.sheet_of(scenes)
-    camera = built.scene.cameras[0]
-    assert sheet.shape == (3 * camera.height_px, 4 * camera.width_px, 3)
-    bare, twice = sheet[:, : camera.width_px], sheet[:, camera.width_px : 2 * camera.width_px]
+    states, made = completion.states_of(built)
+    assert states["bare"].scene is states["restored"].scene is built.scene
+    assert [made[name]["added"] for name in states] == [0, len(built.scene.static)] * 2
+    sheet = completion.sheet_of(states)
+    width, height = built.scene.cameras[0].width_px, built.scene.cameras[0].height_px
+    assert sheet.shape == (6 * height, 4 * width, 3)
+    bare, twice, restored, _ = (sheet[:, k * width : (k + 1) * width] for k in range(4))
     assert (bare != twice).any()
+    assert (bare != restored).any()
+
+
+def test_a_drive_is_judged_where_its_frames_count(built: Built) -> None:
+    scene = built.scene
+    states, _ = completion.states_of(built)
+    pictures = [
+        render_scene(scene, scene.cameras[k], float(scene.times_s[k])).picture
+        for k in range(len(scene.cameras))
+    ]
+    frames, fixed = np.stack(pictures), np.zeros((1, *pictures[0].shape[:2]), np.uint8)
+    frames[:, :4] = 255 - frames[:, :4]  # of the own car
+    fixed[:, :4] = 1
+    count = len(frames)
+    clip = SimpleNamespace(
+        frames=frames,
+        times_s=scene.times_s,
+        camera=np.zeros(count, int),
+        valid=np.ones(frames.shape[:3], bool),
+        held_out=np.arange(count) == 1,
+    )
+    judged = [
+        completion.withheld(
+            states[name], cast("Clip", clip), cast("Geometry", SimpleNamespace(fixed_regions=fixed))
+        )
+        for name in ("bare", "restored")
+    ]
+    assert judged[0] == pytest.approx(100)
+    assert judged[1] is not None
+    assert judged[1] < 40
 
 
 def test_figures_are_of_their_pixels() -> None:
@@ -61,7 +103,10 @@ def test_the_table_has_means_of_what_is_there() -> None:
     def row(db: float | None) -> dict[str, Any]:
         one = {**dict.fromkeys(completion.GROUPS, 20.0), "moving": db, "stlpips": 0.25}
         return {
-            "states": {s: {"seconds": 2.0, **dict.fromkeys(completion.VIEWS, one)} for s in completion.STATES}
+            "states": {
+                s: {"seconds": 2.0, "frame_s": 0.5, **dict.fromkeys(completion.VIEWS, one)}
+                for s in completion.STATES
+            }
         }
 
     told = completion.table([row(None), row(10.0), row(14.0)])

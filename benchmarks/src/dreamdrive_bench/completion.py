@@ -1,14 +1,16 @@
-"""What completion is worth: scenes as they are fitted beside the same with what no frame saw put in space.
+"""What completion and the restorer are worth: scenes as they are fitted beside the same with either and both.
 
 Drawn streets of edition 1, clean, true poses, ``draft``, the twin of the street network: PSNR of held-out
 frames and of views 2 and 3 m aside, over all pixels and over those that stand, move and that no training
-frame saw, perceptual distance (stlpips-vgg), seconds of completion. Of every recorded drive that is there a
-sheet shows its first, middle and last view from 2 m to the left and right, in each state.
+frame saw, perceptual distance (stlpips-vgg), seconds of completion and of a frame. Of every recorded drive
+that is there PSNR of its held-out frames, and a sheet that shows its first, middle and last view from 2 m to
+the left and right, in each state.
 """
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,12 +21,14 @@ from dreamdrive.build import Built, build_scene
 from dreamdrive.complete import CompletionOptions, completed
 from dreamdrive.evaluate.networks import stlpips
 from dreamdrive.options import Options
+from dreamdrive.restore import Recordings, Restorer, load_restorer
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 from dreamdrive.show import grid as panels, write_png
-from dreamdrive.splat import render_scene
+from dreamdrive.splat import SceneView, render_scene
+from dreamdrive.trust import evidence_of
 from dreamdrive_bench.common.machine import describe_machine
 from dreamdrive_bench.common.markdown import grid, number
 from dreamdrive_bench.common.options import parser_of
@@ -38,22 +42,39 @@ from dreamdrive_bench.street.case import Case, clip_of
 from dreamdrive_bench.street.methods import QUALITY
 from dreamdrive_bench.street.views import true_cameras
 
-State = Callable[[Scene, Geometry], Scene]
 Distance = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
 
-def as_fitted(scene: Scene, _: Geometry) -> Scene:
-    """Nothing is added."""
-    return scene
+@dataclass(frozen=True)
+class State:
+    """What is made of a fitted scene.
+
+    Attributes:
+        complete: Whether what no frame saw is put in space.
+        restore: Whether its views are mended with recorded frames.
+    """
+
+    complete: bool
+    restore: bool
 
 
-def with_completion(scene: Scene, geometry: Geometry) -> Scene:
-    """As a build completes it unless told."""
-    return completed(scene, geometry, CompletionOptions())
+STATES = {
+    "bare": State(complete=False, restore=False),
+    "completed": State(complete=True, restore=False),
+    "restored": State(complete=False, restore=True),
+    "both": State(complete=True, restore=True),
+}
+"""By their names; all are measured and shown in this order."""
 
 
-STATES: dict[str, State] = {"bare": as_fitted, "completed": with_completion}
-"""What is made of a fitted scene, by name; all are measured and shown in this order."""
+@dataclass(frozen=True)
+class Shown:
+    """A scene in one state, and how it is seen."""
+
+    scene: Scene
+    view: Callable[[Camera, float], SceneView]
+
+
 VIEWS = ("held_out", "shift_2", "shift_3")
 GROUPS = ("all", "standing", "moving", "unseen")
 ASIDE_M = 2.0
@@ -70,10 +91,12 @@ def main() -> int:
     shown: list[dict[str, Any]] = []
     for name in there if args.drives is None else args.drives:
         built = fitted(there[name].clip(), options_of(there[name], TWIN, "draft"))
-        scenes, made = states_of(built)
-        write_png(args.runs / f"{name}.png", sheet_of(scenes))
+        states, made = states_of(built)
+        write_png(args.runs / f"{name}.png", sheet_of(states))
+        for state, each in states.items():
+            made[state]["held_out"] = withheld(each, built.clip, built.geometry)
         shown.append({"name": name, "drifts": built.scene.moves_per_frame, "states": made})
-        print(name, made, flush=True)
+        print(name, {state: each["held_out"] for state, each in made.items()}, flush=True)
     distance = stlpips.load_stlpips("vgg") if args.seeds else None
     rows = [measured(seed, distance) for seed in args.seeds if distance is not None]
     worlds = {"set": set_of(args.seeds), "rows": rows}
@@ -86,37 +109,66 @@ def fitted(clip: Clip, options: Options) -> Built:
     return build_scene(clip, replace(options, completion=CompletionOptions(aside_m=0.0)))
 
 
-def states_of(built: Built) -> tuple[dict[str, Scene], dict[str, dict[str, float]]]:
+def states_of(built: Built) -> tuple[dict[str, Shown], dict[str, dict[str, float | None]]]:
     """The scene in each state; and of each how many Gaussians that added, and in what seconds of one core."""
-    scenes, made = dict[str, Scene](), dict[str, dict[str, float]]()
+    states, made = dict[str, Shown](), dict[str, dict[str, float | None]]()
+    began_s = time.process_time()
+    full = completed(built.scene, built.geometry, CompletionOptions())
+    took_s = time.process_time() - began_s
     for name, state in STATES.items():
+        scene = full if state.complete else built.scene
+        view = restorer_of(built, scene).view if state.restore else partial(render_scene, scene)
+        states[name] = Shown(scene, view)
         began_s = time.process_time()
-        scenes[name] = state(built.scene, built.geometry)
-        took_s = time.process_time() - began_s
-        made[name] = {"seconds": took_s, "added": len(scenes[name].static) - len(built.scene.static)}
-    return scenes, made
+        view(scene.cameras[0].moved(ASIDE_M), float(scene.times_s[0]))
+        made[name] = {
+            "seconds": took_s if state.complete else 0.0,
+            "added": len(scene.static) - len(built.scene.static),
+            "frame_s": time.process_time() - began_s,
+        }
+    return states, made
+
+
+def restorer_of(built: Built, scene: Scene) -> Restorer:
+    """That of a scene in some state, with the frames that it was fitted to."""
+    assert scene.residual is not None
+    evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
+    frames = built.clip.frames
+    recordings = Recordings(scene, evidence, lambda view: frames[view], np.flatnonzero(~scene.held_out))
+    return Restorer(recordings, load_restorer())
+
+
+def withheld(shown: Shown, clip: Clip, geometry: Geometry) -> float | None:
+    """Mean PSNR in dB of the held-out frames of a recorded drive, where they count."""
+    found = list[float]()
+    for index in np.flatnonzero(clip.held_out).tolist():
+        counts = clip.valid[index] & (geometry.fixed_regions[clip.camera[index]] == 0)
+        picture = shown.view(shown.scene.cameras[index], float(clip.times_s[index])).picture
+        wrong = np.square((picture.astype(np.float32) - clip.frames[index]) / 255)[counts]
+        found.append(float(-10 * np.log10(max(float(wrong.mean()), 1e-10))))
+    return float(np.mean(found)) if found else None
 
 
 def measured(seed: int, distance: Distance) -> dict[str, Any]:
     """The figures of one street, by state and view."""
     clip = clip_of(Case(seed, "true", "clean"))
-    scenes, made = states_of(fitted(clip, QUALITY))
-    found: dict[str, dict[str, Any]] = {name: dict(made[name]) for name in scenes}
+    states, made = states_of(fitted(clip, QUALITY))
+    found: dict[str, dict[str, Any]] = {name: dict(made[name]) for name in states}
     for view in VIEWS:
         truth, cameras = seen(seed, view, clip), true_cameras(seed, view)
         frames = np.flatnonzero(truth.counts)[:: 1 if view == "held_out" else _EVERY]
-        for name, scene in scenes.items():
-            found[name][view] = figures(pictures(scene, cameras, frames), truth, frames, distance)
+        for name, shown in states.items():
+            found[name][view] = figures(pictures(shown, cameras, frames), truth, frames, distance)
     print(seed, {name: found[name]["shift_2"] for name in found}, flush=True)
     return {"seed": seed, "states": found}
 
 
 def pictures(
-    scene: Scene, cameras: Sequence[Camera], frames: Int[np.ndarray, " k"]
+    shown: Shown, cameras: Sequence[Camera], frames: Int[np.ndarray, " k"]
 ) -> UInt8[np.ndarray, "k h w 3"]:
     """What a scene shows these cameras at the times of some of its frames."""
-    shown = [render_scene(scene, cameras[k], float(scene.times_s[k])).picture for k in frames.tolist()]
-    return np.stack(shown)
+    times_s = shown.scene.times_s
+    return np.stack([shown.view(cameras[k], float(times_s[k])).picture for k in frames.tolist()])
 
 
 def figures(
@@ -133,29 +185,29 @@ def figures(
     return {**psnr, "stlpips": float(np.mean(apart))}
 
 
-def sheet_of(scenes: dict[str, Scene]) -> UInt8[np.ndarray, "h w 3"]:
+def sheet_of(states: dict[str, Shown]) -> UInt8[np.ndarray, "h w 3"]:
     """First, middle and last view from both sides, the states beside each other."""
     images: dict[str, np.ndarray] = {}
-    views = next(iter(scenes.values())).front
+    views = next(iter(states.values())).scene.front
     for view in views[[0, len(views) // 2, -1]].tolist():
         for right_m in (-ASIDE_M, ASIDE_M):
-            for name, scene in scenes.items():
-                camera, t_s = scene.cameras[view].moved(right_m), float(scene.times_s[view])
-                images[f"{name}, view {view}, {right_m:+g} m"] = render_scene(scene, camera, t_s).picture
-    return panels(images, columns=2 * len(scenes))
+            for name, shown in states.items():
+                camera, t_s = shown.scene.cameras[view].moved(right_m), float(shown.scene.times_s[view])
+                images[f"{name}, view {view}, {right_m:+g} m"] = shown.view(camera, t_s).picture
+    return panels(images, columns=len(states))
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """Means over the streets, a state and view a line."""
-    lines = [["view", "state", *(f"{group}, dB" for group in GROUPS), "stlpips-vgg", "s"]]
+    lines = [["view", "state", *(f"{group}, dB" for group in GROUPS), "stlpips-vgg", "s", "s a frame"]]
     for view in VIEWS if rows else ():
         for name in STATES:
             found = [row["states"][name] for row in rows]
             cells = [mean_of([one[view][key] for one in found]) for key in (*GROUPS, "stlpips")]
-            seconds = mean_of([one["seconds"] for one in found])
+            seconds = [mean_of([one[key] for one in found]) for key in ("seconds", "frame_s")]
             digits = [".2f"] * len(GROUPS) + [".4f"]
             told = [number(cell, each) for cell, each in zip(cells, digits, strict=True)]
-            lines.append([view, name, *told, number(seconds, ".1f")])
+            lines.append([view, name, *told, *(number(each, ".2f") for each in seconds)])
     return grid(lines)
 
 

@@ -70,6 +70,8 @@ class FusionOptions:
         stereo_spread: Of stereo that is believed, and of the road.
         least_spread: Of the network, at least.
         contact_spread: Of the depth by a road user's contact with the road, beside that of the row.
+        thin_spread: Of people and two-wheelers, at least: a row is a tenth of their distance, and masks of
+            what is so small are off by as much.
         end_overhang: How much nearer front and rear are than their contact with the road, over the height.
         side_overhang: The same of the sides.
         user_stereo: Log depth by which sure stereo on a standing road user may differ from its contact.
@@ -89,6 +91,7 @@ class FusionOptions:
     stereo_spread: float = 0.013
     least_spread: float = 0.05
     contact_spread: float = 0.06
+    thin_spread: float = 0.2
     end_overhang: float = 0.3
     side_overhang: float = 0.1
     user_stereo: float = 0.12

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from dreamdrive.compute.device import CPU
+from dreamdrive.names import RESTORE_NETWORK
 from dreamdrive.restore.carried import Recordings
 from dreamdrive.restore.network import RestorerNetwork, load_restorer
 from dreamdrive.scene.camera import Camera
@@ -31,9 +32,13 @@ class Restorer:
 
     @classmethod
     def of(
-        cls, scene: Scene, evidence: GaussianEvidence, weights: Path, device: torch.device = CPU
+        cls,
+        scene: Scene,
+        evidence: GaussianEvidence,
+        weights: str | Path = RESTORE_NETWORK,
+        device: torch.device = CPU,
     ) -> "Restorer":
-        """That of a scene, with weights of ``dreamdrive train restorer``.
+        """That of a scene, with the weights that ship or with those of ``dreamdrive train restorer``.
 
         Raises:
             InputError: The scene was changed or holds no recorded frames, or there are no such weights.

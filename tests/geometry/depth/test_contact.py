@@ -114,3 +114,21 @@ def test_sides_are_hardly_nearer_than_the_wheels() -> None:
         ).inverse[16, 44:58]
     )
     assert (wheels - surface < 0.5 * end_m).all()
+
+
+def rider() -> tuple[np.ndarray, np.ndarray]:
+    """A two-wheeler (1) on the road and who sits on it (2), who meets no ground."""
+    instances, ground = standing(45)
+    instances[24:33, 24:36] = 2
+    return instances, ground & (instances == 0)
+
+
+def test_who_is_carried_is_where_the_carrier_is() -> None:
+    found = on_the_road(*rider(), plane(), 1.5, np.zeros(3, bool), FusionOptions())
+    assert np.allclose(found.inverse[rider()[0] == 2], (46 - HORIZON) / 150)
+    assert (found.spread[rider()[0] == 2] > 0).all()
+
+
+def test_nobody_stands_on_a_vehicle() -> None:
+    found = on_the_road(*rider(), plane(), 1.5, np.array([False, True, False]), FusionOptions())
+    assert not found.inverse[rider()[0] == 2].any()

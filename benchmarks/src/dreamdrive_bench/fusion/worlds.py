@@ -20,6 +20,7 @@ from dreamdrive_bench.street.views import counted, true_frames
 OFF = 0.1
 FAR_M = 80.0
 _VEHICLES = (Semantic.CAR, Semantic.VAN, Semantic.TRUCK, Semantic.BUS)
+_TWO_WHEELERS = (Semantic.BICYCLE, Semantic.MOTORCYCLE)
 _VIEWS = ("held_out", "shift_2")
 
 
@@ -40,6 +41,7 @@ def judge_world(case: Case, knowledge: str, folder: Path) -> dict[str, Any]:
         **views,
         "mask_iou": labels.mask.iou,
         "fake_motion_mm": None if labels.fake is None else 1000 * labels.fake.mean_m,
+        "box_off_m": None if labels.boxes is None else labels.boxes.position_median_m,
         **depth_shares(geometry, made, ~scene.held_out),
         "fallback": geometry.fallback,
         "look_s": stages.seconds["look"],
@@ -54,16 +56,24 @@ def depth_shares(
     """Shares of pixels whose depth is off, by what they show, and of the intervals that hold the truth."""
     true, depth = made.depth_m[used].astype(np.float64), geometry.depth_m[used].astype(np.float64)
     counts, moving = (true > 0) & (true < FAR_M), made.moving[used]
-    vehicle = np.isin(made.semantic[used], _VEHICLES)
+    vehicle, wheels = (np.isin(made.semantic[used], kinds) for kinds in (_VEHICLES, _TWO_WHEELERS))
     still = counts & (depth > 0) & ~moving & (made.instance[used] == 0)
     scale = np.median(true[still] / depth[still])
     off = np.where(depth > 0, np.abs(depth * scale - true) / np.maximum(true, 1e-3), np.inf)
-    groups = {"standing_off": vehicle & ~moving, "moving_off": vehicle & moving, "static_off": ~moving}
-    found = {name: _share(off[counts & inside] > OFF) for name, inside in groups.items()}
-    if geometry.spread is None:
-        return {**found, "held_by_68": None}
-    told = counts & (depth > 0)
-    return {**found, "held_by_68": _share(off[told] < geometry.spread[used][told])}
+    groups = {
+        "standing": vehicle & ~moving,
+        "moving": vehicle & moving,
+        "two_wheelers": wheels & moving,
+        "people": moving & (made.semantic[used] == Semantic.PEDESTRIAN),
+        "static": ~moving,
+    }
+    found = {f"{name}_off": _share(off[counts & inside] > OFF) for name, inside in groups.items()}
+    told, spread = counts & (depth > 0), geometry.spread
+    held = {"": np.ones_like(told), **{f"{name}_": groups[name] for name in ("standing", "moving")}}
+    for name, inside in held.items():
+        there = told & inside
+        found[f"{name}held_by_68"] = None if spread is None else _share(off[there] < spread[used][there])
+    return found
 
 
 def _share(of: Bool[np.ndarray, " n"]) -> float | None:

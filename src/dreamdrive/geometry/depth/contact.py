@@ -13,6 +13,7 @@ _LEAST_PX = 8  # of a thing that is given a depth
 _BELOW_PX = 2  # rows under a thing's lowest pixel in which the ground is looked for
 _SEEN_SHARE = 0.1  # of a thing's columns whose contact has to be seen
 _SEEN_COLUMNS = 3
+_LEAST_BORDER_PX = 3  # with what carries it
 _LEAST_INVERSE = 1 / 250  # 1/m; a contact farther away is the horizon
 _ENDS = 0.2  # of a thing's columns on each side
 _MOST_END_PX = 15  # of pictures that are 480 wide
@@ -43,7 +44,8 @@ def on_the_road(
 
     Wheels touch the road, the floor between them does not: the line of contact is the lower convex hull of
     the outline, taken of those columns in which the ground is seen right below. Columns between these are on
-    the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing.
+    the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing; but who sits on
+    a two-wheeler, or the upper part of a person that was taken for two, is where that below it is.
 
     ``plane_inverse`` is inverse depth of the road in 1/m, ``camera_height_m`` above which the camera is;
     ``is_vehicle`` has a flag for each label, 0 included. The surface of a vehicle is nearer than its contact.
@@ -79,7 +81,29 @@ def on_the_road(
         place[1, columns[near]] = np.hypot(_ROW_PX * a_row[near], options.contact_spread)
         inverse[mask] = np.broadcast_to(place[0], mask.shape)[mask]
         spread[mask] = np.broadcast_to(place[1], mask.shape)[mask]
+    _carry(instances, is_vehicle, inverse, spread)
     return Contact(inverse, spread)
+
+
+def _carry(
+    instances: Integer[np.ndarray, "h w"],
+    is_vehicle: Bool[np.ndarray, " n"],
+    inverse: Float[np.ndarray, "h w"],
+    spread: Float[np.ndarray, "h w"],
+) -> None:
+    """People and two-wheelers without a contact get that of what carries them: no vehicle, right below."""
+    placed = np.bincount(instances.ravel(), inverse.ravel(), minlength=len(is_vehicle)) > 0
+    above, under = instances[:-1], instances[1:]
+    for label in np.flatnonzero(~placed & ~is_vehicle).tolist():
+        border = np.bincount(under[(above == label) & (under != label)], minlength=len(is_vehicle))
+        border[~placed | is_vehicle] = 0
+        border[0] = 0
+        carrier = int(border.argmax())
+        if label == 0 or border[carrier] < _LEAST_BORDER_PX:
+            continue
+        inside = (instances == carrier) & (inverse > 0)
+        inverse[instances == label] = np.median(inverse[inside])
+        spread[instances == label] = np.median(spread[inside])
 
 
 def _at_rows(

@@ -190,6 +190,8 @@ def fuse(
     contact_spread = np.hypot(contact.spread, plane.spread_per_m / np.maximum(contact.inverse, 1e-4))
     standing = (contact.inverse > 0) & shown & ((plane.spread_per_m == 0) | (contact_spread < spread))
     log_depth[standing], spread[standing] = _log_depth(contact.inverse)[standing], contact_spread[standing]
+    thin = np.isin(seen.classes, (StreetClass.PERSON, StreetClass.TWO_WHEELER))
+    spread[thin] = np.maximum(spread[thin], options.thin_spread)
     depth = np.clip(np.exp(log_depth), _NEAREST_M, _FARTHEST_M)
     trust = np.where(stereo, confidence, np.clip(_TRUSTED / spread, 0, 1))
     maps = (np.where(shown, each, 0).astype(np.float32) for each in (1 / depth, trust, spread))
