@@ -191,4 +191,5 @@ NB_MODULE(_native, m) {
   bind_fit(m);
   bind_geometry(m);
   bind_motion(m);
+  bind_restore(m);
 }

@@ -5,3 +5,4 @@
 void bind_fit(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_motion(nanobind::module_& m);
+void bind_restore(nanobind::module_& m);

@@ -10,6 +10,6 @@ const Kernels kTable = {DD_STRING(DD_ISA), project, project_backward, cover, com
                         l1_ssim, l1_ssim_backward, over_sky, over_sky_backward, geometry_loss, adam, activate,
                         activate_backward, network, network_backward, planes, planes_backward,
                         steepness, sweep_cost, sweep_misfit, smooth,
-                        weighted_median};
+                        weighted_median, mix};
 
 }  // namespace dd::DD_ISA

@@ -30,6 +30,7 @@ void sweep_cost(const SweepTask&);
 void sweep_misfit(const SweepTask&);
 void smooth(const SmoothTask&);
 void weighted_median(const MedianTask&);
+void mix(const MixTask&);
 
 extern const Kernels kTable;
 

@@ -131,6 +131,17 @@ constexpr int kSsimRadius = 5, kSsimScratchRows = 4 * (1 + 11) + 1;
 // Floats of one row with its padding, rounded up so that whole lanes may be read past the end.
 static inline int ssim_row(int width) { return (3 * (width + 2 * kSsimRadius) + 31) / 16 * 16; }
 
+// Rows [first, last) of a view that is mixed from its surroundings in several pictures.
+struct MixTask {
+  const float* answer;                          // (taps + details, h, w)
+  const float* pictures;                        // (n, 4, h + 2 reach, w + 2 reach): RGB and how sure; the view first
+  const int32_t* tap;                           // (taps, 3): picture, rows and columns away; the view's own pixel first
+  const int32_t* detail;                        // (details, 2): rows and columns away in the view
+  float* mixed;                                 // (3, h, w)
+  int taps, details, height, width, reach, first, last;
+  float own, most_detail, gentle;               // logit of the own pixel; what scales the details
+};
+
 // The same functions compiled for one instruction set.
 struct Kernels {
   const char* isa;
@@ -169,6 +180,7 @@ struct Kernels {
   void (*sweep_misfit)(const SweepTask&);   // (labels, h, w): mean absolute difference in grey levels
   void (*smooth)(const SmoothTask&);
   void (*weighted_median)(const MedianTask&);
+  void (*mix)(const MixTask&);
 };
 
 const Kernels& kernels();                       // the set chosen at run time

@@ -1,7 +1,8 @@
 """Types of the compiled core: native/bindings/module.cpp and what that binds from its neighbours.
 
 Arrays are contiguous float32 CPU tensors, or NumPy's of geometry; ``visible``, ``mask``, ``usable`` and the
-``sky`` of the geometry loss are bool, ``actor`` is int64, homographies are float64.
+``sky`` of the geometry loss are bool, ``actor`` is int64, ``taps`` and ``details`` are
+int32, homographies are float64.
 """
 
 import numpy as np
@@ -242,3 +243,13 @@ def smooth(
 ) -> None: ...
 def weighted_median(values: np.ndarray, weights: np.ndarray, median: np.ndarray) -> None: ...
 def minimum_cut(gain: np.ndarray, right: np.ndarray, below: np.ndarray, labelled: np.ndarray) -> None: ...
+def mix(
+    answer: Tensor,
+    pictures: Tensor,
+    taps: Tensor,
+    details: Tensor,
+    own: float,
+    most_detail: float,
+    gentle: float,
+    mixed: Tensor,
+) -> None: ...

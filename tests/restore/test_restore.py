@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, strategies as st
 from safetensors.torch import save_file
 
 from dreamdrive.data.pictures.picture_file import frame_of, kept_frame
@@ -191,3 +192,16 @@ def test_a_kept_frame_is_the_frame_but_for_jpeg() -> None:
     for wrong, size in ((kept, (64, 96)), (kept[:200], (96, 64)), (b"", (96, 64))):
         with pytest.raises(InputError, match="recorded frame"):
             frame_of(wrong, size)
+
+
+@given(height=st.integers(1, 6), width=st.integers(1, 20), seed=st.integers(0, 100))
+def test_the_core_mixes_as_torch_does(height: int, width: int, seed: int) -> None:
+    """Also where rows are shorter than what it takes at a time, and where logits are far apart."""
+    generator = torch.Generator().manual_seed(seed)
+    told = torch.rand(2, CHANNELS, 2 * height, 2 * width, generator=generator)
+    network = RestorerNetwork((8, 8)).eval()
+    with torch.no_grad():
+        network.answer.weight.normal_(0, 3, generator=generator)
+        network.answer.bias.normal_(0, 30, generator=generator)
+        mixed = network(told)
+    assert torch.allclose(mixed, network(told).detach(), atol=2e-5)

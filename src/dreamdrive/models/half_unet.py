@@ -53,7 +53,7 @@ class HalfUNet(nn.Module):
             size = kept[level].shape[2:]
             wider = nn.functional.interpolate(self.up[level](x), scale_factor=2, mode="nearest")
             x = self.leave[level](kept[level] + wider[..., : size[0], : size[1]])
-        return nn.functional.pixel_shuffle(self.answer(x), 2), x
+        return nn.functional.pixel_shuffle(self.answer(x.contiguous()), 2), x
 
 
 def _even(x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:

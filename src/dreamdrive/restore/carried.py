@@ -122,15 +122,18 @@ class Recordings:
     ) -> Float[np.ndarray, "4 h w"]:
         """A recorded frame where it shows the same surface, and how surely it does, 0 to 1."""
         there, solid = self.scene.cameras[view], depth_m > 0
-        rays = camera.rays() @ camera.world_from_camera[:3, :3].T
-        away = np.where(solid, depth_m, _FAR_M)[..., None] * rays + camera.world_from_camera[:3, 3]
-        away = away if shift_m is None else away + shift_m
-        pose = there.camera_from_world
-        local = away @ pose[:3, :3].T + pose[:3, 3]
-        z_m = local[..., 2].astype(np.float32)
-        ahead_m = np.maximum(z_m, NEAR_M)
-        u = (local[..., 0] / ahead_m * there.fx_px + there.cx_px).astype(np.float32)
-        v = (local[..., 1] / ahead_m * there.fy_px + there.cy_px).astype(np.float32)
+        # Single precision, but for the place: two cameras may be far from where the world begins.
+        pose = there.camera_from_world @ camera.world_from_camera
+        rays = (camera.rays() @ pose[:3, :3].T).astype(np.float32)
+        local = np.where(solid, depth_m, np.float32(_FAR_M))[..., None] * rays + pose[:3, 3].astype(
+            np.float32
+        )
+        if shift_m is not None:
+            local += shift_m @ there.camera_from_world[:3, :3].T.astype(np.float32)
+        z_m = local[..., 2]
+        ahead_m = np.maximum(z_m, np.float32(NEAR_M))
+        u = local[..., 0] / ahead_m * np.float32(there.fx_px) + np.float32(there.cx_px)
+        v = local[..., 1] / ahead_m * np.float32(there.fy_px) + np.float32(there.cy_px)
         inside = (z_m > NEAR_M) & (u >= 0) & (u < there.width_px) & (v >= 0) & (v < there.height_px)
         inverse = self._inverse_depth(view)
         sy, sx = (
@@ -139,11 +142,15 @@ class Recordings:
         known = cv2.remap(
             inverse, u * sx - 0.5, v * sy - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
-        off = np.where(solid, np.abs(ahead_m * known - 1), _NEAR_M * known)
-        sure = inside * np.exp(-off / _SAME)
+        off = np.where(solid, np.abs(ahead_m * known - 1), np.float32(_NEAR_M) * known)
+        sure = inside * np.exp(off * np.float32(-1 / _SAME))
         rgb = cv2.remap(self.frame(view), u - 0.5, v - 0.5, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        carried = np.concatenate([inside[..., None] * rgb / 255.0, sure[..., None]], axis=2)
-        return carried.transpose(2, 0, 1).astype(np.float32)
+        carried = np.empty((OF_FRAME, *sure.shape), np.float32)
+        np.multiply(
+            rgb.transpose(2, 0, 1), np.where(inside, np.float32(1 / 255), np.float32(0)), out=carried[:3]
+        )
+        carried[3] = sure
+        return carried
 
     def _inverse_depth(self, view: int) -> Float[np.ndarray, "h2 w2"]:
         """Of a recorded view in 1/m, at half its size; 0 where nothing stands."""

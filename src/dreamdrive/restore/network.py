@@ -6,6 +6,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from dreamdrive import _native
+from dreamdrive.compute.device import in_core
 from dreamdrive.errors import InputError
 from dreamdrive.models import HalfUNet, fill_network, read_state
 from dreamdrive.names import RESTORE_NETWORK
@@ -20,7 +22,7 @@ MOVES, ERROR, UNSEEN = 5, 6, 7
 """Where three of the view are: what moves, how far off it is, how little it was seen."""
 FIRST_PLANES = range(OF_VIEW, CHANNELS, OF_FRAME)
 """Where each recorded frame begins in these."""
-WIDTHS = (24, 48, 96, 192)
+WIDTHS = (16, 48, 96, 192)
 _FILE = Path(__file__).with_name("restorer.safetensors")
 EXPECTED = "weights of the restorer, as `dreamdrive train restorer` writes them"
 _AROUND = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -30,6 +32,8 @@ _TAPS = ((0, 0),), *[_AROUND + _BESIDE] * FRAMES
 
 What is seen from aside and at a wrong depth lies too far left or right.
 """
+_PLACES = [(k, shift) for k, shifts in enumerate(_TAPS) for shift in shifts]
+"""The same, one by one, each with the number of its picture."""
 _DETAIL = _AROUND[:4] + _AROUND[5:] + ((-2, 0), (0, -2), (0, 2), (2, 0))
 """Those in the view whose difference from a pixel is added to it or taken away: it sharpens or smooths."""
 _MOST_DETAIL = 0.5
@@ -48,32 +52,60 @@ class RestorerNetwork(HalfUNet):
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
-        super().__init__(CHANNELS, sum(map(len, _TAPS)) + len(_DETAIL), widths)
+        super().__init__(CHANNELS, len(_PLACES) + len(_DETAIL), widths)
 
     def forward(self, told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n 3 h w"]:
-        """The mended view in RGB; sides are multiples of 2."""
+        """The mended view in RGB; sides are multiples of 2.
+
+        Who learns has the gradients of torch; where none are wanted on the CPU, the compiled core mixes.
+        """
         answer, _ = self.answered(told)
-        logits, signed = answer.split([answer.shape[1] - len(_DETAIL), len(_DETAIL)], dim=1)
-        # Gently, or the first steps drive it to its ends, where it learns no more.
-        detail = _MOST_DETAIL * torch.tanh(signed / _FIRM)
-        pictures = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
-        prior = [_constant(told, 1.0)] + [told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES]
-        taps = [(k, shift) for k, shifts in enumerate(_TAPS) for shift in shifts]
-        wide = [torch.nn.functional.pad(each, [_MOST_PX] * 4, mode="replicate") for each in pictures]
-        sure = [torch.nn.functional.pad(each.log(), [_MOST_PX] * 4, mode="replicate") for each in prior]
-        own = [_FIRM if (k, shift) == (0, (0, 0)) else 0.0 for k, shift in taps]
-        known = torch.cat([_shifted(sure[k], shift) for k, shift in taps], dim=1)
-        shares = torch.softmax(logits + known + told.new_tensor(own)[:, None, None], dim=1)
-        said = torch.zeros_like(told[:, :3])
-        for number, (k, shift) in enumerate(taps):
-            said = said + shares[:, number : number + 1] * _shifted(wide[k], shift)
-        for number, shift in enumerate(_DETAIL):
-            said = said + detail[:, number : number + 1] * (_shifted(wide[0], shift) - pictures[0])
-        return said
+        wide = _wide(told)
+        compiled = in_core(told) and not torch.is_grad_enabled()
+        return (
+            torch.stack([_mixed_in_core(a, w) for a, w in zip(answer, wide, strict=True)])
+            if compiled
+            else mixed(answer, wide)
+        )
 
 
-def _constant(like: Float[Tensor, "n c h w"], value: float) -> Float[Tensor, "n 1 h w"]:
-    return torch.full_like(like[:, :1], value)
+def _wide(told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n p 4 h2 w2"]:
+    """The view and the carried frames, RGB and how sure each is (0, 1], with a border."""
+    sure = [torch.ones_like(told[:, :1])] + [
+        told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES
+    ]
+    rgb = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
+    planes = torch.cat([each for pair in zip(rgb, sure, strict=True) for each in pair], dim=1)
+    wide = torch.nn.functional.pad(planes, [_MOST_PX] * 4, mode="replicate")
+    return wide.unflatten(1, (-1, 4))
+
+
+def mixed(answer: Float[Tensor, "n k h w"], wide: Float[Tensor, "n p 4 h2 w2"]) -> Float[Tensor, "n 3 h w"]:
+    """Pixels as the network's answer mixes them from the pictures of ``_wide``."""
+    logits, signed = answer.split([len(_PLACES), len(_DETAIL)], dim=1)
+    # Gently, or the first steps drive it to its ends, where it learns no more.
+    detail = _MOST_DETAIL * torch.tanh(signed / _FIRM)
+    there = [_shifted(wide[:, k], shift) for k, shift in _PLACES]
+    own = torch.zeros(len(_PLACES), 1, 1, device=answer.device)
+    own[0] = _FIRM
+    known = torch.cat([each[:, 3:] for each in there], dim=1).log()
+    shares = torch.softmax(logits + known + own, dim=1)
+    said = torch.zeros_like(there[0][:, :3])
+    for number, each in enumerate(there):
+        said = said + shares[:, number : number + 1] * each[:, :3]
+    for number, shift in enumerate(_DETAIL):
+        said = said + detail[:, number : number + 1] * (_shifted(wide[:, 0], shift) - there[0])[:, :3]
+    return said
+
+
+def _mixed_in_core(
+    answer: Float[Tensor, "k h w"], wide: Float[Tensor, "p 4 h2 w2"]
+) -> Float[Tensor, "3 h w"]:
+    said = answer.new_empty(3, *answer.shape[1:])
+    taps = torch.tensor([(k, *shift) for k, shift in _PLACES], dtype=torch.int32)
+    details = torch.tensor(_DETAIL, dtype=torch.int32)
+    _native.mix(answer.contiguous(), wide.contiguous(), taps, details, _FIRM, _MOST_DETAIL, _FIRM, said)
+    return said
 
 
 def _shifted(wide: Float[Tensor, "n c h2 w2"], shift: tuple[int, int]) -> Float[Tensor, "n c h w"]:
@@ -84,7 +116,7 @@ def _shifted(wide: Float[Tensor, "n c h2 w2"], shift: tuple[int, int]) -> Float[
 
 
 def load_restorer(given: str | Path = RESTORE_NETWORK) -> RestorerNetwork:
-    """The network with the weights that ship, or with those that ``dreamdrive train restorer`` wrote to a file.
+    """The network with the weights that ship, or with those of a file of ``dreamdrive train restorer``.
 
     Raises:
         InputError: There is no such file, or it is of something else.

@@ -45,6 +45,8 @@ class Restorer:
         """
         network = load_restorer(weights).to(device)
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        # Its answer is read plane by plane.
+        network.answer.to(memory_format=torch.contiguous_format)  # pyright: ignore[reportCallIssue]
         return cls(Recordings.of(scene, evidence), network, device)
 
     def view(self, camera: Camera, t_s: float, besides: int | None = None) -> SceneView:

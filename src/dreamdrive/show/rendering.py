@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
+from dreamdrive.compute.threads import ahead, one_torch_thread
 from dreamdrive.data.formats.cameras import indexed_pinhole
 from dreamdrive.data.pictures.picture_file import write_picture
 from dreamdrive.data.pictures.video_writer import write_video
@@ -67,26 +69,30 @@ def write_drive(
     W, 3) in [0, 1], not of depth alone; ``depth_m`` float32 (H, W) in metres along z, 0 where there is
     nothing; ``alpha`` float32 (H, W), the share of the pixel that Gaussians cover; ``trust`` float32 (H // 8,
     W // 8), where it is shown, of blocks of pixels. ``render.json`` beside them has calibration, poses, times
-    and the PSNR to expect where trust is shown. One frame is held at a time. A restorer mends the colours.
-    ``progress`` is called with the number of frames done.
+    and the PSNR to expect where trust is shown. A restorer mends the colours. One frame is held at a time,
+    with a restorer three. ``progress`` is called with the number of frames done.
     """
     camera = view_camera(scene.cameras[0], options.size)
     part = options.show if options.show in ("dynamic", "static") else "all"
     trust = (trust or SceneTrust.of(scene)) if options.show == "trust" else None
     expected_db: list[float] = []
 
+    def view(place: tuple[Camera, float]) -> SceneView | TrustedView:
+        if restorer is not None:
+            return restorer.view(*place)
+        return render_scene(scene, *place, part=part) if trust is None else trust.view(*place)
+
     def views() -> Iterator[SceneView | TrustedView]:
-        for i, pose in enumerate(drive.path.world_from_camera):
-            here, t_s = camera.at(pose), float(drive.path.times_s[i])
-            if restorer is not None:
-                yield restorer.view(here, t_s)
-            elif trust is None:
-                yield render_scene(scene, here, t_s, part=part)
-            else:
-                seen = trust.view(here, t_s)
-                expected_db.append(seen.psnr_db)
+        path = drive.path
+        places = [(camera.at(path.world_from_camera[i]), float(path.times_s[i])) for i in range(len(path))]
+        # The core splats with all threads; what torch and NumPy do for a restorer takes one.
+        at_once = restorer is not None
+        with one_torch_thread() if at_once else nullcontext():
+            for i, seen in enumerate(ahead(view, places) if at_once else map(view, places)):
+                if isinstance(seen, TrustedView):
+                    expected_db.append(seen.psnr_db)
                 yield seen
-            progress(i + 1)
+                progress(i + 1)
 
     if options.format == "mp4":
         write_video(path, (_picture(view, options) for view in views()), video_rate(drive, options))
