@@ -118,7 +118,7 @@ WRITERS = {
         moments=8,  # a run takes ten seconds: it starts another process
     ),
     "train restorer": Writer(
-        "train restorer --drives IN/drive/frames --each 1 --steps 1 --batch 1 -o OUT",
+        "train restorer --drives IN/drive/frames --each 1 --steps 1 --batch 1 --stlpips 0 -o OUT",
         goes_on=True,
         moments=4,  # it makes three scenes, in two other processes
     ),

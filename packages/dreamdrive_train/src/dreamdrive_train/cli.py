@@ -159,6 +159,7 @@ def restorer(
     seed: Annotated[int, arg(metavar="S")] = 0,
     batch: Annotated[int, arg(metavar="N")] = 4,
     rate: Annotated[float, arg(metavar="R")] = 4e-4,
+    stlpips: Annotated[float, arg(metavar="W")] = 0.5,
     knowledge: Annotated[str, arg(metavar="street|FILE")] = "street",
     licence: Annotated[str, arg(metavar="TEXT")] = "Apache-2.0",
     device: DeviceFlag = "cpu",
@@ -174,22 +175,28 @@ def restorer(
         seed: Seed of everything random.
         batch: Pairs a step.
         rate: Largest step of the optimiser.
+        stlpips: Weight of a perceptual distance, which sharpens; more than 0 takes dreamdrive[metrics].
         knowledge: Weights of the street network that sees the frames.
         licence: Under which the weights may be used; it is written into them.
         device: Where the network is trained; scenes are made on the CPU.
     """
     _check(steps, batch, each, seed, rate)
+    if not 0 <= stlpips < 100:
+        raise InputError(f"--stlpips {stlpips:g}: expected a weight from 0 on, such as 0.5")
     for path in drives:
         check_there(path, "a video or a folder of images")
     if not drives and streets < 1:
         raise InputError("nothing to train on; give --drives VIDEO|DIR, --streets N or both")
     use_all_cores()
-    from dreamdrive_train.pairs import PairTraining
+    from dreamdrive.evaluate.networks import stlpips as networks
+    from dreamdrive_train.pairs import TRUNK, PairTraining
     from dreamdrive_train.restorer import FIRST_SEED, RESTORER, RestorerPairs, restorer_pairs
 
+    if stlpips:
+        networks.load_stlpips(TRUNK)  # before hours go into pairs
     seeds = range(FIRST_SEED, FIRST_SEED + streets)
     sources = restorer_pairs(drives, seeds, knowledge, RestorerPairs(each=each))
-    options = PairTraining(steps=steps, seed=seed, rate=rate, batch=batch)
+    options = PairTraining(steps=steps, seed=seed, rate=rate, batch=batch, stlpips=stlpips)
     _learn(RESTORER, sources, out, knowledge, options, licence, device)
 
 

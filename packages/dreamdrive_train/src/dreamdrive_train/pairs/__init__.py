@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         make_pairs as make_pairs,
     )
     from dreamdrive_train.pairs.training import (
+        TRUNK as TRUNK,
         PairTask as PairTask,
         PairTraining as PairTraining,
         batch_of as batch_of,
