@@ -19,7 +19,5 @@ antialias: the same with antialiasing (torchmetrics); clean: antialiased bicubic
 Covariance = Literal["sample", "population"]
 FILL_NETWORK, FILL_INPAINT = "network", "inpaint"
 """What fills what a photo does not show, in place of a file: the weights that ship, no network at all."""
-RESTORE_NETWORK = "network"
-"""What mends views from aside, in place of a file: the weights that ship."""
 Stlpips = Literal["alex", "vgg", "both"]
 """Trunk of the shift-tolerant LPIPS; that of VGG takes four times as long."""

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from dreamdrive.build import Built
+from dreamdrive.restore import RestorerNetwork
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -23,7 +24,7 @@ def doubled(scene: Scene, *_: object) -> Scene:
     return scene.with_standing(scene.static)
 
 
-def darkened(built: Built, scene: Scene) -> SimpleNamespace:
+def darkened(built: Built, scene: Scene, network: RestorerNetwork) -> SimpleNamespace:
     def view(camera: Camera, t_s: float) -> SceneView:
         seen = render_scene(scene, camera, t_s)
         return replace(seen, colour=0.5 * seen.colour)
@@ -39,7 +40,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> Built:
 
 
 def test_each_state_is_made_and_shown(built: Built) -> None:
-    states, made = completion.states_of(built)
+    states, made = completion.states_of(built, RestorerNetwork((8, 8)))
     assert states["bare"].scene is states["restored"].scene is built.scene
     assert [made[name]["added"] for name in states] == [0, len(built.scene.static)] * 2
     sheet = completion.sheet_of(states)
@@ -52,7 +53,7 @@ def test_each_state_is_made_and_shown(built: Built) -> None:
 
 def test_a_drive_is_judged_where_its_frames_count(built: Built) -> None:
     scene = built.scene
-    states, _ = completion.states_of(built)
+    states, _ = completion.states_of(built, RestorerNetwork((8, 8)))
     pictures = [
         render_scene(scene, scene.cameras[k], float(scene.times_s[k])).picture
         for k in range(len(scene.cameras))

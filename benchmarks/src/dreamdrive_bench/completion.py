@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from dreamdrive.build import Built, build_scene
 from dreamdrive.complete import CompletionOptions, completed
 from dreamdrive.evaluate.networks import stlpips
 from dreamdrive.options import Options
-from dreamdrive.restore import Recordings, Restorer, load_restorer
+from dreamdrive.restore import Recordings, Restorer, RestorerNetwork, load_restorer
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip
 from dreamdrive.scene.geometry import Geometry
@@ -64,7 +65,7 @@ STATES = {
     "restored": State(complete=False, restore=True),
     "both": State(complete=True, restore=True),
 }
-"""By their names; all are measured and shown in this order."""
+"""By their names; all are measured and shown in this order, the restored ones where weights are given."""
 
 
 @dataclass(frozen=True)
@@ -85,20 +86,22 @@ def main() -> int:
     """Measure, draw sheets, print the table and write all as JSON."""
     parser = parser_of(__doc__, runs="runs/completion", markdown=True)
     parser.add_argument("--seeds", type=int, nargs="*", default=list(TEST[:8]))
+    parser.add_argument("--restorer", type=Path, help="weights; without them nothing is restored")
     parser.add_argument("--drives", nargs="*", default=None, metavar="NAME", help="without it all there are")
     args = parser.parse_args()
     there = {name: drive for name, drive in drives().items() if drive.folder.exists()}
+    network = None if args.restorer is None else load_restorer(args.restorer)
     shown: list[dict[str, Any]] = []
     for name in there if args.drives is None else args.drives:
         built = fitted(there[name].clip(), options_of(there[name], TWIN, "draft"))
-        states, made = states_of(built)
+        states, made = states_of(built, network)
         write_png(args.runs / f"{name}.png", sheet_of(states))
         for state, each in states.items():
             made[state]["held_out"] = withheld(each, built.clip, built.geometry)
         shown.append({"name": name, "drifts": built.scene.moves_per_frame, "states": made})
         print(name, {state: each["held_out"] for state, each in made.items()}, flush=True)
     distance = stlpips.load_stlpips("vgg") if args.seeds else None
-    rows = [measured(seed, distance) for seed in args.seeds if distance is not None]
+    rows = [measured(seed, network, distance) for seed in args.seeds if distance is not None]
     worlds = {"set": set_of(args.seeds), "rows": rows}
     report = {"machine": describe_machine(), "worlds": worlds, "drives": shown}
     return publish(args, report, table(rows), ())
@@ -109,7 +112,9 @@ def fitted(clip: Clip, options: Options) -> Built:
     return build_scene(clip, replace(options, completion=CompletionOptions(aside_m=0.0)))
 
 
-def states_of(built: Built) -> tuple[dict[str, Shown], dict[str, dict[str, float | None]]]:
+def states_of(
+    built: Built, network: RestorerNetwork | None
+) -> tuple[dict[str, Shown], dict[str, dict[str, float | None]]]:
     """The scene in each state; and of each how many Gaussians that added, and in what seconds of one core."""
     states, made = dict[str, Shown](), dict[str, dict[str, float | None]]()
     began_s = time.process_time()
@@ -117,7 +122,12 @@ def states_of(built: Built) -> tuple[dict[str, Shown], dict[str, dict[str, float
     took_s = time.process_time() - began_s
     for name, state in STATES.items():
         scene = full if state.complete else built.scene
-        view = restorer_of(built, scene).view if state.restore else partial(render_scene, scene)
+        if not state.restore:
+            view = partial(render_scene, scene)
+        elif network is not None:
+            view = restorer_of(built, scene, network).view
+        else:
+            continue
         states[name] = Shown(scene, view)
         began_s = time.process_time()
         view(scene.cameras[0].moved(ASIDE_M), float(scene.times_s[0]))
@@ -129,13 +139,13 @@ def states_of(built: Built) -> tuple[dict[str, Shown], dict[str, dict[str, float
     return states, made
 
 
-def restorer_of(built: Built, scene: Scene) -> Restorer:
+def restorer_of(built: Built, scene: Scene, network: RestorerNetwork) -> Restorer:
     """That of a scene in some state, with the frames that it was fitted to."""
     assert scene.residual is not None
     evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
     frames = built.clip.frames
     recordings = Recordings(scene, evidence, lambda view: frames[view], np.flatnonzero(~scene.held_out))
-    return Restorer(recordings, load_restorer())
+    return Restorer(recordings, network)
 
 
 def withheld(shown: Shown, clip: Clip, geometry: Geometry) -> float | None:
@@ -149,10 +159,10 @@ def withheld(shown: Shown, clip: Clip, geometry: Geometry) -> float | None:
     return float(np.mean(found)) if found else None
 
 
-def measured(seed: int, distance: Distance) -> dict[str, Any]:
+def measured(seed: int, network: RestorerNetwork | None, distance: Distance) -> dict[str, Any]:
     """The figures of one street, by state and view."""
     clip = clip_of(Case(seed, "true", "clean"))
-    states, made = states_of(fitted(clip, QUALITY))
+    states, made = states_of(fitted(clip, QUALITY), network)
     found: dict[str, dict[str, Any]] = {name: dict(made[name]) for name in states}
     for view in VIEWS:
         truth, cameras = seen(seed, view, clip), true_cameras(seed, view)
@@ -201,7 +211,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     """Means over the streets, a state and view a line."""
     lines = [["view", "state", *(f"{group}, dB" for group in GROUPS), "stlpips-vgg", "s", "s a frame"]]
     for view in VIEWS if rows else ():
-        for name in STATES:
+        for name in rows[0]["states"]:
             found = [row["states"][name] for row in rows]
             cells = [mean_of([one[view][key] for one in found]) for key in (*GROUPS, "stlpips")]
             seconds = [mean_of([one[key] for one in found]) for key in ("seconds", "frame_s")]

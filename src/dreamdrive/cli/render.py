@@ -16,7 +16,7 @@ from dreamdrive.cli.terminal.progress import Bars
 from dreamdrive.cli.trust import believed, bent, trust_of
 from dreamdrive.errors import InputError
 from dreamdrive.files.given import SCENE, WANTED, check_there
-from dreamdrive.names import RESTORE_NETWORK, Format, Show
+from dreamdrive.names import Format, Show
 from dreamdrive.scene.control import check_numbers, check_render_size
 
 
@@ -30,8 +30,8 @@ class ShownFlags:
         completion: Whether guesses are shown where no frame saw anything.
         size: Size of the frames; the horizontal field of view stays. Without it that of the recording.
         without: Leave a moving thing out, by the id that scene.json gives it. It may be given several times.
-        restore: Mend views with what the recorded frames show of the same surfaces: network takes the weights
-            that ship, else a file of dreamdrive train restorer.
+        restore: Mend views with what the recorded frames show of the same surfaces, by weights of dreamdrive
+            train restorer.
         blur: Make heads of people and plates of vehicles coarse, as far as the street network finds them.
     """
 
@@ -39,7 +39,7 @@ class ShownFlags:
     completion: bool = True
     size: Annotated[str | None, arg(metavar="WxH", help_behavior_hint="")] = None
     without: Annotated[UseAppendAction[tuple[int, ...]], arg(metavar="ID", help_behavior_hint="")] = ()
-    restore: Annotated[str | None, arg(metavar="network|FILE", help_behavior_hint="")] = None
+    restore: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     blur: bool = False
 
 
@@ -82,8 +82,7 @@ def render(
         raise InputError("--blur changes colours in pictures; leave it out with npz and with --show depth")
     if shown.restore is not None and shown.show != "colour":
         raise InputError(f"--restore mends colours; leave it out with --show {shown.show}")
-    if shown.restore not in (None, RESTORE_NETWORK):
-        check_there(Path(shown.restore), WANTED["restore"])
+    check_there(shown.restore, WANTED["weights"])
     check_there(out, SCENE)
     use_all_cores()
     from dreamdrive.compute.device import computing_on

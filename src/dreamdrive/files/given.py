@@ -27,7 +27,6 @@ WANTED = {
     "weights": _WEIGHTS,
     "knowledge": "weights of the street network",
     "fill": "network, inpaint or a file of weights",
-    "restore": "network or a file of weights",
     "options": "a TOML file, see docs/options.md",
     "edits": "edits.json of a scene that dreamdrive edit wrote",
     "layout": "a layout, see docs/layout.md",

@@ -10,7 +10,6 @@ from dreamdrive import _native
 from dreamdrive.compute.device import in_core
 from dreamdrive.errors import InputError
 from dreamdrive.models import HalfUNet, fill_network, read_state
-from dreamdrive.names import RESTORE_NETWORK
 
 FRAMES = 2
 """Recorded frames that are carried over to a view."""
@@ -23,7 +22,6 @@ MOVES, ERROR, UNSEEN = 5, 6, 7
 FIRST_PLANES = range(OF_VIEW, CHANNELS, OF_FRAME)
 """Where each recorded frame begins in these."""
 WIDTHS = (16, 48, 96, 192)
-_FILE = Path(__file__).with_name("restorer.safetensors")
 EXPECTED = "weights of the restorer, as `dreamdrive train restorer` writes them"
 _AROUND = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
 _BESIDE = tuple((0, dx) for dx in (-3, -2, 2, 3))
@@ -115,13 +113,12 @@ def _shifted(wide: Float[Tensor, "n c h2 w2"], shift: tuple[int, int]) -> Float[
     return wide[..., top : top + height, left : left + width]
 
 
-def load_restorer(given: str | Path = RESTORE_NETWORK) -> RestorerNetwork:
-    """The network with the weights that ship, or with those of a file of ``dreamdrive train restorer``.
+def load_restorer(path: Path) -> RestorerNetwork:
+    """The network with the weights that ``dreamdrive train restorer`` wrote to a file.
 
     Raises:
         InputError: There is no such file, or it is of something else.
     """
-    path = _FILE if given == RESTORE_NETWORK else Path(given)
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; expected {RESTORE_NETWORK} or {EXPECTED}")
+        raise InputError(f"{path}: there is no such file; expected {EXPECTED}")
     return fill_network(RestorerNetwork, read_state(path, EXPECTED), str(path), EXPECTED)

@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 
 from dreamdrive.compute.device import CPU
-from dreamdrive.names import RESTORE_NETWORK
 from dreamdrive.restore.carried import Recordings
 from dreamdrive.restore.network import RestorerNetwork, load_restorer
 from dreamdrive.scene.camera import Camera
@@ -35,10 +34,10 @@ class Restorer:
         cls,
         scene: Scene,
         evidence: GaussianEvidence,
-        weights: str | Path = RESTORE_NETWORK,
+        weights: Path,
         device: torch.device = CPU,
     ) -> "Restorer":
-        """That of a scene, with the weights that ship or with those of ``dreamdrive train restorer``.
+        """That of a scene, with weights of ``dreamdrive train restorer``.
 
         Raises:
             InputError: The scene was changed or holds no recorded frames, or there are no such weights.

@@ -77,7 +77,7 @@ def write_drive(
     trust = (trust or SceneTrust.of(scene)) if options.show == "trust" else None
     expected_db: list[float] = []
 
-    def view(place: tuple[Camera, float]) -> SceneView | TrustedView:
+    def seen_at(place: tuple[Camera, float]) -> SceneView | TrustedView:
         if restorer is not None:
             return restorer.view(*place)
         return render_scene(scene, *place, part=part) if trust is None else trust.view(*place)
@@ -88,7 +88,7 @@ def write_drive(
         # The core splats with all threads; what torch and NumPy do for a restorer takes one.
         at_once = restorer is not None
         with one_torch_thread() if at_once else nullcontext():
-            for i, seen in enumerate(ahead(view, places) if at_once else map(view, places)):
+            for i, seen in enumerate(ahead(seen_at, places) if at_once else map(seen_at, places)):
                 if isinstance(seen, TrustedView):
                     expected_db.append(seen.psnr_db)
                 yield seen

@@ -44,8 +44,8 @@ def on_the_road(
 
     Wheels touch the road, the floor between them does not: the line of contact is the lower convex hull of
     the outline, taken of those columns in which the ground is seen right below. Columns between these are on
-    the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing; but who sits on
-    a two-wheeler, or the upper part of a person that was taken for two, is where that below it is.
+    the hull, too. A thing whose foot is hidden, by the border or by another one, gets nothing; but who sits
+    on a two-wheeler, or the upper part of a person that was taken for two, is where that below it is.
 
     ``plane_inverse`` is inverse depth of the road in 1/m, ``camera_height_m`` above which the camera is;
     ``is_vehicle`` has a flag for each label, 0 included. The surface of a vehicle is nearer than its contact.
