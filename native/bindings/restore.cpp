@@ -1,5 +1,4 @@
 // Python bindings of the restorer.
-#include <algorithm>
 #include <cstdlib>
 
 #include "arrays.h"

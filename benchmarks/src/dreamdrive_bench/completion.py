@@ -29,7 +29,6 @@ from dreamdrive.scene.geometry import Geometry
 from dreamdrive.scene.scene import Scene
 from dreamdrive.show import grid as panels, write_png
 from dreamdrive.splat import SceneView, render_scene
-from dreamdrive.trust import evidence_of
 from dreamdrive_bench.common.machine import describe_machine
 from dreamdrive_bench.common.markdown import grid, number
 from dreamdrive_bench.common.options import parser_of
@@ -141,11 +140,7 @@ def states_of(
 
 def restorer_of(built: Built, scene: Scene, network: RestorerNetwork) -> Restorer:
     """That of a scene in some state, with the frames that it was fitted to."""
-    assert scene.residual is not None
-    evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
-    frames = built.clip.frames
-    recordings = Recordings(scene, evidence, lambda view: frames[view], np.flatnonzero(~scene.held_out))
-    return Restorer(recordings, network)
+    return Restorer(Recordings.fitted(scene, built.clip.frames), network)
 
 
 def withheld(shown: Shown, clip: Clip, geometry: Geometry) -> float | None:

@@ -17,7 +17,7 @@ from dreamdrive.restore.network import CHANNELS, FRAMES, MOVES, OF_FRAME, OF_VIE
 from dreamdrive.scene.camera import NEAR_M, Camera
 from dreamdrive.scene.scene import Scene
 from dreamdrive.splat import SceneView, moment_of, render_scene
-from dreamdrive.trust import GaussianEvidence, rows_at
+from dreamdrive.trust import GaussianEvidence, evidence_of, rows_at
 
 _LATER_M_S, _TURNED_M = 3.0, 5.0
 """A frame that much later, or turned by one radian, is as good as one that many metres farther away."""
@@ -67,6 +67,13 @@ class Recordings:
             return frame_of(kept[view], (camera.width_px, camera.height_px))
 
         return cls(scene, evidence, frame, np.array([view for view, data in enumerate(kept) if data]))
+
+    @classmethod
+    def fitted(cls, scene: Scene, frames: UInt8[np.ndarray, "f h w 3"]) -> "Recordings":
+        """Those of a scene that was just fitted, with the frames of its clip; withheld ones are not used."""
+        assert scene.residual is not None
+        evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
+        return cls(scene, evidence, lambda view: frames[view], np.flatnonzero(~scene.held_out))
 
     def nearest(self, camera: Camera, t_s: float, besides: int | None = None) -> list[int]:
         """The recorded views that are nearest in place, direction and time; less one of them, if told."""
@@ -124,10 +131,8 @@ class Recordings:
         there, solid = self.scene.cameras[view], depth_m > 0
         # Single precision, but for the place: two cameras may be far from where the world begins.
         pose = there.camera_from_world @ camera.world_from_camera
-        rays = (camera.rays() @ pose[:3, :3].T).astype(np.float32)
-        local = np.where(solid, depth_m, np.float32(_FAR_M))[..., None] * rays + pose[:3, 3].astype(
-            np.float32
-        )
+        rays, from_m = (camera.rays() @ pose[:3, :3].T).astype(np.float32), pose[:3, 3].astype(np.float32)
+        local = np.where(solid, depth_m, np.float32(_FAR_M))[..., None] * rays + from_m
         if shift_m is not None:
             local += shift_m @ there.camera_from_world[:3, :3].T.astype(np.float32)
         z_m = local[..., 2]
@@ -146,9 +151,8 @@ class Recordings:
         sure = inside * np.exp(off * np.float32(-1 / _SAME))
         rgb = cv2.remap(self.frame(view), u - 0.5, v - 0.5, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         carried = np.empty((OF_FRAME, *sure.shape), np.float32)
-        np.multiply(
-            rgb.transpose(2, 0, 1), np.where(inside, np.float32(1 / 255), np.float32(0)), out=carried[:3]
-        )
+        carried[:3] = rgb.transpose(2, 0, 1)
+        carried[:3] *= inside * np.float32(1 / 255)
         carried[3] = sure
         return carried
 

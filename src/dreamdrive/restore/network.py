@@ -59,26 +59,21 @@ class RestorerNetwork(HalfUNet):
         """
         answer, _ = self.answered(told)
         wide = _wide(told)
-        compiled = in_core(told) and not torch.is_grad_enabled()
-        return (
-            torch.stack([_mixed_in_core(a, w) for a, w in zip(answer, wide, strict=True)])
-            if compiled
-            else mixed(answer, wide)
-        )
+        if torch.is_grad_enabled() or not in_core(told):
+            return _mixed(answer, wide)
+        return torch.stack([_mixed_in_core(*each) for each in zip(answer, wide, strict=True)])
 
 
 def _wide(told: Float[Tensor, "n 16 h w"]) -> Float[Tensor, "n p 4 h2 w2"]:
     """The view and the carried frames, RGB and how sure each is (0, 1], with a border."""
-    sure = [torch.ones_like(told[:, :1])] + [
-        told[:, first + 3 : first + 4] + _LEAST for first in FIRST_PLANES
-    ]
-    rgb = [told[:, :3]] + [told[:, first : first + 3] for first in FIRST_PLANES]
-    planes = torch.cat([each for pair in zip(rgb, sure, strict=True) for each in pair], dim=1)
-    wide = torch.nn.functional.pad(planes, [_MOST_PX] * 4, mode="replicate")
+    planes = [told[:, :3], torch.ones_like(told[:, :1])]
+    for first in FIRST_PLANES:
+        planes += [told[:, first : first + 3], told[:, first + 3 : first + 4] + _LEAST]
+    wide = torch.nn.functional.pad(torch.cat(planes, dim=1), [_MOST_PX] * 4, mode="replicate")
     return wide.unflatten(1, (-1, 4))
 
 
-def mixed(answer: Float[Tensor, "n k h w"], wide: Float[Tensor, "n p 4 h2 w2"]) -> Float[Tensor, "n 3 h w"]:
+def _mixed(answer: Float[Tensor, "n k h w"], wide: Float[Tensor, "n p 4 h2 w2"]) -> Float[Tensor, "n 3 h w"]:
     """Pixels as the network's answer mixes them from the pictures of ``_wide``."""
     logits, signed = answer.split([len(_PLACES), len(_DETAIL)], dim=1)
     # Gently, or the first steps drive it to its ends, where it learns no more.

@@ -31,11 +31,7 @@ class Restorer:
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        evidence: GaussianEvidence,
-        weights: Path,
-        device: torch.device = CPU,
+        cls, scene: Scene, evidence: GaussianEvidence, weights: Path, device: torch.device = CPU
     ) -> "Restorer":
         """That of a scene, with weights of ``dreamdrive train restorer``.
 

@@ -86,9 +86,9 @@ def write_drive(
         path = drive.path
         places = [(camera.at(path.world_from_camera[i]), float(path.times_s[i])) for i in range(len(path))]
         # The core splats with all threads; what torch and NumPy do for a restorer takes one.
-        at_once = restorer is not None
-        with one_torch_thread() if at_once else nullcontext():
-            for i, seen in enumerate(ahead(seen_at, places) if at_once else map(seen_at, places)):
+        with nullcontext() if restorer is None else one_torch_thread():
+            shown = map(seen_at, places) if restorer is None else ahead(seen_at, places)
+            for i, seen in enumerate(shown):
                 if isinstance(seen, TrustedView):
                     expected_db.append(seen.psnr_db)
                 yield seen

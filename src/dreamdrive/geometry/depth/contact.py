@@ -94,12 +94,10 @@ def _carry(
     """People and two-wheelers without a contact get that of what carries them: no vehicle, right below."""
     placed = np.bincount(instances.ravel(), inverse.ravel(), minlength=len(is_vehicle)) > 0
     above, under = instances[:-1], instances[1:]
-    for label in np.flatnonzero(~placed & ~is_vehicle).tolist():
-        border = np.bincount(under[(above == label) & (under != label)], minlength=len(is_vehicle))
-        border[~placed | is_vehicle] = 0
-        border[0] = 0
-        carrier = int(border.argmax())
-        if label == 0 or border[carrier] < _LEAST_BORDER_PX:
+    for label in (1 + np.flatnonzero(~placed[1:] & ~is_vehicle[1:])).tolist():
+        border = np.bincount(under[above == label], minlength=len(is_vehicle))
+        carrier = int(np.where(placed & ~is_vehicle, border, 0).argmax())
+        if not carrier or border[carrier] < _LEAST_BORDER_PX:
             continue
         inside = (instances == carrier) & (inverse > 0)
         inverse[instances == label] = np.median(inverse[inside])

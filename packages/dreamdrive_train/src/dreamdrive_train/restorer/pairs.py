@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from dreamdrive.build import Built, build_scene
+from dreamdrive.build import build_scene
 from dreamdrive.data.clip_reader import read_clip
 from dreamdrive.errors import InputError
 from dreamdrive.options import QUALITIES
@@ -22,7 +22,6 @@ from dreamdrive.restore import CHANNELS, Recordings
 from dreamdrive.scene.camera import Camera
 from dreamdrive.scene.clip import Clip, Known
 from dreamdrive.scene.street.truth import DriveTruth, Semantic
-from dreamdrive.trust import evidence_of
 from dreamdrive_train.pairs import CROP_PX, PlaneRange, Source
 from streetworld import make_street
 from streetworld.corruption import corrupt, parse_corruption
@@ -87,7 +86,7 @@ def street_pairs(
     if generator.random() < _CORRUPTED:
         frames = corrupt(frames, parse_corruption("generated", seed), made.depth_m)
     built = build_scene(_drawn(made, frames, options), replace(QUALITIES["draft"], knowledge=knowledge))
-    recordings = _recordings(built)
+    recordings = Recordings.fitted(built.scene, built.clip.frames)
     for _ in range(options.each):
         frame = int(generator.integers(options.frames))
         camera = _aside(made.cameras[frame], options, generator)
@@ -120,7 +119,7 @@ def drive_pairs(
     clip = replace(clip, held_out=held_out)
     clip = clip.with_features(appearance=appearance(clip.frames, clip.valid))
     built = build_scene(clip, replace(QUALITIES["draft"], knowledge=knowledge))
-    recordings = _recordings(built)
+    recordings = Recordings.fitted(built.scene, built.clip.frames)
     views, street = np.flatnonzero(held_out), built.geometry.fixed_regions[0] == 0
     for view in generator.permutation(views)[: options.each].tolist():
         _, told = recordings.told(built.scene.cameras[view], float(clip.times_s[view]))
@@ -142,13 +141,6 @@ def _drawn(made: DriveTruth, frames: UInt8[np.ndarray, "f h w 3"], options: Rest
         known=Known(made.trajectory.world_from_camera, intrinsics=True),
     )
     return clip.with_features(appearance=appearance(clip.frames, clip.valid))
-
-
-def _recordings(built: Built) -> Recordings:
-    scene = built.scene
-    assert scene.residual is not None
-    evidence = evidence_of(scene, np.square(scene.residual.astype(np.float32)))
-    return Recordings(scene, evidence, lambda view: built.clip.frames[view], np.flatnonzero(~scene.held_out))
 
 
 def _aside(camera: Camera, options: RestorerPairs, generator: np.random.Generator) -> Camera:
