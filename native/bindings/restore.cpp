@@ -1,6 +1,4 @@
 // Python bindings of the restorer.
-#include <cstdlib>
-
 #include "arrays.h"
 #include "kernels/types.h"
 #include "parts.h"
@@ -13,8 +11,9 @@ constexpr int64_t kRows = 8;  // of a part; which they are does not depend on th
 
 // The places are tried before anything is read: a wrong one would be outside of the pictures.
 void expect_inside(const int32_t* away, int reach) {
-  if (std::abs(away[0]) > reach || std::abs(away[1]) > reach)
-    throw nb::value_error("taps, details: expected places within the border of the pictures");
+  for (int k = 0; k < 2; k++)
+    if (away[k] < -reach || away[k] > reach)
+      throw nb::value_error("taps, details: expected places within the border of the pictures");
 }
 
 void mix(In answer, In pictures, Places taps, Places details, float own, float most_detail, float gentle, Out mixed) {

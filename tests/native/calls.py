@@ -184,6 +184,20 @@ def _minimum_cut() -> Arguments:
     return {"gain": gain, "right": right, "below": below, "labelled": np.zeros((8, 8), bool)}
 
 
+def _mix() -> Arguments:
+    reach = 2
+    return {
+        "answer": _f(3, _H, _W),
+        "pictures": np.abs(_f(2, 4, _H + 2 * reach, _W + 2 * reach)) + np.float32(0.1),
+        "taps": np.array([[0, 0, 0], [1, -reach, reach]], np.int32),
+        "details": np.array([[0, -reach]], np.int32),
+        "own": 4.0,
+        "most_detail": 0.5,
+        "gentle": 4.0,
+        "mixed": _z(3, _H, _W),
+    }
+
+
 CALLS: dict[str, Callable[[], Arguments]] = {
     "gaussians": _gaussians,
     "forward": _forward,
@@ -252,5 +266,6 @@ CALLS: dict[str, Callable[[], Arguments]] = {
     "smooth": _smooth,
     "weighted_median": lambda: {"values": _f(5, 40), "weights": np.abs(_f(5, 40)), "median": _z(40)},
     "minimum_cut": _minimum_cut,
+    "mix": _mix,
 }
 """A right call of each function, by its name."""

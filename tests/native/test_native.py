@@ -195,3 +195,12 @@ def test_weights_that_would_overflow_are_no_cut() -> None:
             given[name][0, 0] = extreme
             with pytest.raises(ValueError, match="weights of 0 or more below 2\\^30"):
                 _native.minimum_cut(**given)
+
+
+def test_nothing_is_mixed_from_outside_of_the_pictures() -> None:
+    for name, column in (("taps", 0), ("taps", 1), ("taps", 2), ("details", 0), ("details", 1)):
+        for extreme in (3, -3, 2**31 - 1, -(2**31)):
+            given = CALLS["mix"]()
+            given[name][0, column] = extreme
+            with pytest.raises(ValueError, match="no such picture|within the border"):
+                _native.mix(**given)
