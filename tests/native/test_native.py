@@ -202,5 +202,5 @@ def test_nothing_is_mixed_from_outside_of_the_pictures() -> None:
         for extreme in (3, -3, 2**31 - 1, -(2**31)):
             given = CALLS["mix"]()
             given[name][0, column] = extreme
-            with pytest.raises(ValueError, match="no such picture|within the border"):
+            with pytest.raises(ValueError, match=r"no such picture|within the border"):
                 _native.mix(**given)
